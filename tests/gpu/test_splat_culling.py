@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu import chunks, splat_culling
+from viewer.gpu import chunks, culling, gl, splat_culling
 from viewer.gpu.amplify import Points
 from viewer.gpu.surface import Surface
 from viewer.look import Look
@@ -320,3 +321,116 @@ def test_chunks_that_face_away_hold_no_splat_that_faces_the_eye(
     faces_eye = ~surface.view.faces_away(cloud.positions, normals)
     assert not (is_away & faces_eye).any()
     surface.release()
+
+
+class Twin:
+    """The plain version of chunks/cull.comp for splats, chunk by chunk in float64."""
+
+    def __init__(self, view: View, margins: culling.Margins, told: splat_culling.SplatChunks) -> None:
+        self.view, self.margins = view, margins
+        self.low, self.high = np.moveaxis(read(told.boxes.boxes, 6).reshape(-1, 2, 3), 1, 0)
+        self.cones, self.reaches = read(told._cones, 4), read(told._reaches, 1)[:, 0]
+
+    def scale_at(self, depth: float) -> float:
+        return self.view.scale / depth if self.view.perspective else self.view.scale
+
+    def reach(self, chunk: int) -> tuple[bool, np.ndarray, np.ndarray, float]:
+        """Whether it is in view, the first and the last pixel of it, and its nearest depth."""
+        view, margins, low, high = self.view, self.margins, self.low[chunk], self.high[chunk]
+        far = view.depths((low + high) / 2) + np.abs(view.rotation[2]) @ (high - low) / 2
+        radius = margins.radius_scale * max(self.reaches[chunk], margins.uniform_radius)
+        least = margins.least_radius / self.scale_at(max(far, view.near))
+        slack = margins.box_slack + 1.001 * max(radius, least)
+        corners = np.array(list(itertools.product(*np.transpose([low - slack, high + slack]))))
+        pixels, depths = view.project(corners)
+        near, far = depths.min(), depths.max()
+        first, last = pixels.min(axis=0), pixels.max(axis=0)
+        is_before = not view.perspective or near > max(view.near, 1e-6 * far)
+        if not is_before:
+            first, last = np.zeros(2), np.array(SIZE, float)
+        first = np.maximum(first - margins.pixel_margin, 0)
+        last = np.minimum(last + margins.pixel_margin, np.array(SIZE) - 1.0)
+        in_view = (first <= last).all() and view.near <= far and near <= view.far
+        is_before = is_before and slack * self.scale_at(near) < 60
+        return in_view, first.astype(int), np.maximum(last, 0).astype(int), near * (1 - 1e-5) * is_before
+
+    def faces_away(self, chunk: int) -> bool:
+        """Whether a sphere round its points and a cone round its normals leave none that faces the eye."""
+        center, cone = (self.low[chunk] + self.high[chunk]) / 2, self.cones[chunk]
+        to_eye = -(self.view.rotation @ center + self.view.translation)
+        radius = 0.5 * np.linalg.norm(self.high[chunk] - self.low[chunk])
+        if not self.view.perspective:
+            to_eye, radius = np.array([0.0, 0, 1]), 0.0
+        far, facing = np.linalg.norm(to_eye), self.view.rotation @ cone[:3] @ to_eye
+        across, sine = np.sqrt(max(far**2 - facing**2, 0)), np.sqrt(max(1 - cone[3] ** 2, 0))
+        is_beside = cone[3] > 0 and facing < (cone[3] - 1e-4) * far
+        return bool(is_beside and facing * cone[3] + across * sine < -radius - 1e-4 * far)
+
+    def first_word(self, chunk: int, before: int) -> int:
+        in_view = self.reach(chunk)[0]
+        away = in_view and self.margins.cull_back and self.faces_away(chunk)
+        hidden = in_view and before & 16 != 0
+        listed = in_view and not away and not (self.margins.trusts and hidden)
+        return 1 * listed | 4 * in_view | 8 * away | 16 * hidden
+
+    def is_hidden(self, chunk: int, depth: np.ndarray, spare: int) -> bool:
+        _, first, last, nearest = self.reach(chunk)
+        left, top = np.maximum(first - spare, 0) // 16 * 16
+        right, bottom = (last + spare) // 16 * 16 + 16
+        far = depth[top:bottom, left:right].max()
+        behind = np.inf if np.isinf(far) else self.margins.pixels_behind / self.scale_at(far)
+        return bool(far + max(self.margins.behind, behind) < nearest)
+
+    def second_word(self, chunk: int, word: int, depth: np.ndarray) -> int:
+        may_show = word & 4 != 0 and word & 8 == 0
+        shown = may_show and not self.is_hidden(chunk, depth, 0)
+        hidden = may_show and not shown and self.is_hidden(chunk, depth, self.margins.spare_pixels)
+        return word & ~16 | 2 * shown | 16 * hidden
+
+
+def read(texels: gl.BufferTexture, numbers: int) -> np.ndarray:
+    return np.frombuffer(texels.buffer.read(), np.float32).reshape(-1, numbers).astype(np.float64)
+
+
+@pytest.mark.parametrize("perspective", [True, False])
+def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, perspective: bool) -> None:
+    rng, chunk, count = np.random.default_rng(8), 32, 4096
+    seen_words: set[int] = set()
+    different = 0
+    for number in range(6):
+        normals = sphere(rng, count // chunk).repeat(chunk, axis=0) + 0.3 * sphere(rng, count)
+        points = 2 * rng.normal(size=(count // chunk, 3)).repeat(chunk, axis=0)
+        points += rng.uniform(0.05, 0.4) * rng.normal(size=(count, 3))
+        radii = rng.uniform(0.01, 0.05, count)
+        cloud = PointCloud.from_arrays(points, normals=normals, radii=radii, origin=np.zeros(3))
+        pose = renderer.resident(Pose(0, 0.0, f"twin {number}", cloud))
+        pose.keep(chunks.Chunks)._order = chunks.in_file_order(cloud)
+        eye, kind = rng.normal(size=3) * 4, "perspective" if perspective else "orthographic"
+        camera = Camera(tuple(eye), tuple(rng.normal(size=3)), (0, 1, 0), kind, near=0.6, far=7.0)
+        surface = Surface(renderer.gpu, SIZE)
+        surface.start(pose, View.of(camera, SIZE, np.zeros(3), cloud.bounds()))
+        told = pose.keep(splat_culling.SplatChunks)
+        told.measure(Points(pose, True, count))
+        limits = splat_culling.SplatLimits(rng.uniform(0.5, 2), 0.03, 0.7, 0.05, 1.0, cull_back=number != 1)
+        margins = limits.margins(told.boxes.slack, number % 2 == 0, 5 * number)
+        twin = Twin(surface.view, margins, told)
+        before = 16 * rng.integers(0, 2, told.boxes.chunks).astype(np.uint32)
+        surface.keep(culling.SeenChunks).of(told.boxes).write(before)
+        told.test(surface, culling.START, margins)
+        first = told.boxes.seen(surface)
+        expected = np.array([twin.first_word(place, int(word)) for place, word in enumerate(before)])
+        different += np.count_nonzero(first != expected)
+
+        tiles = rng.uniform(0.5, 5, (5, 8)).astype(np.float32)
+        tiles[rng.random(tiles.shape) < 0.1] = np.inf
+        depth = tiles.repeat(16, axis=0).repeat(16, axis=1)[: SIZE[1], : SIZE[0]]
+        surface.depths.buffer.write(np.ascontiguousarray(depth))
+        culling.find_farthest(surface)
+        told.test(surface, culling.FIND, margins)
+        found = told.boxes.seen(surface)
+        expected = np.array([twin.second_word(place, int(word), depth) for place, word in enumerate(first)])
+        different += np.count_nonzero(found != expected)
+        seen_words |= set(found.tolist()) | set(first.tolist())
+        surface.release()
+    assert different <= 8, "of 1536 words, where float32 rounds to the other side"
+    assert {0, 4, 5, 7, 12, 20, 21} <= seen_words
