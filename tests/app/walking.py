@@ -57,31 +57,36 @@ class Walk:
 
     def _go_through(self, path: Path) -> None:
         """Act on the widgets that are reached by clicks on a path of others, and on those that they open."""
-        while self._reach(path) and (item := self._next(path)) is not None:
-            before = self._popups
+        left: list[int] = []
+        while self._reach(path):
+            left = left or self._new(path)
+            if not left:
+                return
+            item, before = left.pop(0), self._popups
             self._act(item)
             if self._popups and self._popups[-1] not in before:
                 longer = (*path, item)
                 self._opened[longer] = self._popups[-1]
                 self._go_through(longer)
 
-    def _next(self, path: Path) -> int | None:
-        """The first widget that nothing was done with; None where there is none."""
+    def _new(self, path: Path) -> list[int]:
+        """The widgets that nothing was done with, but for most of those that are alike."""
+        found = []
         for item in self._reachable(() if path else self._windows):
             if item not in self._seen:
-                words = self._words(item)
-                self._seen[item] = words
+                words = self._seen[item] = self._words(item)
                 alike = sum(other == words for other in self._seen.values())
                 if alike <= _MOST_ALIKE or words.endswith(": "):
-                    return item
-        return None
+                    found.append(item)
+        return found
 
     def _act(self, item: int) -> None:
         """Hover, rest, drag and click."""
         context, before, words = self._context, self._popups, self._seen[item]
         print(f"walk: {words}", file=sys.stderr, flush=True)  # the last one, should the process end
-        self._point_at(item)
-        self._look(words, 3)
+        if not self._point_at(item):
+            return
+        self._look(words)
         if self._presses and not any(words.endswith(f"###{name}") for name in self._skipped):
             context.mouse_drag_with_delta(_DRAG)
             self._look(f"drag of {words}")
