@@ -69,3 +69,9 @@ def test_landmarks_beside_the_surface_are_told() -> None:
     assert told is not None
     assert told.startswith("3 of 10 landmarks lie beside the surface (p0, p1, p2)")
     assert told_beside([Landmark("a")]) is None
+
+
+def test_a_title_has_the_name_in_words_where_one_is_known() -> None:
+    assert Landmark("sn", about="Subnasale: where the nose meets the lip").title == "Subnasale (sn)"
+    assert Landmark("vertex", about="Vertex: the highest point of the head").title == "vertex"
+    assert Landmark("mine", about="left of the scar").title == Landmark("mine").title == "mine"
