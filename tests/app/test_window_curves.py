@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from PIL import Image
 from virtual_screen import PANEL, ROOT, RunningApp, Screen, running_app
 
+from viewer.analysis.track import Known
 from viewer.camera import Camera
 from viewer.document.recording import Recording
-from viewer.output.overlays import PLACED_COLOR
+from viewer.output.overlays import STATE_MARKS
 
 RATE, FRAMES = 25.0, 50
 PEAK, WIDE, OPENING = 1.0, 0.25, 12.0  # seconds, seconds, scan units
@@ -196,7 +197,7 @@ def check_saved_picture(app: RunningApp, folder: Path) -> None:
     assert len(entry.landmarks) == 4
     assert sum(len(path.places) for path in entry.trajectories) == FRAMES
     assert [path.name.split()[0] for path in entry.measure_lines] == ["Distance", "Distance"]
-    marks = [(one.place, PLACED_COLOR) for one in entry.landmarks]
+    marks = [(one.place, STATE_MARKS[Known.PLACED].color) for one in entry.landmarks]
     (line, upper), way = entry.measure_lines, entry.trajectories[0]
     assert line.places == upper.places, "the latter covers the former"
     marks.append((line.places[len(line.places) // 2], upper.colors[0]))

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from viewer.analysis.track import Known
 from viewer.camera import Camera
 from viewer.geometry import Vector
 from viewer.look import Look
 from viewer.output.marks import Legend, Marks, marked, text_height
 from viewer.output.overlays import (
     MARK_RADIUS,
-    PLACED_COLOR,
-    TRACKED_COLOR,
+    STATE_MARKS,
     DrawnLandmark,
     DrawnPath,
     Overlay,
@@ -23,6 +24,7 @@ from viewer.output.overlays import (
     rounded,
     runs_of,
 )
+from viewer.srgb import linear_from_bytes
 
 SIZE = (2560, 1440)
 UNIT = 144  # pixels
@@ -57,12 +59,50 @@ def changed(image: NDArray[np.int64]) -> NDArray[np.bool_]:
 
 def test_landmarks_are_discs_where_they_are_in_the_colour_of_their_state() -> None:
     image = picture(DrawnLandmark((2.0, 1.0, 0.0), "", True), DrawnLandmark((-3.0, 0.0, 0.0), "", False))
-    assert image[at(2, 1)].tolist() == bytes_of(PLACED_COLOR)
-    assert image[at(-3, 0)].tolist() == bytes_of(TRACKED_COLOR)
+    assert image[at(2, 1)].tolist() == bytes_of(STATE_MARKS[Known.PLACED].color)
+    assert image[at(-3, 0)].tolist() == bytes_of(STATE_MARKS[Known.TRACKED].color)
     rows, columns = np.nonzero(changed(image)[:, SIZE[0] // 2 :])
     middle = rows.mean(), columns.mean() + SIZE[0] // 2
     assert middle == pytest.approx(at(2, 1), abs=1.1)
     assert len(rows) == pytest.approx(np.pi * (MARK_RADIUS * EM + 1) ** 2, rel=0.4)
+
+
+PROTAN = (0.152286, 1.052583, -0.204868), (0.114503, 0.786281, 0.099216), (-0.003882, -0.048116, 1.051998)
+DEUTAN = (0.367322, 0.860646, -0.227968), (0.280085, 0.672501, 0.047413), (-0.011820, 0.042940, 0.968881)
+TRITAN = (1.255528, -0.076749, -0.178779), (-0.078411, 0.930809, 0.147602), (0.004733, 0.691367, 0.303900)
+
+
+def seen_as(color: int, sight: tuple[tuple[float, ...], ...]) -> NDArray[np.float64]:
+    """CIELAB of a colour as it is seen. sight: from linear RGB to linear RGB (Machado, Oliveira and Fernandes
+    2009, severity 1)."""
+    linear = linear_from_bytes(np.array(bytes_of(color), np.uint8))
+    to_xyz = (
+        (0.4124564, 0.3575761, 0.1804375),
+        (0.2126729, 0.7151522, 0.0721750),
+        (0.0193339, 0.1191920, 0.9503041),
+    )
+    xyz = np.array(to_xyz) @ np.clip(np.array(sight) @ linear, 0, 1) / (0.95047, 1, 1.08883)
+    x, y, z = np.where(xyz > 216 / 24389, np.cbrt(xyz), (24389 / 27 * xyz + 16) / 116)
+    return np.array([116 * y - 16, 500 * (x - y), 200 * (y - z)])
+
+
+@pytest.mark.parametrize(
+    "sight", [np.eye(3), PROTAN, DEUTAN, TRITAN], ids=["all", "protan", "deutan", "tritan"]
+)
+def test_states_are_told_apart_whoever_looks(sight: tuple[tuple[float, ...], ...]) -> None:
+    for one, other in itertools.combinations(STATE_MARKS.values(), 2):
+        assert one.sides != other.sides, "also by their shapes"
+        assert np.linalg.norm(seen_as(one.color, sight) - seen_as(other.color, sight)) >= 20
+
+
+def test_the_shape_of_a_mark_tells_what_was_tracked() -> None:
+    image = picture(DrawnLandmark((2.0, 1.0, 0.0), "", True), DrawnLandmark((-3.0, 0.0, 0.0), "", False))
+    for place, diagonal in (((2, 1), True), ((-3, 0), False)):
+        row, column = at(*place)
+        away = round(0.8 * MARK_RADIUS * EM)  # in a disc to all sides, in a diamond not across
+        corner = round(0.66 * MARK_RADIUS * EM)
+        bright = [image[row, column + away].max() > 150, image[row + corner, column + corner].max() > 150]
+        assert bright == [True, diagonal]
 
 
 def test_a_ring_tells_how_sure_a_tracked_one_is() -> None:

@@ -14,6 +14,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..files import printable
 from ..look import rgba
+from ..output.overlays import MARK_RADIUS, StateMark, mark_radius
 from ..params import Parameter, describe
 from ..task import Task
 from . import theme
@@ -27,7 +28,6 @@ _NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span
 _FACTS = 6.0  # where facts begin, in heights of the font
 _NARROW = 15.0  # width of a window, in heights of the font, below which labels stand over their widgets
 ICON_WIDTH = 1.3  # of a button with an icon, in heights of frames
-_DOT = 0.25  # radius, in heights of the font
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
@@ -289,13 +289,21 @@ def edited(path: str, text: str) -> str:
     return kept + text[len(printable(kept)) :]
 
 
-def dot(middle: ImVec2, color: int | None) -> None:
-    """A small disc on the screen, of a colour 0xRRGGBB, to show a state; a faint ring without one."""
-    draw_list, radius = imgui.get_window_draw_list(), _DOT * imgui.get_font_size()
-    if color is None:
-        draw_list.add_circle(middle, radius, imgui.get_color_u32(imgui.Col_.text_disabled))
+def state_mark(middle: ImVec2, mark: StateMark | None) -> None:
+    """Draw the mark of a landmark's state on the screen; a faint ring without one."""
+    draw_list, em = imgui.get_window_draw_list(), imgui.get_font_size()
+    if mark is None:
+        draw_list.add_circle(middle, MARK_RADIUS * em, imgui.get_color_u32(imgui.Col_.text_disabled))
     else:
-        draw_list.add_circle_filled(middle, radius, theme.packed(color))
+        fill_mark(draw_list, middle, mark_radius(mark.sides) * em, mark.sides, theme.packed(mark.color))
+
+
+def fill_mark(draw_list: imgui.ImDrawList, middle: ImVec2, radius: float, sides: int, ink: int) -> None:
+    """Fill a polygon with a corner at the right, or a disc for 0 sides. ink: packed for ImGui."""
+    if sides:
+        draw_list.add_ngon_filled(middle, radius, ink, sides)
+    else:
+        draw_list.add_circle_filled(middle, radius, ink)
 
 
 def labelled(text: str, name: object) -> str:

@@ -497,6 +497,24 @@ class _Overlay:
             _stroke_on(pixels, places[first] - (left, top), places[last] - (left, top), thick, color)
         self._lay(pixels, (left, top))
 
+    def mark(self, place: Spot, radius: float, sides: int, color: int, opacity: float) -> None:
+        (left, right), (top, bottom) = (
+            _pixels(at, at, radius + 1, extent) for at, extent in zip(place, self.image.size, strict=True)
+        )
+        if left >= right or top >= bottom:
+            return
+        x, y = np.arange(left, right) + 0.5 - place[0], np.arange(top, bottom)[:, None] + 0.5 - place[1]
+        if sides:
+            turns = (2 * np.arange(sides) + 1) * np.pi / sides  # across the edges
+            away = np.max([x * np.cos(turn) + y * np.sin(turn) for turn in turns], axis=0)
+            away -= radius * np.cos(np.pi / sides)
+        else:
+            away = np.hypot(x, y) - radius
+        pixels = np.zeros((*away.shape, 4), np.uint8)
+        pixels[..., :3] = rgba(f"#{color:06x}")[:3]
+        pixels[..., 3] = np.round(255 * opacity * np.clip(0.5 - away, 0, 1))
+        self._lay(pixels, (left, top))
+
     def ring(self, place: Spot, radius: float, width: float, color: int, opacity: float) -> None:
         count = max(12, min(round(2 * radius), 360))
         turns = 2 * np.pi * np.arange(count + 1) / count

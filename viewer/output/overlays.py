@@ -5,25 +5,41 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.track import Known
 from ..camera import Camera
 from ..geometry import Vector
 from ..rigid import STILL, Rigid
 from .labels import free_names
 
 LINE_COLOR = 0x58D6F0  # of measurements, in the window as well
-PLACED_COLOR, TRACKED_COLOR = 0x8DE36B, 0xF2C14E  # of landmarks, in the window as well
+
+
+class StateMark(NamedTuple):
+    """How the state of a landmark is shown. sides: of a polygon with a corner at the right, 0: a disc."""
+
+    color: int  # 0xRRGGBB
+    sides: int
+
+
+# Told apart with protanopia, deuteranopia and tritanopia too: by the colour, and by the shape.
+STATE_MARKS = {
+    Known.PLACED: StateMark(0x22D6A4, 0),
+    Known.TRACKED: StateMark(0xFFD21F, 4),
+    Known.GAP: StateMark(0xD55E00, 3),
+    Known.PENDING: StateMark(0x858B95, 6),
+}
 LINE_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that a line lies on
 DIM_LINE, DIM_LANDMARK = 0.5, 0.35  # opacity where something is hidden
 HALO_OPACITY, LEADER_OPACITY = 0.75, 0.8
 _DIGITS = 6  # of places, in the radius of the scan
 
 # In heights of the text:
-LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.15, 0.18, 0.22
+LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.15, 0.18, 0.25
 HALO, LEADER_THICK, LABEL_EDGE = 0.1, 0.08, 0.2  # dark beside lines; of a leader; of a label's coloured edge
 DOT_ROOM = 0.4  # how far apart dots are at least
 NAME_GAP = 0.15  # between a landmark and its name
@@ -157,10 +173,18 @@ class OverlayPainter(Protocol):
         """Draw a line through pixels (N, 2), with discs of a width at those of `dots`; NaN: a gap. Where it
         covers itself, it is no more opaque."""
 
+    def mark(self, place: tuple[float, float], radius: float, sides: int, color: int, opacity: float) -> None:
+        """Fill a polygon with a corner at the right, or a disc for 0 sides."""
+
     def ring(
         self, place: tuple[float, float], radius: float, width: float, color: int, opacity: float
     ) -> None:
         """Draw a circle."""
+
+
+def mark_radius(sides: int) -> float:
+    """The radius of the corners of a mark, in heights of the text: marks of all shapes are about as large."""
+    return MARK_RADIUS * (1.0 if sides == 0 else 1.3)
 
 
 def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
@@ -252,13 +276,13 @@ def _draw_landmarks(
     opacities = np.where(seen, 1.0, DIM_LANDMARK)
     for number in np.flatnonzero(at_all).tolist():
         one, place, opacity = landmarks[number], pixels[number], float(opacities[number])
-        color = PLACED_COLOR if one.is_placed else TRACKED_COLOR
-        at, here = place[None], np.ones(1, bool)
-        for ink, diameter, share in ((0, 2 * MARK_RADIUS * em + 2, 0.7), (color, 2 * MARK_RADIUS * em, 1.0)):
-            painter.polyline(at, 0.0, [ink], np.array([share * opacity]), here, diameter)
+        color, sides = STATE_MARKS[Known.PLACED if one.is_placed else Known.TRACKED]
+        spot, radius = (float(place[0]), float(place[1])), mark_radius(sides) * em
+        painter.mark(spot, radius + 1.5, sides, 0, HALO_OPACITY * opacity)
+        painter.mark(spot, radius, sides, color, opacity)
         reach = one.sure * lengths[number]
         if not one.is_placed and reach > MARK_RADIUS * em:
-            painter.ring((place[0], place[1]), reach, max(_RING_THICK * em, 1.0), color, opacity)
+            painter.ring(spot, reach, max(_RING_THICK * em, 1.0), color, opacity)
     named = np.flatnonzero(at_all)
     corners = pixels[named] + np.array([MARK_RADIUS + NAME_GAP, -0.5]) * em
     texts = [landmarks[number].name for number in named.tolist()]

@@ -26,10 +26,12 @@ from ...output.overlays import (
     LINE_THICK,
     MARK_RADIUS,
     NAME_GAP,
+    StateMark,
     dotted,
+    mark_radius,
     runs_of,
 )
-from .. import theme
+from .. import theme, widgets
 from .box import Box
 from .viewport import Viewport
 
@@ -224,21 +226,21 @@ class Canvas:
     def marks(
         self,
         places: NDArray[np.float64],
-        color: int,
+        mark: StateMark,
         alphas: NDArray[np.float64],
         reaches: NDArray[np.float64],
     ) -> None:
-        """Discs at many places on the screen, (N, 2), of opacity (N,), each in a ring of a radius (N,) where
-        that is wider than the disc. Labels do not keep off them."""
+        """Draw a mark at many places on the screen, (N, 2), of opacity (N,), each in a ring of a radius (N,)
+        where that is wider than the mark."""
         self._marks.append(places)
-        radius, thick = MARK_RADIUS * self.em, _RING * self.em
-        colors = {alpha: theme.packed(color, alpha) for alpha in set(alphas.tolist())}
-        outlines = {alpha: theme.packed(_OUTLINE, 0.7 * alpha) for alpha in colors}
+        radius, thick = mark_radius(mark.sides) * self.em, _RING * self.em
+        colors = {alpha: theme.packed(mark.color, alpha) for alpha in set(alphas.tolist())}
+        outlines = {alpha: theme.packed(_OUTLINE, HALO_OPACITY * alpha) for alpha in colors}
         with self._layer() as draw_list:
             for (x, y), alpha, reach in zip(places.tolist(), alphas.tolist(), reaches.tolist(), strict=True):
                 place = ImVec2(x, y)
-                draw_list.add_circle_filled(place, radius + 1, outlines[alpha])
-                draw_list.add_circle_filled(place, radius, colors[alpha])
+                widgets.fill_mark(draw_list, place, radius + 1.5, mark.sides, outlines[alpha])
+                widgets.fill_mark(draw_list, place, radius, mark.sides, colors[alpha])
                 if reach > radius:
                     draw_list.add_circle(place, reach, colors[alpha], thickness=thick)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ....analysis.track import Known
 from ....geometry import vector
-from ....output.overlays import DIM_LANDMARK, PLACED_COLOR, TRACKED_COLOR
+from ....output.overlays import DIM_LANDMARK, STATE_MARKS
 from ...scene.canvas import Canvas, Label, ViewPlace
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlac
     drawn = np.flatnonzero(shown.is_there & inside)
     alphas = np.where(tool.seen, 1.0, DIM_LANDMARK)
     reaches = shown.sure * view.lengths_on_screen(tool.positions)
-    for color, known in ((PLACED_COLOR, Known.PLACED), (TRACKED_COLOR, Known.TRACKED)):
+    for known in (Known.PLACED, Known.TRACKED):
         at = drawn[shown.known[drawn] == known]
         rings = np.nan_to_num(reaches[at]) if known is Known.TRACKED else np.zeros(len(at))
-        canvas.marks(places[at], color, alphas[at], rings)
+        canvas.marks(places[at], STATE_MARKS[known], alphas[at], rings)
     selected = shown.number(tool.selected)
     if selected is not None and selected in drawn:
         canvas.ring(ImVec2(*places[selected].tolist()), _CHOSEN, float(alphas[selected]))

@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, imgui
 from ....analysis.landmarks import Landmark
 from ....analysis.track import Known
 from ....files import printable
+from ....output.overlays import STATE_MARKS
 from ... import widgets
 from ...ui import Ui
 from .words import place_words
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from . import Tool
 
 _ROWS = 6  # of the list that are shown at once
-_COLORS = {Known.PLACED: 0x8DE36B, Known.TRACKED: 0xF2C14E, Known.GAP: 0xE0A03E, Known.PENDING: 0x969CA6}
 _FREE, _NONE = "No template", "None"
 
 
@@ -111,8 +111,8 @@ def _draw_row(tool: Tool, number: int, height: float) -> None:
     if landmark.about:
         widgets.tooltip(landmark.about)
     draw_list, faint = imgui.get_window_draw_list(), imgui.get_color_u32(imgui.Col_.text_disabled)
-    color = _COLORS[Known(int(shown.known[number]))] if landmark.keys else None
-    widgets.dot(corner + ImVec2(0.5 * em, 0.5 * imgui.get_text_line_height()), color)
+    mark = STATE_MARKS[Known(int(shown.known[number]))] if landmark.keys else None
+    widgets.state_mark(corner + ImVec2(0.5 * em, 0.5 * imgui.get_text_line_height()), mark)
     left, state = corner.x + 1.2 * em, shown.state(number)
     room = corner.x + width - left - gap.x
     state = widgets.fitted(state, 0.6 * room)

@@ -9,11 +9,12 @@ import numpy as np
 
 from ....analysis.landmarks import Landmark
 from ....analysis.track import Known, Track
+from ....output.overlays import STATE_MARKS
 from ....scan.units import Scale
 from ...desk import FrameSpan
 from .shown import ShownLandmarks
 
-_GAP_COLOR = 0xE0A03E
+_GAP_COLOR = STATE_MARKS[Known.GAP].color
 _DECIMALS = 6  # at most
 _MOST_NAMED = 4  # of the landmarks that are gaps in a frame
 
