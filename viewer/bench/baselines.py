@@ -132,7 +132,7 @@ class _FaceBuffer:
     """The corners of all faces, three texels each, and how many there are."""
 
     def __init__(self, gpu: Gpu, faces: Triangles) -> None:
-        self.corners = gl.BufferTexture(gpu.ctx.buffer(np.ascontiguousarray(faces)), gl.R32UI)
+        self.corners = gl.BufferTexture(gpu.buffer(np.ascontiguousarray(faces)), gl.R32UI)
         self.count, self.nbytes = faces.size, faces.nbytes
 
     def release(self) -> None:

@@ -84,6 +84,8 @@ def _message(error: BaseException) -> str:
         text = str(error)
     elif _was_interrupted(error):
         text = "stopped"
+    elif isinstance(error, MemoryError):
+        text = "not enough memory. Close other programs, or ask for less at once"
     else:
         text = f"internal error ({type(error).__name__}: {error}). Run it again with --debug"
     if len(text) > _MOST_SHOWN:

@@ -34,7 +34,7 @@ class Bins:
         self.ordered = ordered
         self.starts = self._texture(cells + 1)
         self.items = self._texture(1)
-        self._cursors = gpu.ctx.buffer(reserve=4)  # of cells, or of items where ordered
+        self._cursors = gpu.buffer(reserve=4)  # of cells, or of items where ordered
 
     @property
     def nbytes(self) -> int:
@@ -107,7 +107,7 @@ class Bins:
         gpu = self._gpu
         runs = -(-length // _RUN)
         digits = 1 << _DIGIT_BITS
-        places = gpu.ctx.buffer(reserve=4 * max(digits * runs, 1))
+        places = gpu.buffer(reserve=4 * max(digits * runs, 1))
         other = self._pairs(length)
         shifts = range(0, max((self.cells - 1).bit_length(), 1), _DIGIT_BITS)
         for shift in shifts:
@@ -126,14 +126,14 @@ class Bins:
         gpu.discard(pairs, other, places)
 
     def _texture(self, words: int) -> gl.BufferTexture:
-        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * max(words, 1)), gl.R32UI)
+        return gl.BufferTexture(self._gpu.buffer(reserve=4 * max(words, 1)), gl.R32UI)
 
     def _pairs(self, length: int) -> gl.BufferTexture:
-        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=8 * max(length, 1)), gl.RG32UI)
+        return gl.BufferTexture(self._gpu.buffer(reserve=8 * max(length, 1)), gl.RG32UI)
 
     def _at_least(self, buffer: moderngl.Buffer, nbytes: int) -> moderngl.Buffer:
         """The buffer, or one that is as large in its place."""
         if buffer.size >= nbytes:
             return buffer
         self._gpu.discard(buffer)
-        return self._gpu.ctx.buffer(reserve=nbytes)
+        return self._gpu.buffer(reserve=nbytes)

@@ -32,10 +32,10 @@ class IndexList:
         self._gpu, self.each = gpu, each
         self.capacity = capacity
         self.nbytes = 4 * capacity + 16
-        self.texels = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * capacity), gl.R32UI)
+        self.texels = gl.BufferTexture(gpu.buffer(reserve=4 * capacity), gl.R32UI)
         # The three work group counts of an indirect dispatch, then the length of the list.
         self._rows = -(-capacity * each // (GROUP * GROUP_LIMIT))
-        self._dispatch = gpu.ctx.buffer(reserve=16)
+        self._dispatch = gpu.buffer(reserve=16)
 
     def clear(self) -> None:
         """Make it empty."""
@@ -135,7 +135,7 @@ def scan_words(
 
 def _block_sums(gpu: Gpu, level: int) -> moderngl.Buffer:
     """Room for the sums of the blocks of a level."""
-    return gpu.ctx.buffer(reserve=4 * (MOST_WORDS // (GROUP * _RUN) ** level))
+    return gpu.buffer(reserve=4 * (MOST_WORDS // (GROUP * _RUN) ** level))
 
 
 def _scan_level(

@@ -12,7 +12,7 @@ from typing import Any, Protocol, TypeVar
 
 import moderngl
 
-from ..errors import InputError, NoOpenGLError
+from ..errors import InputError, NoOpenGLError, Scan4DError
 from ..native import give_memory_back
 from . import gl
 from .bindings import UniformBlock
@@ -176,6 +176,24 @@ class Gpu:
         """
         if self._headless:
             self.ctx.__enter__()
+
+    def buffer(self, data: Any = None, *, reserve: int = 0, dynamic: bool = False) -> moderngl.Buffer:
+        """A buffer that holds data, or so many bytes. Raises Scan4DError where there is no memory for it."""
+        made = self.ctx.buffer(data, reserve=reserve, dynamic=dynamic)
+        self.check_memory(made)
+        return made
+
+    def check_memory(self, *made: Resource) -> None:
+        """Release what was just made, and raise Scan4DError, where there was no memory for it: drivers only
+        note that, and whatever is done with it then may end the process."""
+        errors = set[str]()
+        while (error := self.ctx.error) not in ("GL_NO_ERROR", *errors):
+            errors.add(error)
+        if "GL_OUT_OF_MEMORY" in errors:
+            for resource in made:
+                resource.release()
+            what = "not enough memory" if self.software else "not enough memory on the graphics card"
+            raise Scan4DError(f"{what} for this picture", hint="Make it smaller, or close other programs")
 
     def discard(self, *resources: Resource | None, nbytes: int = 0) -> None:
         """Have these released by the next `collect`. From any thread, a finalizer's too. nbytes: of large

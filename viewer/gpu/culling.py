@@ -75,13 +75,13 @@ class ChunkBoxes:
         self.order = order = pose.keep(Chunks).known
         self.count, self.size = len(pose.cloud), size or order.chunk
         self.chunks = -(-self.count // self.size)
-        self.boxes = gl.BufferTexture(gpu.ctx.buffer(reserve=24 * self.chunks), gl.RGB32F)
+        self.boxes = gl.BufferTexture(gpu.buffer(reserve=24 * self.chunks), gl.RGB32F)
         corners = np.stack([order.low, order.high], axis=1)
         if size is None:
             self.boxes.buffer.write(corners)
         self.rows: gl.BufferTexture | None = None
         if order.rows is not None:
-            self.rows = gl.BufferTexture(gpu.ctx.buffer(order.rows), gl.R32UI)
+            self.rows = gl.BufferTexture(gpu.buffer(order.rows), gl.R32UI)
         self.slack = _ROUNDING * float(np.abs(corners).max())
 
     def test(self, surface: RenderTarget, step: int, margins: Margins, **defines: object) -> None:
@@ -135,7 +135,7 @@ class SeenChunks:
         if self._buffer is None or self._of is None or self._of() is not boxes:
             self.release()
             self._of, self.nbytes = weakref.ref(boxes), 4 * boxes.chunks
-            self._buffer = self._gpu.ctx.buffer(bytes(self.nbytes))
+            self._buffer = self._gpu.buffer(bytes(self.nbytes))
         return self._buffer
 
     def release(self) -> None:
@@ -155,7 +155,7 @@ class CulledChunks:
         self._positions = None
         if boxes.order.rows is not None:
             in_order = pose.cloud.positions.take(boxes.order.rows, axis=0)
-            self._positions = gl.BufferTexture(gpu.ctx.buffer(in_order), gl.RGB32F)
+            self._positions = gl.BufferTexture(gpu.buffer(in_order), gl.RGB32F)
 
     @property
     def defines(self) -> dict[str, object]:
@@ -231,7 +231,7 @@ class _Farthest:
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._tiles = -(-size[0] // _TILE) * -(-size[1] // _TILE)
-        self._buffer: moderngl.Buffer = gpu.ctx.buffer(reserve=4 * self._tiles)
+        self._buffer: moderngl.Buffer = gpu.buffer(reserve=4 * self._tiles)
         self.texels = gl.BufferTexture(self._buffer, gl.R32UI)
         self.nbytes = self._buffer.size
 

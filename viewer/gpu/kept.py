@@ -32,7 +32,7 @@ class ClosedGaps:
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._copies = [
-            gl.BufferTexture(gpu.ctx.buffer(reserve=4 * size[0] * size[1]), gl.R32UI) for _ in range(2)
+            gl.BufferTexture(gpu.buffer(reserve=4 * size[0] * size[1]), gl.R32UI) for _ in range(2)
         ]
         self.nbytes = 8 * size[0] * size[1]
 

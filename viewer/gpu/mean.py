@@ -23,7 +23,7 @@ class PictureMean:
         self._gpu = gpu
         self._pixels = size[0] * size[1]
         self.nbytes = 16 * self._pixels
-        self._sums = gpu.ctx.buffer(reserve=self.nbytes)
+        self._sums = gpu.buffer(reserve=self.nbytes)
         self.count = 0
 
     def clear(self) -> None:
@@ -63,4 +63,4 @@ def _encoded(gpu: Gpu) -> gl.BufferTexture:
 
 
 def _words(gpu: Gpu, values: np.ndarray) -> gl.BufferTexture:
-    return gl.BufferTexture(gpu.ctx.buffer(values.astype(np.uint32)), gl.R32UI)
+    return gl.BufferTexture(gpu.buffer(values.astype(np.uint32)), gl.R32UI)

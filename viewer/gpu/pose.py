@@ -466,7 +466,7 @@ def _array_upload(gpu: Gpu, values: NDArray) -> _Upload:
     # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
     data = values if values.size else np.zeros(4, np.float32)
     words = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
-    buffer = gpu.ctx.buffer(reserve=len(words))
+    buffer = gpu.buffer(reserve=len(words))
     slices = range(0, len(words), _SLICE)
     steps = (partial(buffer.write, words[start : start + _SLICE], offset=start) for start in slices)
     return _Upload(values, buffer, len(words), deque(steps))

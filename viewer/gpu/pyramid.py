@@ -76,8 +76,8 @@ class Image:
         self._gpu = gpu
         self.size = size
         self.channels = channels
-        self.samples = gl.BufferTexture(gpu.ctx.buffer(reserve=nbytes), _FORMATS[channels])
-        self.weights = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32F)
+        self.samples = gl.BufferTexture(gpu.buffer(reserve=nbytes), _FORMATS[channels])
+        self.weights = gl.BufferTexture(gpu.buffer(reserve=4 * width * height), gl.R32F)
 
     @property
     def nbytes(self) -> int:

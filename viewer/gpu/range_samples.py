@@ -236,7 +236,7 @@ class RangeSamples:
         if self._normals is None:
             self._normals = _Normals(
                 self._texels(gl.R32UI, 4 * self._total),
-                gpu.ctx.buffer(reserve=4 * RANGE_TILE * self.tile_count),
+                gpu.buffer(reserve=4 * RANGE_TILE * self.tile_count),
             )
         known = self._normals
         if known.filter != self.filter:
@@ -273,7 +273,7 @@ class RangeSamples:
         self._gpu.discard(self.depths, self.looks, self.xy, self.tiles, self._table)
 
     def _texels(self, texel_format: int, nbytes: int) -> gl.BufferTexture:
-        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+        return gl.BufferTexture(self._gpu.buffer(reserve=nbytes), texel_format)
 
     def _check_size(self) -> None:
         """Raise InputError for more samples than a driver takes, in all or of a level that shaders write."""

@@ -65,7 +65,7 @@ class Sample:
             self._share, self._reach = share, int(count * _GROWTH)
             self._rows = _sampled_rows(self._reach, share)
             texels = self._rows if self._rows.size else bytes(4)  # a buffer of no bytes is not allowed
-            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(texels), gl.R32UI)
+            self._texels = gl.BufferTexture(self._gpu.buffer(texels), gl.R32UI)
         return self._texels, int(np.searchsorted(self._rows, count))
 
 
@@ -88,7 +88,7 @@ class RowList:
         if self._texels is None or len(rows) > self._capacity:
             self._gpu.discard(self._texels)
             self._capacity = max(int(len(rows) * _GROWTH), 1)  # a buffer of no bytes is not allowed
-            self._texels = gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * self._capacity), gl.R32UI)
+            self._texels = gl.BufferTexture(self._gpu.buffer(reserve=4 * self._capacity), gl.R32UI)
         if rows is not self._rows and len(rows):
             self._texels.buffer.write(rows)
         self._rows = rows

@@ -172,7 +172,7 @@ class CellSums:
             raise InputError(f"sums of {channels} channels in {cells:,} cells are too large for this driver")
         self._gpu = gpu
         self.cells, self.channels = cells, channels
-        self.buffer = gpu.ctx.buffer(reserve=max(nbytes, 4))
+        self.buffer = gpu.buffer(reserve=max(nbytes, 4))
 
     @property
     def nbytes(self) -> int:

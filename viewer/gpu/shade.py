@@ -153,7 +153,7 @@ class _PixelBits:
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self.words = -(-size[0] // 32) * size[1]
         self.nbytes = 8 * self.words
-        self.buffer = gpu.ctx.buffer(reserve=self.nbytes)
+        self.buffer = gpu.buffer(reserve=self.nbytes)
 
     def release(self) -> None:
         self.buffer.release()
@@ -213,8 +213,8 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
 
 
 def _color_map(gpu: Gpu, name: str) -> gl.BufferTexture:
-    return gl.BufferTexture(gpu.ctx.buffer(color_table(name)), gl.RGBA8)
+    return gl.BufferTexture(gpu.buffer(color_table(name)), gl.RGBA8)
 
 
 def _level_colors(gpu: Gpu, colors: tuple[str, ...]) -> gl.BufferTexture:
-    return gl.BufferTexture(gpu.ctx.buffer(bytes(byte for color in colors for byte in rgba(color))), gl.RGBA8)
+    return gl.BufferTexture(gpu.buffer(bytes(byte for color in colors for byte in rgba(color))), gl.RGBA8)

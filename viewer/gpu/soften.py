@@ -32,7 +32,7 @@ class _Before:
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self.nbytes = 4 * size[0] * size[1]
-        self.texels = gl.BufferTexture(gpu.ctx.buffer(reserve=self.nbytes), gl.R32UI)
+        self.texels = gl.BufferTexture(gpu.buffer(reserve=self.nbytes), gl.R32UI)
 
     def release(self) -> None:
         self.texels.release()

@@ -157,8 +157,8 @@ class SplatChunks:
     def __init__(self, pose: GpuPose) -> None:
         self._gpu = gpu = pose.gpu
         self.boxes = boxes = ChunkBoxes(pose, chunk_size(len(pose.cloud), _CHUNKS, _CHUNK))
-        self._cones = gl.BufferTexture(gpu.ctx.buffer(reserve=16 * boxes.chunks), gl.RGBA32F)
-        self._reaches = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * boxes.chunks), gl.R32F)
+        self._cones = gl.BufferTexture(gpu.buffer(reserve=16 * boxes.chunks), gl.RGBA32F)
+        self._reaches = gl.BufferTexture(gpu.buffer(reserve=4 * boxes.chunks), gl.R32F)
         self._listed = IndexList(gpu, boxes.chunks, boxes.size)
         self._arranged: gl.BufferTexture | None = None
         self._ascending = _Ascending(gpu, boxes)
@@ -191,7 +191,7 @@ class SplatChunks:
         if boxes.rows is None or nbytes > gpu.max_storage_bytes:
             return
         program = gpu.compute("chunks/arrange.comp", self._defines(points))
-        arranged = gl.BufferTexture(gpu.ctx.buffer(reserve=nbytes), gl.RGBA32UI)
+        arranged = gl.BufferTexture(gpu.buffer(reserve=nbytes), gl.RGBA32UI)
         with gpu.timers.measure("arrange"):
             self._bind(points, program)
             arranged.buffer.bind_to_storage_buffer(Storage.ARRANGED)
@@ -267,7 +267,7 @@ class _Rows:
         nbytes = 4 * max(count, 1)
         if self._rows is None or self._rows.buffer.size < nbytes:
             self._gpu.discard(self._rows)
-            self._rows = ListedRows(self._gpu.ctx.buffer(reserve=nbytes + nbytes // 8 // 4 * 4), gl.R32UI)
+            self._rows = ListedRows(self._gpu.buffer(reserve=nbytes + nbytes // 8 // 4 * 4), gl.R32UI)
         rows = self._rows
         rows.ascending = rows.places = rows.arranged = None
         return rows
@@ -293,7 +293,7 @@ class _Ascending:
         def rows() -> gl.BufferTexture:
             boxes, numbers, listed = self._boxes, self._numbers, self._listed
             if numbers is None or listed is None:
-                chunks = gpu.ctx.buffer(boxes.order.numbers(boxes.size))
+                chunks = gpu.buffer(boxes.order.numbers(boxes.size))
                 self._numbers = numbers = gl.BufferTexture(chunks, gl.R32UI)
                 self._listed = listed = IndexList(gpu, boxes.count)
 

@@ -72,9 +72,9 @@ class RenderTarget:
             )
         gpu.collect()
         self.size = (width, height)
-        self.depths = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
-        self.rows = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * width * height), gl.R32UI)
-        self.picture = gpu.ctx.buffer(reserve=4 * width * height)
+        self.depths = gl.BufferTexture(gpu.buffer(reserve=4 * width * height), gl.R32UI)
+        self.rows = gl.BufferTexture(gpu.buffer(reserve=4 * width * height), gl.R32UI)
+        self.picture = gpu.buffer(reserve=4 * width * height)
         self._block = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._shown: tuple[GpuPose, View] | None = None
         self._stood_for: tuple[GpuPose, NDArray[np.uint32]] | None = None
@@ -254,7 +254,9 @@ class RenderTarget:
                     f"takes {gl.max_raster_edge():,} pixels along an edge",
                     hint="Use a smaller --size, or --backend points",
                 )
-            self._raster = gl.Raster(self.gpu.ctx, self.size)
+            raster = gl.Raster(self.gpu.ctx, self.size)
+            self.gpu.check_memory(raster)
+            self._raster = raster
         return self._raster
 
     def take_raster(self) -> None:
@@ -412,7 +414,7 @@ class RenderTarget:
     def found_range(self) -> tuple[float, float]:
         """The 2 % and 98 % quantiles of the number that the backend gave, among some of the pixels."""
         stride = -(-max(self.size) // _SAMPLED)
-        texels = gl.BufferTexture(self.gpu.ctx.buffer(reserve=4 * self._count(stride)), gl.R32F)
+        texels = gl.BufferTexture(self.gpu.buffer(reserve=4 * self._count(stride)), gl.R32F)
         self._resolve("value", texels, stride)
         values = np.frombuffer(texels.buffer.read(), np.float32)
         self.gpu.discard(texels)
@@ -498,7 +500,7 @@ class RenderTarget:
     def _texels(self, name: str) -> gl.BufferTexture:
         """A channel of a texel for each pixel."""
         texel_format, size = _CHANNELS[name]
-        buffer = self.gpu.ctx.buffer(reserve=size * self.size[0] * self.size[1])
+        buffer = self.gpu.buffer(reserve=size * self.size[0] * self.size[1])
         return gl.BufferTexture(buffer, texel_format)
 
 

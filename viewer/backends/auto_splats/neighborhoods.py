@@ -101,7 +101,7 @@ class Neighborhoods:
         self._resize(size)
         self._view = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._texels: dict[str, gl.BufferTexture] = {}
-        self._totals = gpu.ctx.buffer(reserve=8)
+        self._totals = gpu.buffer(reserve=8)
         self._bins = Bins(gpu, 1)
         self._grids = Grids.of(size, FINEST_COARSE, Search(), 1.0)
         self.participants = 0
@@ -432,7 +432,7 @@ class Neighborhoods:
         if old is not None and nbytes <= old.buffer.size <= _SPARE * nbytes:
             return False
         self._gpu.discard(self._texels.pop(name, None))
-        self._texels[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+        self._texels[name] = gl.BufferTexture(self._gpu.buffer(reserve=nbytes), texel_format)
         return True
 
 

@@ -43,7 +43,7 @@ class _ByRow:
         """Room for so many rows."""
         if self.texels is None or self.nbytes != 4 * count:
             self.release()
-            self.texels = gl.BufferTexture(self._gpu.ctx.buffer(reserve=4 * count), gl.R32F)
+            self.texels = gl.BufferTexture(self._gpu.buffer(reserve=4 * count), gl.R32F)
         return self.texels
 
     def release(self) -> None:

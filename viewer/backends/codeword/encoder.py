@@ -96,7 +96,7 @@ class _Table:
         table = shape_table(steps)
         rows = table.rows if len(table.rows) else np.zeros(1, np.uint16)
         self.shapes, self.rows = (
-            gl.BufferTexture(gpu.ctx.buffer(np.ascontiguousarray(each, np.uint32)), gl.R32UI)
+            gl.BufferTexture(gpu.buffer(np.ascontiguousarray(each, np.uint32)), gl.R32UI)
             for each in (table.entries, rows)
         )
 

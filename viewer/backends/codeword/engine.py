@@ -98,7 +98,7 @@ class WordBuffers:
         """The buffer of this name, with room for so many bytes; what it held may be gone."""
         if name not in self._texels or self._texels[name].buffer.size < nbytes:
             self.gpu.discard(self._texels.pop(name, None))
-            buffer = self.gpu.ctx.buffer(reserve=int(nbytes * _SPARE) // 16 * 16 + 16)
+            buffer = self.gpu.buffer(reserve=int(nbytes * _SPARE) // 16 * 16 + 16)
             self._texels[name] = gl.BufferTexture(buffer, _BUFFERS[name][1])
         return self._texels[name]
 
@@ -162,8 +162,8 @@ def draw_stream(
     picture = begun(stream, window, background)
     words = WordBuffers(gpu)
     sheet = words.take(stream)
-    keys, places = (gpu.ctx.buffer(reserve=picture.keys.nbytes) for _ in range(2))
-    image = gpu.ctx.buffer(picture.image)
+    keys, places = (gpu.buffer(reserve=picture.keys.nbytes) for _ in range(2))
+    image = gpu.buffer(picture.image)
     draw_bands(words, sheet, window, keys, places, (image, stream.materials), is_surface=False)
     for buffer, array in ((keys, picture.keys), (places, picture.places), (image, picture.image)):
         array[:] = np.frombuffer(buffer.read(), array.dtype).reshape(array.shape)
@@ -258,4 +258,4 @@ def _bands(sheet: Sheet, window: int, room: int) -> _Bands:
 
 def _light_bytes(gpu: Gpu) -> gl.BufferTexture:
     """The sRGB byte of each step of light."""
-    return gl.BufferTexture(gpu.ctx.buffer(LIGHT_BYTES.astype(np.uint32)), gl.R32UI)
+    return gl.BufferTexture(gpu.buffer(LIGHT_BYTES.astype(np.uint32)), gl.R32UI)

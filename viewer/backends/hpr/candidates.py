@@ -54,7 +54,7 @@ class Candidates:
             )
 
         def texels(count: int, texel_format: int, words: int) -> gl.BufferTexture:
-            return gl.BufferTexture(gpu.ctx.buffer(reserve=4 * words * max(count, 1)), texel_format)
+            return gl.BufferTexture(gpu.buffer(reserve=4 * words * max(count, 1)), texel_format)
 
         self.rows, self.keys, self._stamps, self._found, self._occupied = (
             texels(sectors.count, gl.R32UI, 1) for _ in range(5)

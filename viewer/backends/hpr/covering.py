@@ -227,7 +227,7 @@ class Covering:
         nbytes, held = 4 * words * max(count, 1), self._held.get(name)
         if held is None or not nbytes <= held.buffer.size <= 4 * nbytes:
             self._gpu.discard(held)
-            self._held[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+            self._held[name] = gl.BufferTexture(self._gpu.buffer(reserve=nbytes), texel_format)
         return self._held[name]
 
     def _list(self, name: str, capacity: int) -> IndexList:

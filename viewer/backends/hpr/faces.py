@@ -51,7 +51,7 @@ class FaceLists:
 
 
 def _flags(gpu: Gpu, count: int) -> gl.BufferTexture:
-    return gl.BufferTexture(gpu.ctx.buffer(reserve=4 * count), gl.R32UI)
+    return gl.BufferTexture(gpu.buffer(reserve=4 * count), gl.R32UI)
 
 
 def draw_faces(

@@ -55,7 +55,7 @@ class Spacings:
     """
 
     def __init__(self, pose: GpuPose) -> None:
-        self.texels = gl.BufferTexture(pose.gpu.ctx.buffer(reserve=4 * max(len(pose.cloud), 1)), gl.R32F)
+        self.texels = gl.BufferTexture(pose.gpu.buffer(reserve=4 * max(len(pose.cloud), 1)), gl.R32F)
         with pose.gpu.timers.measure("spacings"):
             self._find(pose)
 

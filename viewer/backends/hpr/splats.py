@@ -124,7 +124,7 @@ class SectorSplats:
             self._sums = CellSums(self._gpu, max(count, 1), 5)
             self._sum_texels = gl.BufferTexture(self._sums.buffer, gl.R32I)
             for name, (texel_format, words) in _BY_ROW.items():
-                buffer = self._gpu.ctx.buffer(reserve=4 * words * max(count, 1))
+                buffer = self._gpu.buffer(reserve=4 * words * max(count, 1))
                 self._texels[name] = gl.BufferTexture(buffer, texel_format)
         return self._sums, self._sum_texels
 

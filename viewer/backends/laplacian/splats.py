@@ -43,7 +43,7 @@ class CapturedLevels:
         counts = [width * height for width, height in sizes(size)]
         self.starts = [0, *np.cumsum(counts[:-1]).tolist()]
         self.sums = CellSums(gpu, sum(counts), 4)
-        self.finest = gl.BufferTexture(gpu.ctx.buffer(reserve=16 * counts[0]), gl.RGBA32F)
+        self.finest = gl.BufferTexture(gpu.buffer(reserve=16 * counts[0]), gl.RGBA32F)
 
     @property
     def nbytes(self) -> int:

@@ -320,4 +320,4 @@ class _Spline:
 
 
 def _texels(gpu: Gpu, texel_format: int, nbytes: int) -> gl.BufferTexture:
-    return gl.BufferTexture(gpu.ctx.buffer(reserve=max(nbytes, 16)), texel_format)
+    return gl.BufferTexture(gpu.buffer(reserve=max(nbytes, 16)), texel_format)

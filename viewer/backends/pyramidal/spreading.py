@@ -68,7 +68,7 @@ def _table(gpu: Gpu, size: int) -> gl.BufferTexture:
     offsets = (np.arange(_STEPS) + 0.5) / _STEPS - 0.5
     along = np.array([_weights(offset, size, erf) for offset in offsets])
     kernels = along[:, None, :, None] * along[None, :, None, :]
-    return gl.BufferTexture(gpu.ctx.buffer(kernels.astype(np.float32)), gl.R32F)
+    return gl.BufferTexture(gpu.buffer(kernels.astype(np.float32)), gl.R32F)
 
 
 def _weights(offset: float, size: int, integral: Callable[[float], float]) -> list[float]:

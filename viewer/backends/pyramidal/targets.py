@@ -97,4 +97,4 @@ class Targets:
 
 
 def _texels(gpu: Gpu, count: int, texel_format: int, size: int) -> gl.BufferTexture:
-    return gl.BufferTexture(gpu.ctx.buffer(reserve=size * max(count, 1)), texel_format)
+    return gl.BufferTexture(gpu.buffer(reserve=size * max(count, 1)), texel_format)

@@ -27,7 +27,7 @@ class DrawnTiles:
 
     def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
         self._gpu = gpu
-        self.counts = gpu.ctx.buffer(reserve=4 * len(COUNTS))
+        self.counts = gpu.buffer(reserve=4 * len(COUNTS))
         self.listed = IndexList(gpu, 1, RANGE_TILE)
 
     @property
@@ -51,7 +51,7 @@ class DrawnTiles:
         nbytes = 4 * (len(COUNTS) + views)
         if self.counts.size != nbytes:
             self._gpu.discard(self.counts)
-            self.counts = self._gpu.ctx.buffer(reserve=nbytes)
+            self.counts = self._gpu.buffer(reserve=nbytes)
 
     def _read(self) -> list[int]:
         return np.frombuffer(self.counts.read(), np.uint32).tolist()

@@ -110,7 +110,7 @@ class GapRadii:
                 radii = np.maximum(radii, stored)
                 usual = np.quantile(radii[radii > 0], 0.9)
             self.usual, self.largest = float(usual), float(radii.max())
-            self.texels = gl.BufferTexture(pose.gpu.ctx.buffer(radii), gl.R32F)
+            self.texels = gl.BufferTexture(pose.gpu.buffer(radii), gl.R32F)
 
 
 class _LastLook:
@@ -156,7 +156,7 @@ class _Search:
         self._count, self._extent = count, extent
         self._lists = 1 << max((count - 1).bit_length(), 8)
         self._bins, self._listed = Bins(gpu, self._lists + 2), IndexList(gpu, count)
-        self._radii = gl.BufferTexture(gpu.ctx.buffer(reserve=4 * count), gl.R32F)
+        self._radii = gl.BufferTexture(gpu.buffer(reserve=4 * count), gl.R32F)
         gl.clear_words(self._radii.buffer, 0)
         self._bins.reserve(count + count // 16)
         self._grid, shared = self._fit()
@@ -231,7 +231,7 @@ class _Search:
         gpu = self._gpu
         bins, length = self._bins, self._bins.length()
         bins.fill(visits, length)
-        slots = gl.BufferTexture(gpu.ctx.buffer(reserve=max(_SLOT * length, _SLOT)), gl.RGBA32F)
+        slots = gl.BufferTexture(gpu.buffer(reserve=max(_SLOT * length, _SLOT)), gl.RGBA32F)
         try:
             self._positions.bind(Texture.POSITIONS)
             bins.items.bind(Texture.LISTED)
@@ -273,8 +273,8 @@ def _searching(pose: GpuPose) -> Iterator[tuple[_Search, Any, Any]]:
             rows, copies = _distinct(cloud.positions)
             assert cloud.normals is not None
             positions, normals = held = (
-                gl.BufferTexture(gpu.ctx.buffer(cloud.positions[rows]), gl.RGB32F),
-                gl.BufferTexture(gpu.ctx.buffer(cloud.normals[rows]), gl.RGB32F),
+                gl.BufferTexture(gpu.buffer(cloud.positions[rows]), gl.RGB32F),
+                gl.BufferTexture(gpu.buffer(cloud.normals[rows]), gl.RGB32F),
             )
             crowd, search = search, _Search(gpu, positions, normals, len(rows), extent)
             gpu.discard(crowd)

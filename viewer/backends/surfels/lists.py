@@ -175,7 +175,7 @@ class TileLists:
         rows = np.frombuffer(self._buffer("large").read(4 * self.large, offset=_LARGE_HEAD), np.uint32)
         self._gpu.discard(self._large_rows)
         # Ascending, so that ties fall to the lowest row.
-        self._large_rows = gl.BufferTexture(self._gpu.ctx.buffer(np.sort(rows)), gl.R32UI)
+        self._large_rows = gl.BufferTexture(self._gpu.buffer(np.sort(rows)), gl.R32UI)
         return replace(points, rows=self._large_rows, count=self.large)
 
     def run(self, program: moderngl.ComputeShader, work: str = "work") -> None:
@@ -248,7 +248,7 @@ class TileLists:
         self._textures[name] = self._texture(nbytes, texel_format)
 
     def _texture(self, nbytes: int, texel_format: int) -> gl.BufferTexture:
-        return gl.BufferTexture(self._gpu.ctx.buffer(reserve=max(nbytes, 16)), texel_format)
+        return gl.BufferTexture(self._gpu.buffer(reserve=max(nbytes, 16)), texel_format)
 
     def _buffer(self, name: str) -> moderngl.Buffer:
         return self._textures[name].buffer

@@ -148,7 +148,7 @@ class _ByRow:
         old, nbytes = self._texels.get(name), 4 * max(count, 1)
         if old is None or not nbytes <= old.buffer.size <= _SPARE * nbytes:
             self._gpu.discard(old)
-            self._texels[name] = gl.BufferTexture(self._gpu.ctx.buffer(reserve=nbytes), texel_format)
+            self._texels[name] = gl.BufferTexture(self._gpu.buffer(reserve=nbytes), texel_format)
         return self._texels[name]
 
     def release(self) -> None:

@@ -127,7 +127,7 @@ def _farthest_first(points: Points, surface: Surface) -> Points:
         rows = np.frombuffer(points.rows.buffer.read(), np.uint32)[: points.count]
     depths = surface.view.depths(points.pose.cloud.positions[rows])
     rows = rows[np.argsort(-depths, kind="stable")]
-    order = gl.BufferTexture(surface.gpu.ctx.buffer(rows if rows.size else bytes(4)), gl.R32UI)
+    order = gl.BufferTexture(surface.gpu.buffer(rows if rows.size else bytes(4)), gl.R32UI)
     return replace(points, rows=order)
 
 

@@ -79,7 +79,7 @@ def _by_size(points: Points, surface: Surface) -> tuple[Points | None, Points | 
 
 def _part(points: Points, chosen: NDArray[np.bool_]) -> Points:
     rows = np.flatnonzero(chosen).astype(np.uint32)
-    return replace(points, rows=gl.BufferTexture(points.pose.gpu.ctx.buffer(rows), gl.R32UI), count=len(rows))
+    return replace(points, rows=gl.BufferTexture(points.pose.gpu.buffer(rows), gl.R32UI), count=len(rows))
 
 
 def _scatter(points: Points, surface: Surface) -> None:
