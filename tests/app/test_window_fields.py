@@ -40,7 +40,9 @@ def app(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ru
     home = tmp_path_factory.mktemp("app")
     keys = home / "config" / "scan4d" / "keys.toml"
     keys.parent.mkdir(parents=True)
-    keys.write_text('[keys]\nkeys = "F1 Shift+U"\nsave_session = "Ctrl+Shift+S Alt+M"\nexport = "Ctrl+E U"\n')
+    keys.write_text(
+        '[keys]\nkeys = "F1 Shift+U"\nsave_session_as = "Ctrl+Shift+S Alt+M"\nexport = "Ctrl+E U"\n'
+    )
     with running_app(screen, home, folder) as app:
         yield app
 

@@ -261,7 +261,7 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
     points = grid(1)
     keys = tmp_path / "config" / "scan4d"
     keys.mkdir(parents=True)
-    (keys / "keys.toml").write_text('[keys]\nsave_landmarks = "Ctrl+S"\n')
+    (keys / "keys.toml").write_text('[keys]\nsave_landmarks = "Ctrl+L"\n')
     for name, far in (("here", 0.0), ("elsewhere", 1e4)):
         found = LandmarkSet.of(("A", "B"), np.array([points[34], points[60]]) + far, unit="units")
         write_landmarks(tmp_path / f"{name}.mrk.json", found)
@@ -276,7 +276,7 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
         state = app.see(lambda state: state.landmarks["A"][0] == "tracked")
         assert math.dist(state.landmarks["A"][1], 1.25 * points[34]) < 1.25 * CLICK
         for typed, frames in (("all.c3d", 3), ("one.mrk.json", 1)):
-            press(app, "ctrl+s", "ctrl+a")
+            press(app, "ctrl+l", "ctrl+a")
             screen.do("type", "--delay", 40, typed)
             screen.do("key", "Return")
             app.told(f"Saved .*{typed}")

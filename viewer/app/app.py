@@ -144,7 +144,7 @@ class App:
         )
         self.sessions: Sessions = Sessions(
             self.session, self.playback, self.note, self.refuse, self.open, self.take_up,
-            lambda at: self.browser.show(at),
+            lambda at: self.browser.show(at), window.touch,
         )  # fmt: skip
         self._opening = Opening()
         self.keeping = Keeping(

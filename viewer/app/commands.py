@@ -213,7 +213,10 @@ _FILE: Menu[App] = Menu("File", (
     ),
     (
         Command(
-            "save_session", "Save session...", lambda app: app.sessions.ask_to_save(), "Ctrl+Shift+S",
+            "save_session", "Save session", lambda app: app.sessions.save(), "Ctrl+S", can=_has_camera,
+        ),
+        Command(
+            "save_session_as", "Save session as...", lambda app: app.sessions.ask_to_save(), "Ctrl+Shift+S",
             can=_has_camera,
         ),
         Command(

@@ -46,7 +46,7 @@ def draw(app: App) -> Place:
         ("What is loaded", lambda: app.loading.draw(place, app.tasks.cancel)),
         ("Help", app.help.draw),
         ("The first card", lambda: app.welcome.draw(*place[:3])),
-        ("The dialog that opens scans", lambda: app.browser.draw(app.palette.broken)),
+        ("The dialog that opens scans", app.browser.draw),
         ("The dialog that saves sessions", app.sessions.saving.draw),
         ("The export dialog", lambda: export_dialog.draw(app.exporting, app.quit)),
         ("Dialogs of tools", app.tools.draw_dialogs),

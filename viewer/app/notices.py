@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
 _MOST_SHOWN = 3
 _MOST_KEPT = 1000
-_WIDTH, _FOOT = 34.0, 4.5  # in heights of the font; the foot is where the scale bar is
+_WIDTH, _NARROW, _FOOT = 34.0, 21.0, 4.5  # in heights of the font; the foot is where the scale bar is
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
     | imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.no_focus_on_appearing
@@ -152,16 +152,18 @@ class Notices:
         imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(width, height))
         imgui.begin("problems", None, _STILL.value | keyboard.flags("problems"))
         keyboard.take("problems")
-        buttons = 2 * imgui.get_frame_height() + 3 * em
-        wrap = max(10 * em, min(_WIDTH * em, width - buttons - 5 * em))
+        is_narrow = width < _NARROW * em
+        buttons = 0.0 if is_narrow else 2 * imgui.get_frame_height() + 3 * em
+        wrap = min(_WIDTH * em, width - buttons - 5 * em)
         for number, notice in enumerate(staying):
             imgui.push_id(number)
-            self._draw_staying(notice, wrap, color)
+            self._draw_staying(notice, wrap, color, is_narrow)
             imgui.pop_id()
         self._foot = imgui.get_window_size().y
         imgui.end()
 
-    def _draw_staying(self, notice: Notice, wrap: float, color: int) -> None:
+    def _draw_staying(self, notice: Notice, wrap: float, color: int, is_narrow: bool) -> None:
+        """Declare a notice. is_narrow: whether its buttons stand below the text."""
         if notice.is_problem:
             imgui.push_style_color(imgui.Col_.text, theme.packed(color))
             imgui.text(icons.ICON_FA_TRIANGLE_EXCLAMATION)
@@ -173,7 +175,10 @@ class Notices:
         imgui.push_text_wrap_pos(start + wrap)
         imgui.text_unformatted(notice.text)
         imgui.pop_text_wrap_pos()
-        imgui.same_line(start + wrap + imgui.get_style().item_spacing.x)
+        if is_narrow:
+            imgui.set_cursor_pos_x(start)
+        else:
+            imgui.same_line(start + wrap + imgui.get_style().item_spacing.x)
         if notice.is_problem:
             if imgui.button("Copy"):
                 imgui.set_clipboard_text(notice.text)

@@ -333,8 +333,9 @@ def fitted(text: str, width: float) -> str:
 
 
 @contextmanager
-def modal(title: str, is_open: bool) -> Iterator[bool]:
-    """A dialog in the middle of the window; whether its widgets are to be declared."""
+def modal(title: str, is_open: bool, size: ImVec2 | None = None) -> Iterator[bool]:
+    """A dialog in the middle of the window; whether its widgets are to be declared. size: pixels; None: as
+    high as they are."""
     if not is_open:
         yield False
         return
@@ -342,7 +343,8 @@ def modal(title: str, is_open: bool) -> Iterator[bool]:
         imgui.open_popup(title)
     display = imgui.get_io().display_size
     imgui.set_next_window_pos(display * 0.5, imgui.Cond_.appearing, ImVec2(0.5, 0.5))
-    imgui.set_next_window_size(ImVec2(min(_DIALOG_WIDTH * imgui.get_font_size(), display.x), 0))
+    usual = ImVec2(min(_DIALOG_WIDTH * imgui.get_font_size(), display.x), 0)
+    imgui.set_next_window_size(size or usual)
     flags = imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_saved_settings
     is_drawn = imgui.begin_popup_modal(title, None, flags)[0]
     yield is_drawn

@@ -11,6 +11,7 @@ from ...errors import InputError
 from ...files import free_file, printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
+from ..notices import Problem
 from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
 from ..session import Session, known_as
@@ -32,22 +33,41 @@ class Sessions:
         open: Callable[[str, SavedSession], None],
         take_up: Callable[[SavedSession], None],
         ask: Callable[[Path], None],
+        redraw: Callable[[], None],
     ) -> None:
         """refuse: tells why nothing is opened. open: opens a scan with a session. take_up: shows the open one
-        so. ask: for one in a folder."""
+        so. ask: for one in a folder. redraw: has the window drawn again."""
         self._session, self._playback, self._note = session, playback, note
         self._refuse, self._open, self._take_up, self._ask = refuse, open, take_up, ask
         about = "Saves view, look, renderer, bookmarks, distances and landmarks, not the scan itself"
-        self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save)
+        self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save, redraw)
         self.homeless: SavedSession | None = None
+        self._files: dict[str, Path] = {}  # of scans, as `known_as` has them: saved to or opened from
+        self._opened: tuple[SavedSession, Path] | None = None  # last, and its file
+
+    def save(self) -> None:
+        """Save the session to its file; where it has none yet, ask for one."""
+        file = self._file
+        if file is None or not file.exists():
+            self.ask_to_save()
+            return
+        try:
+            self._save(file)
+        except InputError as error:
+            self._note(Problem(f"The session is not saved: {error}"))
 
     def ask_to_save(self) -> None:
-        """Open the dialog that saves, with a name that is free."""
-        self.saving.ask(free_file(working_folder(), SUFFIX))
+        """Open the dialog that saves, with the session's file, or a name that is free."""
+        self.saving.ask(self._file or free_file(working_folder(), SUFFIX))
+
+    @property
+    def _file(self) -> Path | None:
+        return self._files.get(known_as(self._session.scan))
 
     def _save(self, file: Path) -> None:
         refuse_input(file, self._playback.timeline)
         self._session.saved(self._session.index).export(file)
+        self._files[known_as(self._session.scan)] = file
         self._note(f"Saved {file}")
 
     def open(self, path: Path) -> None:
@@ -58,6 +78,7 @@ class Sessions:
         except InputError as error:
             self._refuse(str(error))
             return
+        self._opened = session, path
         if is_there(scan):
             self.open_with(session, scan)
             return
@@ -67,6 +88,8 @@ class Sessions:
 
     def open_with(self, session: SavedSession, scan: str) -> None:
         """Open a scan with a session; at once where it is the open one."""
+        if self._opened is not None and self._opened[0] is session:
+            self._files[known_as(scan)] = self._opened[1]
         if known_as(scan) == known_as(self._session.scan):
             self._take_up(session)
         else:

@@ -47,13 +47,17 @@ class Exchange:
         self.templates: dict[str, Template] = dict(templates())
         written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
         about = f"The ending sets the format: {_USUAL}, {', '.join(written)}"
-        self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, written)
+        self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, desk.redraw, written)
         about = "A file of landmarks, or a template"
-        self._reading = ReadDialog("Import landmarks", about, ".json", self._read, landmark_suffixes())
+        self._reading = ReadDialog(
+            "Import landmarks", about, ".json", self._read, desk.redraw, landmark_suffixes()
+        )
         about = "Saves names, mirror partners and measures, for use in other scans"
-        self._template_saving = SaveDialog("Save template", about, ".json", self._save_template)
+        self._template_saving = SaveDialog("Save template", about, ".json", self._save_template, desk.redraw)
         about = "A file that 'Save as template...' has written"
-        self._template_reading = ReadDialog("Choose template", about, ".json", self._read_template)
+        self._template_reading = ReadDialog(
+            "Choose template", about, ".json", self._read_template, desk.redraw
+        )
         self._doubted: Path | None = None  # file whose landmarks seem to be of another scan
 
     def draw(self) -> None:

@@ -45,9 +45,9 @@ class Tool:
         self.desk = desk
         self.filled = False
         about = "All distances, as a table of comma separated values"
-        self.saving = SaveDialog("Export distances", about, ".csv", self._save)
+        self.saving = SaveDialog("Export distances", about, ".csv", self._save, desk.redraw)
         about = "A table that 'Export distances...' has written of this scan"
-        self.reading = ReadDialog("Import distances", about, ".csv", self._read)
+        self.reading = ReadDialog("Import distances", about, ".csv", self._read, desk.redraw)
         self.begun: Spot | None = None
         self._seen: tuple[object, dict[Spot, bool]] = None, {}
         self._told: list[str] = []

@@ -60,7 +60,7 @@ class Tool:
         self.renaming = Renaming()
         self.saving = SaveDialog(
             "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
-            PLOT_SUFFIXES[0], self._save, PLOT_SUFFIXES[1:],
+            PLOT_SUFFIXES[0], self._save, desk.redraw, PLOT_SUFFIXES[1:],
         )  # fmt: skip
         self._words = Kept()
         self._fitted: object = None  # what the axes were fitted to last

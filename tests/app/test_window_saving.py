@@ -1,0 +1,97 @@
+"""Saving in the window: Ctrl+S, and the dialogs that name a file, by real keys."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_screen import RunningApp, Screen, running_app
+
+from viewer.app.path_dialog import files_of
+from viewer.document.document import Document
+from viewer.document.saved_session import SavedSession
+
+
+@pytest.fixture
+def scan(tmp_path: Path) -> Path:
+    scan = tmp_path / "scan.npy"
+    np.save(scan, np.random.default_rng(0).random((300, 3)))
+    (tmp_path / "work" / "b sub").mkdir(parents=True)
+    return scan
+
+
+@pytest.fixture
+def app(screen: Screen, tmp_path: Path, scan: Path) -> Iterator[RunningApp]:
+    with running_app(screen, tmp_path / "work", scan, home=tmp_path / "home") as app:
+        yield app
+    assert "Traceback" not in app.log()
+
+
+def press(app: RunningApp, *keys: str) -> None:
+    for key in keys:
+        app.screen.do("key", key)
+        app.settle()
+
+
+def write(app: RunningApp, text: str) -> None:
+    app.screen.do("type", "--delay", 40, text)
+    app.settle()
+
+
+def test_ctrl_s_asks_once_and_then_saves_to_that_file(app: RunningApp, tmp_path: Path) -> None:
+    file = tmp_path / "work" / "b sub" / "one.scan4d.json"
+    press(app, "ctrl+s", "Up", "Return")  # into the folder, the only row
+    app.act("Save session", ("item_click", "##name"))
+    press(app, "ctrl+a")
+    write(app, "one")
+    press(app, "Return")
+    assert app.told("Saved (.*)")[1] == str(file)
+    first = SavedSession.load(file)
+    press(app, "ctrl+4", "ctrl+s")
+    assert app.settle().lists == 0, "nothing is asked"
+    assert app.told("Saved (.*)")[1] == str(file)
+    assert SavedSession.load(file).document.camera != first.document.camera
+
+
+def test_a_session_that_was_opened_is_saved_to_its_file(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    file = tmp_path / "mine.scan4d.json"
+    SavedSession(str(scan), None, 0, Document()).export(file)
+    before = file.read_bytes()
+    with running_app(screen, tmp_path / "work", scan, home=tmp_path / "home") as app:
+        app.drop(file)
+        app.see(undoes="Open session")
+        press(app, "ctrl+4", "ctrl+s")
+        assert app.told("Saved (.*)")[1] == str(file)
+        assert file.read_bytes() != before
+
+
+def test_a_file_is_replaced_only_after_a_question(app: RunningApp, tmp_path: Path) -> None:
+    file = tmp_path / "work" / "kept.scan4d.json"
+    file.write_text("kept")
+    press(app, "ctrl+s")
+    write(app, "kept")
+    press(app, "Return")
+    assert app.state.lists == 2, "the question stands over the dialog"
+    press(app, "Escape")
+    assert app.state.lists == 1, "Escape ends the question alone"
+    assert file.read_text() == "kept"
+    press(app, "Return")
+    app.act("Replace the file?", ("item_click", "Replace"))
+    assert app.told("Saved (.*)")[1] == str(file)
+    assert app.settle().lists == 0
+    SavedSession.load(file)
+
+
+def test_a_folder_lists_its_folders_and_the_newest_files_first(tmp_path: Path) -> None:
+    for number, name in enumerate(("10 b", "9 a", ".hidden")):
+        (tmp_path / name).mkdir()
+        for suffix in (".csv", ".txt"):
+            file = tmp_path / f"{number}{suffix}"
+            file.write_text("x" * number)
+            os.utime(file, (number, number))
+    rows = files_of(tmp_path, (".csv",))
+    assert [row.title for row in rows] == ["9 a", "10 b", "2.csv", "1.csv", "0.csv"]
+    assert [(row.frames, row.size) for row in rows] == [(0, None), (0, None), (1, 2), (1, 1), (1, 0)]
