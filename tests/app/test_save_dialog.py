@@ -25,5 +25,5 @@ def test_the_file_is_what_the_user_means(tmp_path: Path, monkeypatch: pytest.Mon
         with pytest.raises(InputError, match="is a folder"):
             named_file(wrong, ".csv")
     for wrong in ("nowhere/a.csv", "f" * 300 + "/a.csv"):
-        with pytest.raises(InputError, match="no such folder"):
+        with pytest.raises(InputError, match="this folder does not exist"):
             named_file(wrong, ".csv")

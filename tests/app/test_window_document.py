@@ -215,7 +215,8 @@ def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
         app.drop(moved)
         app.told("its scan 'scans/wall' is missing. Choose where it is now")
         app.settle()
-        screen.do("key", "Tab", "sleep", 0.2, "type", "--delay", 15, scan)
+        Hands(app).press("Tab")
+        screen.do("type", "--delay", 15, scan)
         app.settle()
         screen.do("key", "Return")  # into the folder
         app.settle()

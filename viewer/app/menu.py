@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
@@ -15,6 +16,7 @@ from .keys import chord
 if TYPE_CHECKING:
     from .app import App
 
+_MORE = f"{icons.ICON_FA_ANGLES_RIGHT}###more of the toolbar"
 _ASIDE = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # to the menus beside
 
 
@@ -94,23 +96,43 @@ def _underline(start: ImVec2, letter: str) -> None:
 
 def draw_toolbar(app: App) -> None:
     """Declare the toolbar in the current ImGui window: icons and words, icons alone in the last groups where
-    there is no room for both, and as many as there is room for."""
+    there is no room for both, and what has no room at all in a list at its end."""
     groups = app.commands.toolbar
-    room = imgui.get_content_region_avail().x
+    left, room = [item for group in groups for item in group], imgui.get_content_region_avail().x
     worded = next((count for count in range(len(groups), 0, -1) if _width(app, groups, count) <= room), 0)
+    more = widgets.button_width(_MORE) + imgui.get_style().item_spacing.x
     for number, group in enumerate(groups):
         has_words = number < worded
         if group is not groups[0]:
             _draw_line()
         for item in group:
             text = _text(app, item, has_words)
-            if imgui.get_cursor_pos_x() + widgets.button_width(text) > room:
+            wide = widgets.button_width(text) + (more if len(left) > 1 else 0)
+            if imgui.get_cursor_pos_x() + wide > room:
+                _draw_more(app, left)
                 return
+            left.remove(item)
             if isinstance(item, Menu):
                 _draw_drop(app, item, text)
             else:
                 _draw_button(app, app.commands.of[item], text)
             imgui.same_line()
+
+
+def _draw_more(app: App, items: Sequence[str | Menu[App]]) -> None:
+    """A button that opens what had no room."""
+    if imgui.button(_MORE):
+        imgui.open_popup("more")
+    widgets.tooltip("More of the toolbar")
+    if imgui.begin_popup("more"):
+        for item in items:
+            if isinstance(item, str):
+                _draw(app, app.commands.of[item])
+            elif item.title:
+                _draw(app, item)
+            else:
+                _draw_groups(app, item)
+        imgui.end_popup()
 
 
 def _width(app: App, groups: Toolbar, worded: int) -> float:
