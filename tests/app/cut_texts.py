@@ -68,6 +68,8 @@ class CutTexts:
         left, right = window.clip_rect.min.x, window.clip_rect.max.x
         display = imgui.get_io().display_size.x
         is_outside = low < max(left, 0) - SLACK or high > min(right, display) + SLACK
+        if window.hidden:  # until ImGui has found its size
+            return
         if label.partition("##")[0] and (is_outside or high - low < least - SLACK):
             self._of_frame().setdefault(window.name.partition("/")[0], set()).add(label.partition("##")[0])
 

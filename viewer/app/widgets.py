@@ -138,7 +138,8 @@ def _value_in_words(value: Any, titles: Mapping[str, str]) -> str:
 def tooltip(text: str) -> None:
     """Explain the last widget, in lines that can be read, while the mouse rests on it."""
     if imgui.begin_item_tooltip():
-        imgui.push_text_wrap_pos(_TOOLTIP * imgui.calc_text_size("n").x)
+        widest = 0.9 * imgui.get_io().display_size.x
+        imgui.push_text_wrap_pos(min(_TOOLTIP * imgui.calc_text_size("n").x, widest))
         imgui.text_unformatted(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
