@@ -16,12 +16,17 @@ from viewer.scan import formats
 from viewer.scan.range_view import merge
 
 BARS = ("toolbar", "##MainMenuBar")
-# Two buttons of one name at the end of the toolbar.
+# Two buttons of one name at the start of the toolbar, where there is room for them.
 TWINS = """
 import viewer.app.menu as menu
 from imgui_bundle import imgui
 draw = menu.draw_toolbar
-menu.draw_toolbar = lambda app: (draw(app), imgui.button("twin"), imgui.same_line(), imgui.button("twin"))
+def draw_twins(app):
+    for _ in range(2):
+        imgui.button("twin")
+        imgui.same_line()
+    draw(app)
+menu.draw_toolbar = draw_twins
 """
 # No frame of any scan comes.
 STUCK = """
@@ -51,7 +56,7 @@ def test_no_buttons_of_the_bars_share_an_id_but_those_that_do(
     with running_app(screen, tmp_path, ball, before=f"exec({TWINS!r}); ") as app:
         report = app.walk(BARS, presses=False)
         assert report.problems == ["toolbar: twin: 2 widgets have its id"]
-        assert len(report.seen) > 15
+        assert len(report.seen) > 10
         assert "Traceback" not in app.log()
 
 
