@@ -36,7 +36,9 @@ BECOMES = {a: b for pair in PAIRS.split(",") for a, b in (pair.split(), pair.spl
     "2": "3",
 }
 WORDS = "|".join(word for word in BECOMES if word.isalpha())
-FOUND = re.compile(rf"(?<![\w.])[012](?![\w.])|(?<= )([-+*/]|[<>=!]=|[<>])(?= )|&&|\|\||\b({WORDS})\b")
+FOUND = re.compile(
+    rf"(?<![\w.])[012](?![\w.])|(?<= )([-+*/]|[<>=!]=|[<>])(?= )|&&|\|\||\b(?<!strict=)({WORDS})\b"
+)  # zip's strict changes no result
 PATHS = [path for part in ("viewer", "shaders", "tests") for path in sorted((ROOT / part).rglob("*.*"))]
 CODE = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
         for path in PATHS if path.suffix in (".py", ".glsl", ".comp", ".vert", ".frag")}  # fmt: skip
