@@ -76,10 +76,11 @@ def test_landmarks_are_followed_and_measured_in_all_frames(run: Run) -> None:
     words = ("measure", "seq", "--landmarks", "landmarks.csv", "--measures", "measures.json")
     done = run(*words, "-o", "out.csv", "--unit", "mm")
     assert done.code == 0, done.err
-    assert done.out.endswith("out.csv\n")
+    assert done.out.endswith("out.csv\nout_numbers.csv\n")
+    assert [row["measure"] for row in table(Path("out_numbers.csv"))] == ["öffnung", "way", "winkel"]
     rows = table(Path("out.csv"))
     assert list(rows[0]) == [
-        "kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit"
+        "kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit", "note"
     ]  # fmt: skip
     landmarks = [row for row in rows if row["kind"] == "landmark"]
     assert [(row["frame"], row["name"]) for row in landmarks] == [

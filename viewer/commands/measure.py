@@ -3,8 +3,8 @@
 The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
 the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
 With speeds or accelerations, a row a landmark's trajectory and frame comes last.
-The numbers of the measures' movements are another table, their repeats over one another a third; plots are as
-the window saves them.
+The numbers of the measures' movements, such as amplitude, onset and peak, are a table beside it, OUT_numbers;
+with --repeats the repeats over one another are a third. Plots are as the window saves them.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..analysis.measures.curves import (
     REPEAT_COLUMNS,
     MeasureCurve,
     number_rows,
-    power_of,
+    numbers_file,
     repeat_rows,
     repeats_by_peaks,
     unit_of,
@@ -70,6 +70,7 @@ _STEPS = 200  # of a progress bar
 _NAMED = 3  # landmarks that a message names
 _LONGEST = 1e15  # scan units
 _LEAST_ANCHORS = 3
+_PLAIN = str.maketrans({"²": "^2", "³": "^3", "°": "deg"})  # letters of units in tables
 _LEAST = 0.5  # of a curve's range, that a peak stands out by
 
 
@@ -88,7 +89,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--numbers", type=Path, metavar="FILE",
-        help=f"the largest movement of each measure: amplitude, onset, peak, ...; {' or '.join(_SUFFIXES)}",
+        help="the largest movement of each measure: amplitude, onset, peak, ...; "
+        f"{' or '.join(_SUFFIXES)}, default: OUT_numbers",
     )  # fmt: skip
     parser.add_argument(
         "--repeats", type=Path, metavar="FILE",
@@ -164,14 +166,13 @@ def run(args: Namespace) -> int:
                 found = put_on_surface(found, timeline, frame)
             tracks = with_noise(tracks_in_frames(found, timeline, frame), args.noise)
         with _shown(f"Measuring {timeline.name}"):
-            found_series = all_series(measures, tracks, timeline, frames=indices)
+            found_series = all_series(measures, tracks, timeline, frames=indices, keep=True)
         if args.anchors:  # whose motion changes no measure
             still = stabilising(tracks, args.anchors)
             tracks = {name: held_still(track, still) for name, track in tracks.items()}
-        series = [_in_frames(each, indices) for each in found_series.values()]
+        series = [each.in_frames(indices) for each in found_series.values()]
         order = ORDERS.index(args.order)
-        needs_curves = order or args.numbers or args.repeats or args.plot
-        curves = _curves(args, series, timeline) if needs_curves else []
+        curves = _curves(args, series, timeline)
         if order:
             series = [_changes(*each, order) for each in zip(series, curves, strict=True)]
         ways = _ways(args, tracks, indices) if order else {}
@@ -179,7 +180,7 @@ def run(args: Namespace) -> int:
         rows = _landmark_rows(tracks, timeline, indices)
         for kind, group in (("measure", series), ("trajectory", paces)):
             rows += _value_rows(kind, group, timeline.unit, indices, order)
-        _write(args.out, timeline, LONG_COLUMNS, rows)
+        _write(args.out, timeline, (*LONG_COLUMNS, "note"), rows)
         if args.numbers:
             against = next((curve for curve in curves if curve.name == args.against), None)
             columns = NUMBER_COLUMNS if against is None else (*NUMBER_COLUMNS, "r")
@@ -228,6 +229,8 @@ def _number(text: str) -> float:
 
 def _outputs(args: Namespace) -> list[Path]:
     """The files to write. Raises InputError, before any work, where one cannot be, or a flag does nothing."""
+    if args.numbers is None and args.measures is not None:
+        args.numbers = numbers_file(args.out)
     more = {"--numbers": args.numbers, "--repeats": args.repeats, "--plot": args.plot}
     asked = {flag: path for flag, path in more.items() if path}
     outputs = [args.out, *asked.values()]
@@ -246,13 +249,13 @@ def _outputs(args: Namespace) -> list[Path]:
         raise InputError("is of measures, and there are none", lacking[0], "Tell them by --measures")
     if args.traced is not None and not is_of_speeds:
         raise InputError("is of speeds, and none are asked for", "--traced", "Add --order speed")
-    if args.against is not None and not (args.measures and (args.numbers or args.plot)):
-        raise InputError("is of numbers and plots of measures", "--against", "Add --numbers or --plot")
+    if args.against is not None and args.measures is None:
+        raise InputError("is of measures, and there are none", "--against", "Name them by --measures")
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
         hint = "Name landmarks that do not move against each other, with commas between"
         raise InputError("removing head motion needs three landmarks", "--anchors", hint)
-    if args.smoothing is not None and not (is_of_speeds or args.numbers or args.repeats):
-        hint = f"Use it with --numbers, --repeats, or --order {' or '.join(ORDERS[1:])}"
+    if args.smoothing is not None and not (is_of_speeds or args.measures):
+        hint = f"Use it with --measures, or --order {' or '.join(ORDERS[1:])}"
         raise InputError("smooths nothing that is asked for", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
         flag = "--least" if args.aligned is None else "--aligned"
@@ -283,13 +286,6 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
     if args.against is not None and len(kept) == 1:
         raise InputError("nothing goes against the only measure", "--against", "Tell others by --measures")
     return kept
-
-
-def _in_frames(series: Series, indices: Sequence[int]) -> Series:
-    """The values in these frames alone."""
-    rows = list(indices)
-    times, values, sigmas = series.times[rows], series.values[rows], series.sigmas[rows]
-    return replace(series, times=times, values=values, sigmas=sigmas, known=series.known[rows])
 
 
 def _curves(args: Namespace, series: Sequence[Series], timeline: Timeline) -> list[MeasureCurve]:
@@ -380,7 +376,8 @@ def _landmark_rows(
     """The rows of landmarks, frame by frame."""
     wanted = {index + 1 for index in indices}
     landmarks = LandmarkSet.of_tracks(tracks, timeline.unit)
-    return [row for row in landmark_rows(landmarks) if row[1] in wanted]
+    rows = (row for row in landmark_rows(landmarks) if row[1] in wanted)
+    return [[*row, tracks[str(row[3])].reasons.get(int(str(row[1])) - 1)] for row in rows]
 
 
 def _value_rows(
@@ -394,16 +391,15 @@ def _value_rows(
             state = STATES[Known(int(each.known[row]))]
             values = cell(each.values[row]), cell(each.sigmas[row])
             time, own = cell(each.times[row]), _unit(each.quantity, unit, order)
-            rows.append([kind, index + 1, time, each.name, None, None, None, state, *values, own])
+            note = each.note(row) or None
+            rows.append([kind, index + 1, time, each.name, None, None, None, state, *values, own, note])
     return rows
 
 
 def _unit(quantity: Quantity, unit: str, order: int) -> str:
     """The unit of a measure's values in plain letters, or that of their derivatives as the window has it."""
-    if order:
-        return unit_of(quantity, unit) + PER_ORDER[order]
-    power = power_of(quantity)
-    return "deg" if not power else unit if power == 1 else f"{unit}^{power}"
+    own = unit_of(quantity, unit)
+    return own + PER_ORDER[order] if order else own.translate(_PLAIN)
 
 
 def _write(path: Path, timeline: Timeline, columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
@@ -428,12 +424,15 @@ def _tell_gaps(
     """Say in how many of the frames each is not known. paces: speeds or accelerations of landmarks."""
     what = f"the {ORDERS[order]} of " if order else ""
     known = {f"'{name}'": each.known[list(indices)] for name, each in tracks.items()}
-    known |= {f"{what}'{each.name}'": each.known for each in series}
+    known |= {f"{what}'{each.name}'": each.known for each in series if order or not each.warning}
     known |= {f"{what}the landmark '{each.name}'": each.known for each in paces}
     for name, states in known.items():
         gaps = int((states < Known.TRACKED).sum())
         if gaps:
             warn(f"{name} is not known in {gaps} of {len(indices)} frames")
+    for each in series if not order else ():
+        if each.warning:
+            warn(f"'{each.name}': {each.warning}")
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ _SAME = 1e-7  # weights below which a place in a face is on its edge, and shares
 _ROUNDED = 1e-9  # of weights: the least of a place that is off a chord is some `_SAME`
 _HALF_EDGES = ((0, 1), (1, 2), (2, 0))
 
-Weights = NDArray[np.float64]  # (3,) of the corners of a face
+Weights = tuple[float, float, float]  # of the corners of a face
 Chord = tuple[Weights, Weights]
 Polygon = list[Weights]
 
@@ -96,15 +97,22 @@ def _chords(
                 share = sorted(ends[:, patch.faces[face] == high].ravel().tolist())
                 along[low, high].append((share[0], share[1]))
             else:
-                chords[face].append((ends[0], ends[1]))
+                start, end = map(tuple, ends.tolist())
+                chords[face].append((start, end))
     return chords, along
 
 
 def _side(chord: Chord, place: Weights) -> float:
-    """How far a place of the same face is off a chord, by weights; the sign tells on which side."""
-    from .cutting_kernels import side
+    """How far a place of the same face is off a chord, by weights; the sign tells on which side. In plain
+    numbers: arrays of three take longer."""
+    (a, b, c), (d, e, f), (x, y, z) = *chord, place
+    volume = a * (e * z - f * y) - b * (d * z - f * x) + c * (d * y - e * x)
+    return volume / math.sqrt((d - a) ** 2 + (e - b) ** 2 + (f - c) ** 2)
 
-    return side(*chord, place)
+
+def _middle(polygon: Polygon) -> Weights:
+    x, y, z = zip(*polygon, strict=True)
+    return sum(x) / len(x), sum(y) / len(y), sum(z) / len(z)
 
 
 def _divided(
@@ -115,12 +123,12 @@ def _divided(
     of_face: dict[int, dict[tuple[bool, ...], int]] = {}
     polygons: list[tuple[int, Polygon]] = []
     for face, across in chords.items():
-        parts: list[Polygon] = [list(np.eye(3))]
+        parts: list[Polygon] = [[(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]]
         for chord in across:
             parts = [half for part in parts for half in _halves(part, chord) if len(half) > 2]
         of_face[face] = {}
         for part in parts:
-            middle = np.mean(part, axis=0)
+            middle = _middle(part)
             of_face[face][tuple(_side(chord, middle) > 0 for chord in across)] = len(polygons)
             polygons.append((face, part))
     return of_face, polygons
@@ -137,7 +145,14 @@ def _halves(polygon: Polygon, chord: Chord) -> tuple[Polygon, Polygon]:
             if sign * side >= 0:
                 half.append(corner)
             if side * further < 0:
-                half.append((side * after - further * corner) / (side - further))
+                (a, b, c), (d, e, f), width = corner, after, side - further
+                half.append(
+                    (
+                        (side * d - further * a) / width,
+                        (side * e - further * b) / width,
+                        (side * f - further * c) / width,
+                    )
+                )
     kept = [
         half if any(s * side > 0 for side in sides) else [] for half, s in zip(halves, (1, -1), strict=True)
     ]
@@ -172,9 +187,13 @@ def _links(
             if end - start < 2 * _SAME or any(a <= middle <= b for a, b in blocked.get((low, high), ())):
                 continue
             for face, links in zip(faces, (one, other), strict=True):
-                place = np.where(patch.faces[face] == low, 1 - middle, 0.0)
-                place += np.where(patch.faces[face] == high, middle, 0.0)
-                links.append(_which(patch, face, place, chords, of_face, polygons))
+                if face not in chords:
+                    links.append(face)
+                    continue
+                weight = {low: 1 - middle, high: middle}
+                a, b, c = patch.faces[face].tolist()
+                place = weight.get(a, 0.0), weight.get(b, 0.0), weight.get(c, 0.0)
+                links.append(len(patch.faces) + _which(place, chords[face], of_face[face], polygons))
     return np.array(one, np.int64), np.array(other, np.int64)
 
 
@@ -183,7 +202,7 @@ def _met(patch: Patch, chords: dict[int, list[Chord]]) -> dict[tuple[int, int, i
     met: dict[tuple[int, int, int], list[float]] = defaultdict(list)
     for face, across in chords.items():
         corners = patch.faces[face].tolist()
-        for end in (end.tolist() for chord in across for end in chord):
+        for end in (end for chord in across for end in chord):
             ends = sorted((vertex, weight) for vertex, weight in zip(corners, end, strict=True) if weight)
             if len(ends) == 2:
                 met[face, ends[0][0], ends[1][0]].append(ends[1][1])
@@ -191,24 +210,20 @@ def _met(patch: Patch, chords: dict[int, list[Chord]]) -> dict[tuple[int, int, i
 
 
 def _which(
-    patch: Patch,
-    face: int,
     place: Weights,
-    chords: dict[int, list[Chord]],
-    of_face: dict[int, dict[tuple[bool, ...], int]],
+    across: list[Chord],
+    of_sides: dict[tuple[bool, ...], int],
     polygons: list[tuple[int, Polygon]],
 ) -> int:
-    """The number of the face, or of the polygon of it that holds a place on its edge."""
-    if face not in chords:
-        return face
-    sides = tuple(_side(chord, place) > 0 for chord in chords[face])
-    found = of_face[face].get(sides)
+    """The number of the polygon of a face that holds a place on its edge. across, of_sides: its chords, and
+    its polygons by their sides of these."""
+    found = of_sides.get(tuple(_side(chord, place) > 0 for chord in across))
     if found is None:  # of rounding: the polygon whose corners lie nearest
         found = min(
-            of_face[face].values(),
-            key=lambda number: float(np.linalg.norm(np.mean(polygons[number][1], axis=0) - place)),
+            of_sides.values(),
+            key=lambda number: math.dist(_middle(polygons[number][1]), place),
         )
-    return len(patch.faces) + found
+    return found
 
 
 def _piece(patch: Patch, names: Rows, polygons: list[tuple[int, Polygon]]) -> Piece:

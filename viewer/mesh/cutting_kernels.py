@@ -13,21 +13,6 @@ Weights = NDArray[np.float64]  # (3,) of the corners of a face
 
 
 @compiled
-def side(start: Weights, end: Weights, place: Weights) -> float:
-    """How far a place of a face is off the line through two others, by weights; the sign tells on which
-    side."""
-    volume = (
-        start[0] * (end[1] * place[2] - end[2] * place[1])
-        - start[1] * (end[0] * place[2] - end[2] * place[0])
-        + start[2] * (end[0] * place[1] - end[1] * place[0])
-    )
-    length = 0.0
-    for axis in range(3):
-        length += (end[axis] - start[axis]) ** 2
-    return float(volume / np.sqrt(length))
-
-
-@compiled
 def _nearest(
     vertices: NDArray[np.float64], face: NDArray[np.int64], place: NDArray[np.float64], found: Weights
 ) -> float:

@@ -51,14 +51,13 @@ def without_pockets(patch: Patch, seeds: Sequence[int], spacing: float) -> Patch
 def _inner_holes(patch: Patch) -> Rows:
     """The holes of a patch by number, but for the longest of each connected part, around which it ends."""
     start, end = patch.border
-    count = int(patch.holes.max(initial=-1)) + 1
-    lengths = np.bincount(
-        patch.holes, np.linalg.norm(patch.vertices[end] - patch.vertices[start], axis=1), count
-    )
-    part = np.zeros(count, np.int64)
+    if not len(start):
+        return patch.holes
+    lengths = np.bincount(patch.holes, np.linalg.norm(patch.vertices[end] - patch.vertices[start], axis=1))
+    part = np.zeros(len(lengths), np.int64)
     part[patch.holes] = patch.parts[start]
     order = np.lexsort((lengths, part))
-    return order[np.append(part[order[1:]] == part[order[:-1]], np.zeros(min(count, 1), bool))]
+    return order[:-1][part[order[1:]] == part[order[:-1]]]
 
 
 def _misses(patch: Patch, spacing: float) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from .manifold import Rows, across_edges, joined, manifold
 from .smoothing import Points, rows_apart
 
-_RADII = (1.0, 1.5, 2.5, 4.0)  # of the balls that are rolled, in distances between points
+_RADII = (1.0, 2.0, 4.0)  # of the balls that are rolled, in distances between points
 _NEAREST = 0.6  # two of the points that make a patch, in the same
 _GAP = 2.0  # distances between points: radius of a circle without a point that is no chance
 _AROUND, _AROUND_SPACINGS = 6, 1.38  # points whose farthest lies so many distances away, pi d^2 = 6 s^2

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,7 +41,8 @@ _DIGITS = 9  # of a number in a table
 class PlotLine:
     """A line of a plot. label: its name. unit: of its values, which says whose axis it goes by. values: (N,),
     NaN where not known. band: (N,) how far to either side it is filled, NaN for not at all. color: 0xRRGGBB.
-    is_thin: whether it is one of many that stand behind another."""
+    is_thin: whether it is one of many that stand behind another. notes: by number of the value, what to know
+    about it."""
 
     label: str
     unit: str
@@ -49,6 +50,7 @@ class PlotLine:
     band: NDArray[np.float64]
     color: int
     is_thin: bool = False
+    notes: Mapping[int, str] = field(default_factory=dict)
 
     @cached_property
     def lone(self) -> NDArray[np.intp]:
@@ -90,8 +92,8 @@ class CurvePlot:
         return any(np.isfinite(line.values).any() for line in self.lines)
 
     def rows(self) -> list[list[object]]:
-        """A table: a row for each x, a column for each line and for its band where it has one. Cells are
-        empty where a value is not known; frames are told from 1."""
+        """A table: a row for each x, a column for each line, and for its band and its notes where it has
+        some. Cells are empty where a value is not known; frames count from 1."""
         head: list[object] = [] if self.frames is None else ["frame"]
         head.append(f"{self.x_label} [{self.x_unit}]")
         columns: list[Sequence[object]] = [] if self.frames is None else [(self.frames + 1).tolist()]
@@ -102,6 +104,9 @@ class CurvePlot:
             if line.edges is not None:
                 head.append(f"{line.label} ± [{line.unit}]")
                 columns.append(_cells(line.band))
+            if line.notes:
+                head.append(f"{line.label}: note")
+                columns.append([line.notes.get(row, "") for row in range(len(self.x))])
         return [head, *(list(row) for row in zip(*columns, strict=True))]
 
     def save(self, path: Path) -> None:
@@ -172,7 +177,8 @@ def color_of_way(number: int) -> int:
 def line_of_curve(curve: MeasureCurve, color: int, order: int, has_band: bool = True) -> PlotLine:
     """The line of a measure: its values, 0, speed, 1, or acceleration, 2, with two standard deviations."""
     values, sigmas = curve.derivative(order)
-    return PlotLine(curve.name, curve.unit + PER_ORDER[order], values, _band(sigmas, has_band), color)
+    unit, band = curve.unit + PER_ORDER[order], _band(sigmas, has_band)
+    return PlotLine(curve.name, unit, values, band, color, notes=curve.notes)
 
 
 def line_of_way(

@@ -6,9 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from shapes import found, pose_of, refused
+from shapes import Frames, found, pose_of, refused, track_of
 
+from viewer.analysis.measures import Measure
+from viewer.analysis.measures.series import all_series, surface_of
 from viewer.analysis.measures.surface import PoseSurface
+from viewer.analysis.track import Known
+from viewer.scan.open import open_scan
+from viewer.scan.points import PointCloud
 
 UP = np.array([0.0, 0, 1])
 
@@ -161,3 +166,66 @@ def test_beyond_the_border_there_is_no_region() -> None:
     assert refused(notched, "area", corners) == "the path from 2 to 3 goes around an opening"
     assert refused(notched, "perimeter", corners + np.array([16, 0, 0])) == "1 is off the surface"
     assert found(notched, "area", corners - np.array([0, 9, 0])).value == pytest.approx(480, rel=0.02)
+
+
+LIPS = {  # frame -> where ten landmarks around the demo's lips are; in frame 0 the lips are closed
+    0: (
+        (-19.006, -54.691, 85.167), (-9.322, -52.569, 89.505), (0.215, -51.341, 88.564),
+        (12.373, -52.654, 88.537), (21.246, -55.697, 83.7), (27.292, -60.337, 76.481),
+        (10.329, -68.583, 82.278), (0.217, -69.793, 83.093), (-11.665, -68.662, 81.491),
+        (-24.478, -60.43, 80.088),
+    ),
+    8: (
+        (-18.584, -55.532, 85.209), (-9.183, -52.718, 89.527), (0.214, -51.341, 88.564),
+        (12.145, -52.956, 88.574), (20.774, -56.738, 83.732), (26.815, -61.737, 76.41),
+        (10.218, -70.746, 81.538), (0.217, -71.964, 82.296), (-11.531, -70.789, 80.768),
+        (-23.999, -61.916, 79.966),
+    ),
+    12: (
+        (-18.149, -57.302, 85.039), (-9.039, -52.951, 89.535), (0.214, -51.341, 88.564),
+        (11.908, -53.495, 88.569), (20.297, -58.986, 83.457), (26.391, -64.918, 75.698),
+        (10.162, -76.618, 79.171), (0.217, -78.035, 79.767), (-11.461, -76.519, 78.447),
+        (-23.579, -65.348, 79.165),
+    ),
+}  # fmt: skip
+
+
+def test_lips_that_part_are_measured_along_the_skin() -> None:
+    """The demo has a mouth behind its lips. As these part the skin within their outline stays the same, to a
+    few percent, and no more than a circle as long as the outline holds."""
+    values, shares = {}, {}
+    with open_scan("demo") as timeline:
+        for frame, corners in LIPS.items():
+            surface = surface_of(timeline, timeline.visit(frame))
+            area, outline = (found(surface, kind, np.array(corners)) for kind in ("area", "perimeter"))
+            values[frame], shares[frame] = area.value, area.share
+            assert outline.value == pytest.approx(121.6, rel=0.06)
+            assert area.value < outline.value**2 / (4 * np.pi)
+    assert values[0] == pytest.approx(937, rel=0.02)
+    assert [values[8], values[12]] == pytest.approx([values[0]] * 2, rel=0.08)
+    assert shares[0] == pytest.approx(1)
+    assert 0.6 < shares[12] < shares[8] < 0.93
+
+
+def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
+    places = sheet(44, 44)
+    holed = PointCloud.from_arrays(np.pad(places[np.linalg.norm(places, axis=1) > 6], ((0, 0), (0, 1))))
+    whole = PointCloud.from_arrays(np.pad(places, ((0, 0), (0, 1))))
+    tracks = {name: track_of([place] * 3) for name, place in (("a", (-10, 0, 0)), ("b", (10, 0, 0)))}
+    tracks |= {f"c{n}": track_of([place] * 3) for n, place in enumerate(ring(13, 12).tolist())}
+    tracks["c3"] = track_of([(0, 13, 0)] * 3, gaps=[2])
+    measures = [
+        Measure("way", "path", ("a", "b")),
+        Measure("ring", "area", tuple(f"c{n}" for n in range(12))),
+    ]
+    with Frames([whole, holed, whole]).timeline() as timeline:
+        series = all_series(measures, tracks, timeline)
+    way, area = series["way"], series["ring"]
+    assert np.isfinite(way.values).tolist() == [True, False, True]
+    assert way.known.tolist() == [Known.TRACKED, Known.GAP, Known.TRACKED]
+    assert [way.note(frame) for frame in range(3)] == ["", "the path from a to b goes around an opening", ""]
+    assert way.warning == "no value in 1 of 3 frames: the path from a to b goes around an opening"
+    assert area.note(1) == f"surface in {100 * area.shares[1]:.0f} % of the outline"
+    assert area.note(2) == "c3 is a gap"
+    assert "no value in 1 of 3 frames: c3 is a gap; openings in 1 of 3 frames" in area.warning
+    assert way.in_frames([1, 2]).note(0) == way.note(1)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...mesh.geodesic import Line
 
+WHOLE = 0.95  # of the area within an outline: with less surface, a region has openings
 Quantity = Literal["length", "angle", "area", "volume"]
 
 
@@ -48,3 +49,42 @@ class Series:
     lines: Mapping[int, tuple[Line, ...]] = field(default_factory=dict)
     reasons: Mapping[int, str] = field(default_factory=dict)
     shares: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+
+    def in_frames(self, frames: Sequence[int]) -> Series:
+        """The series of these frames alone, in their order."""
+        rows = list(frames)
+        there = {frame: row for row, frame in enumerate(rows)}
+        return replace(
+            self,
+            times=self.times[rows],
+            values=self.values[rows],
+            sigmas=self.sigmas[rows],
+            known=self.known[rows],
+            lines={there[frame]: lines for frame, lines in self.lines.items() if frame in there},
+            reasons={there[frame]: reason for frame, reason in self.reasons.items() if frame in there},
+            shares=self.shares[rows] if len(self.shares) else self.shares,
+        )
+
+    def note(self, frame: int) -> str:
+        """What to know about the value in a frame: why there is none, or how much of a region has surface
+        where that is not all of it; "" for nothing."""
+        if frame in self.reasons and np.isnan(self.values[frame]):
+            return self.reasons[frame]
+        share = self.shares[frame] if len(self.shares) else np.nan
+        return f"surface in {100 * share:.0f} % of the outline" if share < WHOLE else ""
+
+    @property
+    def warning(self) -> str:
+        """What to know about all values together, such as a movement: in how many frames there are none, and
+        why; in how many a region has openings. "" for nothing."""
+        count, told = len(self.times), []
+        gaps = [frame for frame in sorted(self.reasons) if np.isnan(self.values[frame])]
+        if gaps:
+            reasons = "; ".join(dict.fromkeys(self.reasons[frame] for frame in gaps))
+            told.append(f"no value in {len(gaps)} of {count} frames: {reasons}")
+        open_ = self.shares < WHOLE if len(self.shares) else np.zeros(count, bool)
+        if open_.any():
+            least = 100 * float(self.shares[open_].min())
+            words = f"openings in {int(open_.sum())} of {count} frames"
+            told.append(f"{words}: as little as {least:.0f} % of the outline has surface")
+        return "; ".join(told)

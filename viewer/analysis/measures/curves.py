@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Self
 
 import numpy as np
@@ -20,7 +21,7 @@ BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
 PER_ORDER = ("", "/s", "/s²")  # what derivatives add to a unit, by their order
 NUMBER_COLUMNS = (
     "measure", "unit", "rest", "amplitude", "amplitude ±", "onset [s]", "onset ± [s]", "peak [s]",
-    "end [s]", "end ± [s]", "duration [s]", "duration ± [s]", "fastest per s",
+    "end [s]", "end ± [s]", "duration [s]", "duration ± [s]", "fastest per s", "note",
 )  # fmt: skip
 REPEAT_COLUMNS = ("measure", "repeat", "event [s]", "time [s]", "value", "deviation", "unit")
 _POWERS = {"length": 1, "area": 2, "volume": 3}
@@ -45,7 +46,8 @@ class MeasureCurve:
 
     unit: of the values, such as "mm". times, values, sigmas: (T,). smoothing: with a window wide enough for
     these times. movement: the largest one, None where there is none. fastest: the largest speed to either
-    side, NaN where not known.
+    side, NaN where not known. notes: frame -> what to know about its value. warning: what to know about
+    the movement, "" for nothing.
     """
 
     name: str
@@ -56,6 +58,8 @@ class MeasureCurve:
     smoothing: Smoothing
     movement: Movement | None
     fastest: float
+    notes: Mapping[int, str] = field(default_factory=dict)
+    warning: str = ""
 
     @classmethod
     def of(cls, series: Series, scale: Scale, smoothing: Smoothing) -> Self:
@@ -67,7 +71,8 @@ class MeasureCurve:
         fastest = float(np.nanmax(speeds)) if np.isfinite(speeds).any() else math.nan
         movement = movement_of(times, values, sigmas, wide)
         unit = unit_of(series.quantity, scale.unit)
-        return cls(series.name, unit, times, values, sigmas, wide, movement, fastest)
+        notes = {frame: note for frame in range(len(times)) if (note := series.note(frame))}
+        return cls(series.name, unit, times, values, sigmas, wide, movement, fastest, notes, series.warning)
 
     def derivative(self, order: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """The values as they are, 0, or the speed, 1, or acceleration, 2, of the smoothed curve, and the
@@ -78,11 +83,18 @@ class MeasureCurve:
         return values, np.sqrt(variances)
 
 
+def numbers_file(table: Path) -> Path:
+    """Where the numbers of movements stand whose values are in a table: beside it, NAME_numbers.csv."""
+    return table.with_name(f"{table.stem}_numbers{table.suffix}")
+
+
 def number_rows(curves: Sequence[MeasureCurve], against: MeasureCurve | None = None) -> list[list[object]]:
     """The numbers of the movements, a row for each curve below NUMBER_COLUMNS; None for what is not known.
     Each ± is two standard deviations. against: one of the curves, whose correlation with the others then is
     one more column."""
-    rows: list[list[object]] = [[curve.name, curve.unit, *map(_rounded, _numbers(curve))] for curve in curves]
+    rows: list[list[object]] = [
+        [curve.name, curve.unit, *map(_rounded, _numbers(curve)), curve.warning or None] for curve in curves
+    ]
     if against is None:
         return rows
     found = correlations(curves, against)
@@ -133,7 +145,7 @@ def repeat_rows(curves: Iterable[MeasureCurve], aligned: Repeats, order: int = 0
 def _numbers(curve: MeasureCurve) -> list[float]:
     one, two = curve.movement, BAND_SIGMAS
     if one is None:
-        return [*(math.nan,) * (len(NUMBER_COLUMNS) - 3), curve.fastest]
+        return [*(math.nan,) * (len(NUMBER_COLUMNS) - 4), curve.fastest]
     return [
         one.rest, one.amplitude, two * one.amplitude_sigma, one.onset, two * one.onset_sigma, one.peak,
         one.end, two * one.end_sigma, one.duration, two * one.duration_sigma, curve.fastest,

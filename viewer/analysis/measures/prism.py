@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,59 +10,11 @@ from numpy.typing import NDArray
 from ...mesh.cutting import plane_section
 from ...mesh.geodesic import Line
 from ...mesh.patch import Patch
-from ...mesh.smoothing import Points
-from .outlines import Outline, is_within
-from .planes import THROUGH, plane_of
+from .outlines import Prism
 from .surface import PoseSurface
 
 _PARTS = 8  # into which each side of a face on the rim is divided
 _SLAB = 2.0  # spacings around the prism that its patch reaches
-
-
-@dataclass(frozen=True, eq=False)
-class Prism:
-    """The prism over a polygon, without end on both sides of its plane.
-
-    center, normal: of the plane, (3,). axes: (2, 3), in it. corners: (K, 2) along these.
-    """
-
-    center: NDArray[np.float64]
-    normal: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    corners: Outline
-
-    @classmethod
-    def over(cls, places: Points) -> Prism | None:
-        """The prism over places (K, 3), across the plane nearest to them; None where they tell none."""
-        center, normal = plane_of(places, THROUGH)
-        if not np.isfinite(normal).all():
-            return None
-        axes = np.linalg.svd(normal[None])[2][1:]
-        return cls(center, normal, axes, (places - center) @ axes.T)
-
-    def flat(self, points: Points) -> NDArray[np.float64]:
-        """Places of points (..., 3) in the plane, (..., 2)."""
-        return (points - self.center) @ self.axes.T
-
-    def with_corner(self, number: int, corner: Outline) -> Prism:
-        """The prism over the same plane with another place of one corner, (2,)."""
-        corners = self.corners.copy()
-        corners[number] = corner
-        return replace(self, corners=corners)
-
-    def has(self, flat: Outline) -> NDArray[np.bool_]:
-        """Whether places in the plane, (..., 2), are in the polygon, (...)."""
-        return is_within(flat.reshape(-1, 2), self.corners).reshape(flat.shape[:-1])
-
-    def beyond(self, points: Points) -> NDArray[np.float64]:
-        """How far points (N, 3) are outside the prism, negative within, (N,)."""
-        flat = self.flat(points)
-        away = np.full(len(flat), np.inf)
-        for start, end in zip(self.corners, np.roll(self.corners, -1, axis=0), strict=True):
-            side = end - start
-            share = np.clip((flat - start) @ side / max(side @ side, np.finfo(float).tiny), 0, 1)
-            away = np.minimum(away, np.hypot(*(flat - start - share[:, None] * side).T))
-        return np.where(is_within(flat, self.corners), -away, away)
 
 
 def patch_through(surface: PoseSurface, prism: Prism) -> Patch:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +17,10 @@ from ...scan.timeline import Timeline
 from ...task import checkpoint
 from ..track import Known, Track
 from . import Measure, Series
+from .kept import KeptValues
 from .kinds import MeasureKind, kind_of
-from .surface import PoseSurface, Refused
+from .regions import Refused
+from .surface import Found, PoseSurface
 
 _NO_DIRECTION = "its landmarks lie in one place or on a line"
 _DRAWN = 48  # places of a line along the surface that are kept, in each frame
@@ -60,6 +63,8 @@ def all_series(
     noise: float = 0.0,
     frames: Sequence[int] | None = None,
     tell: Callable[[dict[str, Series]], object] | None = None,
+    *,
+    keep: bool = False,
 ) -> dict[str, Series]:
     """The values of measures by name in all frames.
 
@@ -67,7 +72,8 @@ def all_series(
     is read once for all measures that need its surface, and none where none does. noise: of the scanner,
     standard deviation of a coordinate of what it measures, scan units. frames: those in which the surface is
     looked at, in this order, others stay pending; None: all. tell: called after each with the series as far
-    as they are known. What a frame does not tell, because a landmark is not known there, is not on the
+    as they are known. keep: values of surfaces are kept in the cache folder, and taken from there where they
+    were found before. What a frame does not tell, because a landmark is not known there, is not on the
     surface, or the frame is broken, is a gap. Long work: it can be cancelled. Raises InputError for measures
     that are none.
     """
@@ -77,9 +83,15 @@ def all_series(
             _fill_points(each)
     on_surface = [each for each in asked if each.kind.needs_surface]
     if on_surface and timeline is not None:
-        for _ in _fill_surfaces(on_surface, timeline, range(len(timeline)) if frames is None else frames):
-            if tell is not None:
-                tell(_series(asked, tracks))
+        kept = [KeptValues(each.measure, each.positions) for each in on_surface] if keep else []
+        try:
+            looked_at = range(len(timeline)) if frames is None else frames
+            for _ in _fill_surfaces(on_surface, timeline, looked_at, kept):
+                if tell is not None:
+                    tell(_series(asked, tracks))
+        finally:  # also where it is cancelled
+            for values in kept:
+                values.save()
     return _series(asked, tracks)
 
 
@@ -187,8 +199,11 @@ def _roots(covariances: NDArray[np.float64]) -> NDArray[np.float64]:
     return axes * np.sqrt(np.maximum(widths, 0))[..., None, :]
 
 
-def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence[int]) -> Iterator[int]:
-    """Look at the surface of one frame after the other, and tell which was done."""
+def _fill_surfaces(
+    asked: Sequence[_Asked], timeline: Timeline, frames: Sequence[int], kept: Sequence[KeptValues]
+) -> Iterator[int]:
+    """Look at the surface of one frame after the other, and tell which was done. kept: values of each, or
+    none."""
     needed = [frame for frame in frames if any(each.known[frame] >= Known.TRACKED for each in asked)]
     faces: dict[str, Triangles] = {}
     for done, frame in enumerate(needed):
@@ -201,16 +216,22 @@ def _fill_surfaces(asked: Sequence[_Asked], timeline: Timeline, frames: Sequence
             for each in asked:
                 each.reasons.setdefault(frame, "the frame cannot be read")
             continue
-        for each in asked:
+        for each, values in zip_longest(asked, kept):
             checkpoint()
             if each.known[frame] >= Known.TRACKED and np.isfinite(each.positions[frame]).all():
-                _fill_surface(each, frame, surface)
+                _fill_surface(each, frame, surface, values)
         yield frame
 
 
-def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface) -> None:
-    compute: Callable = asked.kind.compute
-    found = compute(surface, asked.positions[frame], asked.measure.options)
+def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface, kept: KeptValues | None) -> None:
+    found = kept.get(frame, surface.digest) if kept else None
+    if found is None:
+        compute: Callable = asked.kind.compute
+        found = compute(surface, asked.positions[frame], asked.measure.options)
+        if isinstance(found, Found):
+            found = replace(found, lines=tuple(map(_thinned, found.lines)))
+        if kept:
+            kept.put(frame, surface.digest, found)
     if isinstance(found, Refused):
         asked.reasons[frame] = found.told(asked.measure.landmarks)
         return
@@ -220,7 +241,7 @@ def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface) -> None:
     asked.values[frame] = found.value
     asked.sigmas[frame] = np.sqrt(max(variance, 0) + found.deviation**2)
     asked.shares[frame] = found.share
-    asked.lines[frame] = tuple(_thinned(line) for line in found.lines)
+    asked.lines[frame] = found.lines
 
 
 def _thinned(line: Line) -> Line:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from hashlib import blake2b
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,15 +19,18 @@ from ...scan.estimate import cloud_normals
 from ...scan.faces import Triangles
 from ...scan.pose import Pose
 from ...scan.range_view import merged_normals
+from .outlines import Prism
 from .regions import Refused, Region, region_within
 
 Beyond = Callable[[Points], NDArray[np.float64]]  # how far places (N, 3) are outside, negative within, (N,)
 
 _FITTED = 2.0  # spacings in which points tell a normal where there is no noise
-_RIM = 4.0  # spacings that a patch of points reaches farther, as it ends in a ragged rim
+_RIM = 3.0  # spacings that a patch of points reaches farther, as it ends in a ragged rim
 _ASTRAY = 4.0  # spacings, and deviations of noise, that a landmark may lie off the surface
 _LONGER = 1.2  # times the straight line: the path that is looked for first
 _WIDER = 1.1  # times the farthest corner from their middle: where a region is looked for first
+_DEEPER = 0.5  # times the same: how far behind the deepest corner
+_AROUND = 0.3  # times the same: how far around their outline
 _GROWS = 1.6  # by which what is looked at grows where no path is found
 _DETOUR = 0.05  # of its length, or a spacing: how much longer a path may be as it goes around openings
 _TRIES = 8
@@ -77,6 +81,16 @@ class PoseSurface:
         self._faces = None if faces is None or not len(faces) else _rows(faces, self._cloud.ids)
         self.origin = self._cloud.origin
         self._loops: dict[bytes, Circuit | Refused] = {}
+
+    @cached_property
+    def digest(self) -> str:
+        """A hash of the points, their normals and faces: surfaces with the same one are the same."""
+        found = blake2b(digest_size=16)
+        cloud = self._cloud
+        for part in (cloud.positions, cloud.remainders, self.origin, cloud.normals, self._faces):
+            found.update(b"none" if part is None else part.dtype.str.encode())
+            found.update(b"" if part is None else np.ascontiguousarray(part).data)
+        return found.hexdigest()
 
     @cached_property
     def noise(self) -> float:
@@ -173,22 +187,50 @@ class PoseSurface:
         return self._loops[key]
 
     def _loop(self, corners: NDArray[np.float64]) -> Circuit | Refused:
-        middle = corners.mean(axis=0)
-        reach = _WIDER * float(np.linalg.norm(corners - middle, axis=1).max()) + _RIM * self.spacing
+        """Looked for within and around the outline of the corners, in a ball about their middle, and not far
+        behind them; all of these grow until they hold the paths and what is within."""
+        middle, prism = corners.mean(axis=0), Prism.over(corners)
+        size = float(np.linalg.norm(corners - middle, axis=1).max())
+        inwards, factor = np.zeros(3) if prism is None else self._inwards(corners, prism.normal), 1.0
+        deepest = float(((corners - middle) @ inwards).max())
 
         def beyond(points: Points) -> NDArray[np.float64]:
             offsets = points - middle
-            return np.sqrt(np.einsum("pi,pi->p", offsets, offsets)) - reach
+            away = np.sqrt(np.einsum("pi,pi->p", offsets, offsets)) - _WIDER * factor * size
+            away = np.maximum(away, offsets @ inwards - deepest - _DEEPER * factor * size)
+            near = np.flatnonzero(away <= 2 * _RIM * self.spacing)
+            if prism is not None:
+                away[near] = np.maximum(away[near], prism.beyond(points[near]) - _AROUND * factor * size)
+            return away - _RIM * self.spacing
 
         for _ in range(_TRIES):
             found = self._joined(self.patch(beyond), list(corners), is_closed=True)
-            lines = found.lines if isinstance(found, Circuit) else ()
-            if lines and max(beyond(line).max() for line in lines) < -_RIM * self.spacing:
+            if isinstance(found, Circuit) and self._is_whole(found, beyond):
                 break
             if beyond(self._points).max() <= 0:
                 break
-            reach *= _GROWS
+            factor *= _GROWS
         return self._straight(found)
+
+    def _is_whole(self, found: Circuit, beyond: Beyond) -> bool:
+        """Whether paths and what is within them do not reach where their patch was cut off."""
+        if max(beyond(line).max() for line in found.lines) >= -_RIM * self.spacing:
+            return False
+        if isinstance(found.region, Refused):
+            return False
+        rim = np.intersect1d(found.patch.border[0], found.region.piece.faces)
+        return not len(rim) or beyond(found.patch.vertices[rim]).max() <= 0
+
+    def _inwards(self, corners: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The normal of the plane of places (K, 3) on the surface, or its opposite: to the side that the
+        surface faces away from; zeros where nothing tells that."""
+        if self._normals is None:
+            return np.zeros(3)
+        nearest = [
+            int(np.einsum("pi,pi->p", away, away).argmin()) for away in self._points - corners[:, None]
+        ]
+        faces_it = float(self._normals[nearest].sum(axis=0) @ normal)
+        return -normal if faces_it >= 0 else normal
 
     def _straight(self, found: Circuit | Refused) -> Circuit | Refused:
         """Paths, or the reason where one goes around an opening by more than the surface leaves open."""

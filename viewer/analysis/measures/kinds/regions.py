@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
-from ..outlines import crosses_itself
-from ..prism import Prism, area_through, near_rim, patch_through, rim_through
+from .. import WHOLE
+from ..outlines import Prism, crosses_itself
+from ..prism import area_through, near_rim, patch_through, rim_through
 from ..regions import CROSSES, NO_PLANE, across, below, facing
 from ..surface import Circuit, Found, PoseSurface, Refused
 from . import MeasureKind, Options
@@ -19,7 +20,6 @@ DEPTHS = (FRONT, ALL)  # the surface that the landmarks are on, or all that is b
 _STEP = 1e-3  # spacings that a landmark is moved by to find a gradient
 _WIDE_STEP = 1.0  # the same, where all in a prism is measured
 _RIM = 4.0  # spacings off the walls of a prism within which that changes something
-_WHOLE = 0.95  # of the area within an outline that has to have surface, to tell a volume
 _BENT = 3.0  # of the squared angles at a face's edges, by which it is smaller than what it stands for
 
 
@@ -98,7 +98,7 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
     region = loop.region
     if isinstance(region, Refused):
         return region
-    if region.share < _WHOLE:
+    if region.share < WHOLE:
         return Refused(f"only {100 * region.share:.0f} % of the area within its outline has surface")
     piece = region.piece
     edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]

@@ -13,8 +13,8 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
 from ....analysis.measures import Measure
-from ....analysis.measures.curves import NUMBER_COLUMNS, number_rows
-from ....csv_text import to_text
+from ....analysis.measures.curves import NUMBER_COLUMNS, number_rows, numbers_file
+from ....csv_text import save_rows, to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....files import free_file, working_folder
@@ -276,13 +276,21 @@ class Tool:
         self.saving.ask(free_file(working_folder(), PLOT_SUFFIXES[0]))
 
     def _save(self, file: Path) -> None:
-        shown = self.shown.plot
+        """Save what is plotted; beside a table, the numbers of the movements as another one."""
+        shown, curves = self.shown.plot, self.shown.curves
         if shown is None:
-            raise InputError("There is no plot to export.")
-        refuse_input(file, self.desk.timeline)
-        self.desk.run(
-            f"Saving {file.name}", lambda: shown.save(file), lambda _: self.desk.note(f"Saved {file}")
-        )
+            raise InputError("There are no curves to save.")
+        files = [file, numbers_file(file)] if file.suffix.lower() == ".csv" else [file]
+        for path in files:
+            refuse_input(path, self.desk.timeline)
+
+        def save() -> None:
+            shown.save(file)
+            for path in files[1:]:
+                save_rows(path, [NUMBER_COLUMNS, *number_rows(curves)])
+
+        words = f"Saved {' and '.join(map(str, files))}"
+        self.desk.run(f"Saving {file.name}", save, lambda _: self.desk.note(words))
 
 
 def _with_plot(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:

@@ -20,7 +20,7 @@ from ...desk import Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
 from .seen import seen_in_view
 from .shown import Kept
-from .words import with_spread
+from .words import with_note, with_spread
 
 _PIECES = 24  # of a straight line, so that a part of it may be hidden
 _MOST_LABELS = 8  # measures that are told by name and value; of more, the one that is pointed at
@@ -145,4 +145,5 @@ def value_in_words(series: Series, frame: int, scale: Scale) -> str:
     """The value of a measure in a frame with its uncertainty and unit; a dash where it is not known."""
     factor = scale.factor ** power_of(series.quantity)
     value, sigma = factor * series.values[frame], factor * series.sigmas[frame]
-    return with_spread(float(value), float(sigma), unit_of(series.quantity, scale.unit))
+    words = with_spread(float(value), float(sigma), unit_of(series.quantity, scale.unit))
+    return with_note(words, series.note(frame))

@@ -137,7 +137,7 @@ class Measurer:
             self._begun = {}
 
         def measure() -> Mapping[str, Series]:
-            return all_series(measures, tracks, timeline, noise, frames, tell)
+            return all_series(measures, tracks, timeline, noise, frames, tell, keep=True)
 
         self._begun = {}
         self._task = self._desk.run("Measuring surfaces", measure, take)

@@ -17,7 +17,7 @@ from ... import widgets
 from ...ui import Ui
 from .choices import AGAINST, MODE_WORDS, ORDER_WORDS, REPEATS, TIME
 from .shown import Curve, chosen_of
-from .words import NUMBERS_HELP, with_spread
+from .words import NUMBERS_HELP, WARNING, with_note, with_spread
 
 if TYPE_CHECKING:
     from . import Tool
@@ -301,10 +301,13 @@ def _draw_table(tool: Tool, frame: int, size: ImVec2) -> None:
         imgui.table_next_row()
         _draw_name(tool, curve)
         now = with_spread(float(curve.values[frame]), float(curve.sigmas[frame]), curve.unit)
+        now = with_note(now, curve.notes.get(frame, ""))
         told = (f"{related[curve.name]:.3f}" if curve.name in related else "",)
         for words in (now, *(told if is_against else tool.words_of(curve))):
             imgui.table_next_column()
             imgui.text(words)
+            if words.startswith(WARNING):
+                widgets.tooltip(curve.warning)
     imgui.end_table()
 
 

@@ -7,6 +7,7 @@ import math
 from ....analysis.measures.curves import BAND_SIGMAS, MeasureCurve
 
 UNKNOWN = "-"
+WARNING = "(!)"  # before numbers of a movement that the user should know more about
 NUMBERS_HELP = {
     "Amplitude": "From rest, the mean of the first frames, to the peak; ± covers 95 %",
     "Onset": "Time when the curve leaves rest by 10 % of the amplitude",
@@ -27,6 +28,11 @@ def with_spread(value: float, sigma: float, unit: str = "") -> str:
     return f"{value:.{decimals}f} ± {spread:.{decimals}f} {unit}".rstrip()
 
 
+def with_note(words: str, note: str) -> str:
+    """A value in words, with what to know about it."""
+    return f"{words} ({note})" if note else words
+
+
 def numbers_in_words(curve: MeasureCurve) -> tuple[str, ...]:
     """The numbers of a curve's movement, in the order of NUMBERS_HELP."""
     movement = curve.movement
@@ -39,6 +45,8 @@ def numbers_in_words(curve: MeasureCurve) -> tuple[str, ...]:
         (movement.duration, movement.duration_sigma),
     )
     amplitude = with_spread(movement.amplitude, movement.amplitude_sigma, curve.unit)
+    if curve.warning:
+        amplitude = f"{WARNING} {amplitude}"
     return amplitude, *(_seconds(*time) for time in times), fastest
 
 
