@@ -108,7 +108,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
         capture = Capture(app.session, playback, app.viewport, app.note, Marks, no_film)
         exporting = Exporting(
             app.session, playback, app.viewport, app.note, capture.shown,
-            Choices(what="frames", folder=str(tmp_path), name="a"), Marks(),
+            Choices(what="frames", folder=str(tmp_path), name="a"), Marks(), lambda: None,
         )  # fmt: skip
         exporting.start()
         (told,) = app.told

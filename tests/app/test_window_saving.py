@@ -95,3 +95,19 @@ def test_a_folder_lists_its_folders_and_the_newest_files_first(tmp_path: Path) -
     rows = files_of(tmp_path, (".csv",))
     assert [row.title for row in rows] == ["9 a", "10 b", "2.csv", "1.csv", "0.csv"]
     assert [(row.frames, row.size) for row in rows] == [(0, None), (0, None), (1, 2), (1, 1), (1, 0)]
+
+
+def test_the_folder_of_an_export_is_gone_to_and_escape_ends_one_dialog(
+    app: RunningApp, tmp_path: Path
+) -> None:
+    press(app, "ctrl+e")
+    app.act("Export", ("item_click", "\uf07c"))
+    assert app.settle().lists == 2
+    press(app, "Escape")
+    assert app.state.lists == 1
+    app.act("Export", ("item_click", "\uf07c"))
+    press(app, "Up", "Return")  # into the folder, the only row
+    app.act("Choose a folder", ("item_click", "###take"))
+    assert app.settle().fields["##folder"] == str(tmp_path / "work" / "b sub")
+    press(app, "Escape")
+    assert app.state.lists == 0

@@ -177,7 +177,7 @@ class App:
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(
             self.session, self.playback, self.viewport, self.note, self.capture.shown,
-            remembered.export, remembered.export_marks, self.tools.drawn,
+            remembered.export, remembered.export_marks, window.touch, self.tools.drawn,
         )  # fmt: skip
         self.tasks: Tasks = Tasks(
             self.session, self.playback, self.viewport, self._opening, self.tools, self.exporting,

@@ -26,6 +26,8 @@ class PathDialog(ABC):
     is_open: whether the dialog is.
     """
 
+    _goes_in = True  # whether its button goes into a folder that is chosen in the list
+
     def __init__(
         self, title: str, about: str, suffixes: Sequence[str], verb: str, redraw: Callable[[], None]
     ) -> None:
@@ -36,9 +38,10 @@ class PathDialog(ABC):
         self._name = ""
         self._takes_keyboard = False
         self.is_open = False
+        listed = f"{' or '.join(suffixes)} file" if suffixes else "other folder"
         self._view = FolderView(
             lambda folder: files_of(folder, self._suffixes), self._take, choose=self._choose,
-            nothing=f"No {' or '.join(suffixes)} file in this folder.",
+            nothing=f"No {listed} in this folder.",
         )  # fmt: skip
 
     def _open(self, folder: Path, name: str) -> None:
@@ -140,7 +143,7 @@ class PathDialog(ABC):
 
     def _draw_buttons(self) -> None:
         row = self._view.row
-        goes = not self._name.strip() and row is not None and not row.frames
+        goes = self._goes_in and not self._name.strip() and row is not None and not row.frames
         if imgui.button(widgets.labelled("Go" if goes else self._verb, "take")):
             if goes and row is not None:
                 self._view.take(row)

@@ -44,9 +44,12 @@ def draw(exporting: Exporting, quit: Callable[[], None]) -> None:
             choices = _edit_size(choices, exporting.size, problems)
             choices = _edit_quality(choices, exporting.quality)
             marks = _edit_marks(exporting.marks, choices)
-            choices = _edit_place(choices, problems)
+            choices, asks = _edit_place(choices, problems)
             exporting.change(choices, marks)
             _draw_end(exporting, can=not exporting.problems())
+            if asks:
+                exporting.choose_folder()
+            exporting.choosing.draw()
     with widgets.modal(_LEAVING, exporting.is_leaving) as is_drawn:
         if is_drawn:
             _draw_leaving(exporting, quit)
@@ -133,19 +136,23 @@ def _edit_marks(marks: Marks, choices: Choices) -> Marks:
     return marks
 
 
-def _edit_place(choices: Choices, problems: dict[str, str]) -> Choices:
+def _edit_place(choices: Choices, problems: dict[str, str]) -> tuple[Choices, bool]:
+    """Declare where the files go; the choices, and whether the user wants to go through folders."""
     widgets.label("Anonymise (no names, paths)", _HELP["anonymous"])
     imgui.begin_disabled(choices.format == MP4)
     anonymous = imgui.checkbox("##anonymous", choices.anonymous)[1]
     widgets.tooltip("A film stores no names and paths" if choices.format == MP4 else _HELP["anonymous"])
     imgui.end_disabled()
-    widgets.label("Folder", _HELP["folder"])
+    gap = imgui.get_style().item_inner_spacing.x
+    widgets.label("Folder", _HELP["folder"], widgets.ICON_WIDTH * imgui.get_frame_height() + gap)
     folder = widgets.edit_path("##folder", choices.folder)[1]
+    imgui.same_line(0, gap)
+    asks = widgets.icon_button(icons.ICON_FA_FOLDER_OPEN, "Choose a folder")
     _draw_problems(problems, "folder")
     widgets.label("Name", _HELP["name"])
     name = imgui.input_text("##name", choices.name)[1]
     _draw_problems(problems, "name")
-    return replace(choices, anonymous=anonymous, folder=folder, name=name)
+    return replace(choices, anonymous=anonymous, folder=folder, name=name), asks
 
 
 def _whole(name: str, value: int, width: float = -1) -> int:
@@ -190,7 +197,8 @@ def _draw_end(exporting: Exporting, can: bool) -> None:
         exporting.start()
     imgui.end_disabled()
     imgui.same_line()
-    if imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape):
+    leaves = imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape)
+    if leaves and not exporting.choosing.is_open:
         exporting.is_open = False
     if not exporting.is_open:
         imgui.close_current_popup()

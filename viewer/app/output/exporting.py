@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import wait as wait_for
@@ -19,6 +20,7 @@ from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...scan.inputs import found_among, scan_inputs
 from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
+from ..folder_dialog import FolderDialog
 from ..notices import Offer, Problem
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
@@ -49,16 +51,19 @@ class Exporting:
         shown: Callable[[Marks], Entry | None],
         choices: Choices,
         marks: Marks,
+        redraw: Callable[[], None],
         drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
     ) -> None:
-        """shown: brings what the picture shows, with these marks. drawn: brings what tools draw over a
-        frame."""
+        """shown: brings what the picture shows, with these marks. redraw: has the window drawn again. drawn:
+        brings what tools draw over a frame."""
         self._drawn = drawn
         self._session, self._playback, self._viewport = session, playback, viewport
         self._note, self._shown = note, shown
         self.choices = choices
         self.marks = marks
         self.is_open = False
+        about = "Scan4D saves the exported files in this folder"
+        self.choosing: FolderDialog = FolderDialog("Choose a folder", about, self._choose_folder, redraw)
         self.replaced: list[Path] = []
         self.refused: list[Path] = []
         self.is_leaving = False
@@ -66,6 +71,14 @@ class Exporting:
         self._work: Future[Made] | None = None
         self._suggested = ""
         self._span: tuple[str, tuple[int, int] | None] | None = None  # of a scan, that was suggested
+
+    def choose_folder(self) -> None:
+        """Open the dialog that asks where the files go."""
+        known = Path(os.path.expanduser(self.choices.folder.strip()))
+        self.choosing.ask(known if known.is_dir() else working_folder())
+
+    def _choose_folder(self, folder: Path) -> None:
+        self.change(replace(self.choices, folder=str(folder)), self.marks)
 
     @property
     def can(self) -> bool:
