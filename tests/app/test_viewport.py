@@ -65,6 +65,18 @@ def test_a_pixel_is_read_once_until_mouse_or_picture_move(
     assert len(reads) == 4
 
 
+def test_what_is_shown_near_a_pixel_is_known(viewport: Viewport) -> None:
+    assert not viewport.shows_near((30, 20), 5), "before the first picture"
+    viewport.draw(REQUEST)
+    assert viewport.surface is not None
+    shown = np.isfinite(viewport.surface.depth)
+    left = int(shown.any(axis=0).argmax())
+    assert viewport.shows_near((30, 20), 1)
+    assert viewport.shows_near((left - 3, 20), 6)
+    assert not viewport.shows_near((left - 9, 20), 6)
+    assert not viewport.shows_near((0, 0), 2)
+
+
 def test_nothing_is_picked_where_there_is_no_picture(viewport: Viewport) -> None:
     viewport.draw(REQUEST)
     assert viewport.pick((30, 20)) is not None

@@ -41,6 +41,7 @@ _COVERS = 4.0  # a square of the subject
 _COVERS_MARK = 12.0  # the same of a landmark or a line, and of the subject beside them
 _CROSSES, _CROSSES_LINE = 12.0, 2.0  # a leader another one, or the line of another label
 _OVERLAPS = 1e4
+_UPRIGHT = 1.5  # how much more an upright leader costs: it looks like a part of a line that is upright
 _OTHER_FORM = 3.0  # a form after the first
 # How much worse than when it was chosen a place may become before the label leaves it:
 _WORSE, _LONGER = 24.0, 6.0
@@ -285,7 +286,7 @@ class _Layout:
         boxes = np.concatenate(of_forms)
         cost = self.covering(boxes) + _OVERLAPS * self.overlapping(boxes) + _OTHER_FORM * forms
         leaders = self.leaders_to(number, boxes)
-        cost += _lengths(leaders) / self.em
+        cost += np.hypot(*(leaders[:, 1] - leaders[:, 0]).T * ((1.0,), (_UPRIGHT,))) / self.em
         judged = np.argsort(cost, kind="stable")[:_JUDGED]
         cost = cost[judged] + self.crossing(number, leaders[judged])
         cost += _CROSSES * self.cutting(number, leaders[judged], boxes[judged])
