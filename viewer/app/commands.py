@@ -179,14 +179,10 @@ def _look_switch(parameter: Parameter) -> Command[App]:
 
 
 def _renderers(app: App) -> Iterator[Item]:
-    for name in app.rendering.choices:
-        yield backends()[name].title, partial(app.rendering.choose, name), name == app.rendering.backend
-
-
-def _renderers_and_uses(app: App) -> Iterator[Item]:
     """The renderers, each with what it is good for."""
-    for (title, act, is_on), name in zip(_renderers(app), app.rendering.choices, strict=True):
-        yield f"{title}: {backends()[name].good_for}", act, is_on
+    for name in app.rendering.choices:
+        words = f"{backends()[name].title}: {backends()[name].good_for}"
+        yield words, partial(app.rendering.choose, name), name == app.rendering.backend
 
 
 def _renderer_name(app: App) -> str:
@@ -390,7 +386,7 @@ _PLAYBACK: Menu[App] = Menu("Playback", (
 ))  # fmt: skip
 _RENDERER: Menu[App] = Menu("Renderer", (
     (
-        Listing("", _renderers_and_uses),
+        Listing("", _renderers),
     ),
     (
         Command("backend", "Next renderer", lambda app: app.naming.step(1), "B"),
