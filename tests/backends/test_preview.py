@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from scenes import NOTHING, every_backend, every_backend_of_points, of_variant, sphere, sphere_hits
+from scenes import NOTHING, every_backend, every_backend_of_points, of_variant, rarely, sphere, sphere_hits
 
 from viewer.backends import backend
 from viewer.camera import Camera
@@ -39,7 +39,7 @@ def preview(renderer: Renderer) -> Preview:
 
 
 @every_backend_of_points
-@pytest.mark.parametrize("share", [0.5, 0.25, 0.1])
+@pytest.mark.parametrize("share", [*rarely(0.5, 0.1), 0.25])
 def test_a_preview_shows_rows_of_the_sample_and_counts_the_others(
     preview: Preview, name: str, share: float
 ) -> None:
@@ -60,7 +60,7 @@ def test_points_and_surfels_are_drawn_in_part(preview: Preview, name: str) -> No
     assert preview(sphere(20_000), name, 0.25).stats.share == 0.25
 
 
-@pytest.mark.parametrize("share", [0.5, 0.25, 0.1])
+@pytest.mark.parametrize("share", [*rarely(0.5, 0.1), 0.25])
 @pytest.mark.parametrize("order", ["in rows", "shuffled"])
 def test_the_surface_stays_closed_and_where_it_is(preview: Preview, share: float, order: str) -> None:
     cloud = sphere(20_000)

@@ -85,7 +85,7 @@ def seen_rows(scene: BareScene, draw: Callable[..., Surface]) -> NDArray[np.intp
     return np.unique(rows[rows != NOTHING]).astype(np.intp)
 
 
-@pytest.mark.parametrize("hidden_neighbors", [True, False])
+@pytest.mark.parametrize("hidden_neighbors", [True, *rarely(False)])
 @every_scene
 def test_neighborhoods_are_those_of_a_tree(
     name: str, hidden_neighbors: bool, draw: Callable[..., Surface]
