@@ -10,8 +10,9 @@ import pytest
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.track import Known, Track
-from viewer.bench.tracking.known import KnownScan, resampled_demo, scanned_demo
+from viewer.bench.tracking.known import KnownScan, resampled_demo, scanned_demo, shuffled_mesh
 from viewer.bench.tracking.landmark_judge import judge_tracking, judge_tracks, keyed_landmarks
+from viewer.scan.demo import DemoSource
 from viewer.scan.timeline import Timeline
 
 
@@ -116,3 +117,13 @@ def test_places_are_hidden_where_no_pod_sees_them() -> None:
         nearest = np.array([np.linalg.norm(points - place, axis=1).min() for place in known.paths[frame]])
         assert nearest[known.counted[frame]].max() < 2.01 * known.spacing
         assert (nearest[known.hidden[frame]] > 1.99 * known.spacing).all()
+
+
+def test_a_shuffled_mesh_has_its_vertices_in_another_order_in_each_frame() -> None:
+    known = shuffled_mesh(DemoSource("demo:smile:1"), "smile", 3, seed=1)
+    first, second = (known.source.load(index).world() for index in (0, 1))
+    assert np.median(np.linalg.norm(first - second, axis=1)) > 20.0  # mm
+    for frame, points in enumerate((first, second)):
+        for place in known.paths[frame]:
+            assert np.linalg.norm(points - place, axis=1).min() < 1e-4
+    assert known.counted.all()

@@ -1,10 +1,10 @@
-"""The whole of a subject as a few hundred nodes that are moved from frame to frame together.
+"""The whole of a subject as up to two thousand nodes that are moved from frame to frame together.
 
-Which of two limbs a patch lies on, the patch cannot tell, but what the limbs hang on does. Nodes are spread
-over the points of one frame and held by those beside them along the surface, each about as a rigid body
-(as-rigid-as-possible, Sorkine and Alexa 2007); the points of the next frame are shared out softly among them,
-ever closer (coherent point drift, Myronenko and Song 2010), so that each part of the frame is taken by one
-part of the body.
+A patch cannot tell which of two limbs it lies on, but the limb's root can. Nodes are spread over the points
+of one frame. The nodes beside each other along the surface hold each other about as a rigid body
+(as-rigid-as-possible, Sorkine and Alexa 2007). In the next frame each node is drawn onto the tangent plane of
+the nearest surface that faces as it does (non-rigid point-to-plane registration, Li et al. 2008), first over
+long ways and stiffly, then closely and softly.
 """
 
 from __future__ import annotations
@@ -15,32 +15,40 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .surface import MomentSurface
+
 Float = NDArray[np.float64]
 
-_NODES = 300
-_TARGETS = 900  # points of a frame that they are moved onto
-_LOOKED_AT = 10_000  # points at most that either are chosen from
+_NODES = 2000  # at most
+_SHARE = 4  # points to a node, at least
+_TARGETS = 900  # points of a frame by which poses are compared
+_LOOKED_AT = 10_000  # points at most that nodes are chosen from and drawn to
 _BESIDE = 8  # nodes that hold a node
-_JOINED = 3.0  # spacings between points that are taken to be beside each other on the surface
-_ROUNDS = 30
-_WIDEST = 0.4, 1.5  # node distances: standard deviation of the first round, least and most
-_CLOSEST = 0.3  # that of the last one
-_STIFF = 3.0, 0.1  # of the body against the points, first and last
-_STRAY = 0.1  # of a point's share that belongs to no node
-_PREDICTED = 0.01  # weight of places that the speed tells, against the body's stiffness
+_JOINED = 2.5  # local spacings between points that lie beside each other on the surface
+_STRAY = 8.0  # spacings to the fourth neighbour, from which on a point belongs to nothing
+_PIECE = 0.01  # of the points: a smaller connected piece is no part of the body
+_ROUNDS = 16
+_REACH = 12.0, 2.5  # spacings that a node is drawn over, first and last
+_STIFF = 2.0, 0.05  # of the body against the surface, first and last
+_YIELD = 0.2  # of its length that an edge is stretched by, at which it keeps half of its stiffness
+_YIELDS = 0.7  # of the rounds, after which stretched edges yield
+_PREDICTED = 0.01  # weight of places that the speed predicts, against the body's stiffness
+_STEPS = 60  # of conjugate gradients at most
+_CAPPED = 3.0  # node distances: a longer way counts as this one where poses are compared
+_STRETCH = 3.0  # spacings that count as much as a stretch by the whole length
 
 
 class Grip(NamedTuple):
-    """A place that goes along with a body.
+    """Places that go along with a body.
 
-    nodes: (k,), those around it. weights: (k,), their sum 1. offsets: (k, 3), the place from each node, as at
-    rest. turn: (3, 3), of the body there when it was gripped.
+    nodes: (n, k), those around each place. weights: (n, k), their sum 1. offsets: (n, k, 3), the place from
+    each node, as at rest. turns: (n, 3, 3), of the body there when it was gripped.
     """
 
     nodes: NDArray[np.intp]
     weights: Float
     offsets: Float
-    turn: Float
+    turns: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,105 +62,171 @@ class BodyPose:
 class DeformableBody:
     """A deformable model of all that one frame shows, and where it is.
 
-    distance: how far apart its nodes are, scan units.
+    distance: how far apart its nodes are, scan units. slips: (N,), how far each node has been from where it
+    was, at most, after a step to the next frame and back, scan units.
     """
 
     def __init__(self, points: Float, spacing: float) -> None:
         """points: (P, 3) of the frame, all at rest. spacing: between neighbours."""
         from scipy.sparse import csr_matrix
-        from scipy.sparse.csgraph import dijkstra
+        from scipy.sparse.csgraph import connected_components, dijkstra
         from scipy.spatial import cKDTree
 
+        from .body_kernels import normals_at
+
+        self._spacing = spacing
         some = _some(points)
-        reach = _JOINED * spacing * np.sqrt(len(points) / len(some))
-        distances, others = cKDTree(some).query(some, _BESIDE + 1, distance_upper_bound=reach)
-        is_there = np.isfinite(distances)
-        is_inner = is_there.sum(axis=1) > _BESIDE // 2  # stray points would each be a node
-        is_there &= is_inner[:, None]
-        starts = np.broadcast_to(np.arange(len(some))[:, None], others.shape)[is_there]
-        graph = csr_matrix((distances[is_there], (starts, others[is_there])), shape=(len(some),) * 2)
+        reach = self._spacing_of(points, some)
+        distances, others = cKDTree(some).query(some, min(_BESIDE + 1, len(some)))
+        distances, others = distances.reshape(len(some), -1), others.reshape(len(some), -1)
+        local = distances[:, min(_BESIDE // 2, distances.shape[1] - 1)]
+        is_inner = local <= _STRAY * reach
+        joined = distances <= _JOINED * np.maximum(local[:, None], local[others])
+        joined &= is_inner[:, None] & is_inner[others]
+        starts = np.broadcast_to(np.arange(len(some))[:, None], others.shape)[joined]
+        graph = csr_matrix((distances[joined], (starts, others[joined])), shape=(len(some),) * 2)
+        piece = connected_components(graph, directed=False)[1]
+        is_inner = np.bincount(piece)[piece] >= _PIECE * len(some)  # the others would drift away
         inner = np.flatnonzero(is_inner) if is_inner.any() else np.arange(len(some))
-        chosen, farthest = _spread(some[inner], _NODES)
+        chosen, farthest = _spread(some[inner], min(_NODES, -(-len(inner) // _SHARE)))
         self.distance = max(farthest, spacing)
         rows = inner[chosen]
         rest = some[rows]
         count = len(rows)
         along = dijkstra(graph, directed=False, indices=rows, limit=6 * self.distance)[:, rows]
         nearest = np.argsort(along, axis=1)[:, 1 : _BESIDE + 1]
+        is_near = np.isfinite(np.take_along_axis(along, nearest, axis=1))
+        own = np.arange(count)[:, None]
+        self._around = np.hstack([own, np.where(is_near, nearest, own)])
         is_beside = np.zeros((count, count), bool)
-        is_beside[np.arange(count)[:, None], nearest] = np.isfinite(
-            np.take_along_axis(along, nearest, axis=1)
-        )
+        is_beside[own, self._around] = True
         is_beside |= is_beside.T
-        one, self._others = np.nonzero(is_beside)
-        self._firsts = np.searchsorted(one, np.arange(count + 1))
-        self._edges = rest[self._others] - rest[one]
+        np.fill_diagonal(is_beside, False)
+        self._ones, self._others = np.nonzero(is_beside)
+        self._firsts = np.searchsorted(self._ones, np.arange(count + 1))
+        self._edges = rest[self._others] - rest[self._ones]
+        self._surface = MomentSurface(some, reach)
+        self._normals = normals_at(self._surface.held, rows)
+        self.slips = np.zeros(count)
+        self._rest = rest
         self.pose = self._before = BodyPose(rest, np.tile(np.eye(3), (count, 1, 1)))
 
     def move_to(self, points: Float) -> None:
-        """Move it onto the points (P, 3) of the next frame; where there are none it stays."""
-        from scipy.spatial import cKDTree
+        """Move it onto the points (P, 3) of the next frame; where there are none it stays.
 
-        from .body_kernels import share_out
-
+        It begins both from where it is and from where its speed takes it: the better fit counts.
+        """
         before, self._before = self._before, self.pose
         if not len(points):
             return
         some = _some(points)
+        surface = MomentSurface(some, self._spacing_of(points, some))
         targets = some[_spread(some, _TARGETS)[0]]
-        pose = self._predicted(before)
-        off = np.quantile(cKDTree(pose.places).query(targets)[0], 0.98) / self.distance
-        first = np.clip(off / 2, *_WIDEST)
-        many = len(targets) / len(pose.places)
-        weights, wanted = np.empty(len(pose.places)), np.empty_like(pose.places)
-        for share in np.linspace(0, 1, _ROUNDS):
-            deviation = self.distance * first ** (1 - share) * _CLOSEST**share
-            share_out(pose.places, targets, deviation, _STRAY, weights, wanted)
-            pose = self._settled(pose, many * _STIFF[0] ** (1 - share) * _STIFF[1] ** share, weights, wanted)
-        self.pose = pose
+        found = [self._drawn(start, surface) for start in (self._predicted(before), self.pose)]
+        now = min(found, key=lambda pose: self._misfit(pose, targets))
+        returned = self._drawn(now, self._surface).places - self.pose.places
+        self.slips = np.maximum(self.slips, np.linalg.norm(returned, axis=1))
+        self.pose, self._surface = now, surface
 
-    def gripped(self, place: Float) -> Grip:
-        """The grip of a place (3,) of the body as it is now."""
-        from_all = np.linalg.norm(self.pose.places - place, axis=1)
-        nearest = int(from_all.argmin())
-        around = np.append(self._others[self._firsts[nearest] : self._firsts[nearest + 1]], nearest)
-        reach = 1.01 * max(from_all[around].max(), self.distance)
-        weights = (1 - from_all[around] / reach) ** 2
-        weights /= weights.sum()
-        arms = place - self.pose.places[around]
-        offsets = np.einsum("nji,nj->ni", self.pose.turns[around], arms)
-        return Grip(around, weights, offsets, _rotation(weights, self.pose.turns[around]))
+    def gripped(self, places: Float) -> Grip:
+        """The grip of places (..., 3) of the body as it is now."""
+        from scipy.spatial import cKDTree
+
+        nodes = self._around[cKDTree(self.pose.places).query(places)[1]]
+        arms = places[..., None, :] - self.pose.places[nodes]
+        away = np.linalg.norm(arms, axis=-1)
+        reach = 1.01 * np.maximum(away.max(axis=-1, keepdims=True), self.distance)
+        weights = (1 - away / reach) ** 2
+        weights /= weights.sum(axis=-1, keepdims=True)
+        turns = self.pose.turns[nodes]
+        return Grip(nodes, weights, np.einsum("...ji,...j->...i", turns, arms), _mean(weights, turns))
 
     def carried(self, grip: Grip) -> tuple[Float, Float]:
-        """The place that is held now, (3,), and how it has been turned since it was gripped, (3, 3)."""
+        """The places that are held now, (..., 3), and how each has been turned since it was gripped,
+        (..., 3, 3)."""
         turns = self.pose.turns[grip.nodes]
-        places = np.einsum("nij,nj->ni", turns, grip.offsets) + self.pose.places[grip.nodes]
-        return grip.weights @ places, _rotation(grip.weights, turns) @ grip.turn.T
+        places = np.einsum("...ij,...j->...i", turns, grip.offsets) + self.pose.places[grip.nodes]
+        return (
+            np.einsum("...k,...ki->...i", grip.weights, places),
+            _mean(grip.weights, turns) @ np.swapaxes(grip.turns, -1, -2),
+        )
+
+    def at_rest(self, grip: Grip) -> tuple[Float, Float]:
+        """Where the places of a grip, (..., 3), were when the body was at rest, and how each has been turned
+        from when it was gripped to there, (..., 3, 3)."""
+        places = grip.offsets + self._rest[grip.nodes]
+        return np.einsum("...k,...ki->...i", grip.weights, places), np.swapaxes(grip.turns, -1, -2)
 
     def _predicted(self, before: BodyPose) -> BodyPose:
         """The pose that follows if all parts move and turn on as from the pose before to the one now."""
         now = self.pose
         wanted = 2 * now.places - before.places
         pose = BodyPose(wanted, now.turns @ before.turns.transpose(0, 2, 1) @ now.turns)
-        weights = np.full(len(wanted), _PREDICTED)
+        pulls = np.broadcast_to(_PREDICTED * np.eye(3), (len(wanted), 3, 3))
         for _ in range(4):
-            pose = self._settled(pose, 1.0, weights, wanted)
+            pose = self._settled(pose, 1.0, pulls, wanted)
         return pose
 
-    def _settled(self, pose: BodyPose, stiffness: float, weights: Float, wanted: Float) -> BodyPose:
-        """The pose after a step towards places (N, 3) that are wanted of nodes, with weights (N,)."""
+    def _drawn(self, pose: BodyPose, surface: MomentSurface) -> BodyPose:
+        """A pose drawn onto a surface."""
+        from .body_kernels import pull_across
+
+        pulls, wanted = np.empty_like(pose.turns), np.empty_like(pose.places)
+        for share in np.linspace(0, 1, _ROUNDS):
+            reach = surface.spacing * _REACH[0] ** (1 - share) * _REACH[1] ** share
+            pull_across(surface.held, pose.places, pose.turns, self._normals, reach, pulls, wanted)
+            stiffness = _STIFF[0] ** (1 - share) * _STIFF[1] ** share
+            pose = self._settled(pose, stiffness, pulls, wanted, yields=share > _YIELDS)
+        return pose
+
+    def _misfit(self, pose: BodyPose, targets: Float) -> float:
+        """How badly a pose fits targets (T, 3) of a frame: ways to and fro, and stretching, spacings."""
+        from scipy.spatial import cKDTree
+
+        def mean(ways: Float) -> float:
+            return float(np.sqrt((np.minimum(ways, _CAPPED * self.distance) ** 2).mean())) / self._spacing
+
+        to = cKDTree(pose.places).query(targets)[0]
+        fro = cKDTree(targets).query(pose.places)[0]
+        edges = pose.places[self._others] - pose.places[self._ones]
+        if not len(edges):
+            return mean(to) + mean(fro)
+        stretch = np.linalg.norm(edges, axis=1) / np.linalg.norm(self._edges, axis=1) - 1
+        return mean(to) + mean(fro) + _STRETCH * float(np.sqrt(np.minimum(stretch**2, 1).mean()))
+
+    def _settled(
+        self, pose: BodyPose, stiffness: float, pulls: Float, wanted: Float, *, yields: bool = False
+    ) -> BodyPose:
+        """The pose after a step towards places (N, 3) that are wanted of nodes, with weights (N, 3, 3).
+
+        yields: whether stretched edges, as at joints, hold less.
+        """
         from .body_kernels import settle_nodes
 
         places, products = pose.places.copy(), np.empty_like(pose.turns)
+        holds = self._holds(pose) if yields else np.ones(len(self._edges))
         settle_nodes(
-            self._firsts, self._others, self._edges, pose.turns, stiffness, weights, wanted, places, products
+            self._firsts, self._others, self._edges, pose.turns, stiffness, pulls, wanted, holds, _STEPS,
+            places, products,
         )  # fmt: skip
         return BodyPose(places, _rotations(products))
+
+    def _holds(self, pose: BodyPose) -> Float:
+        """How much of its stiffness each edge keeps, (E,): those that are stretched, as at joints, less."""
+        turns = 0.5 * (pose.turns[self._ones] + pose.turns[self._others])
+        off = (
+            pose.places[self._others] - pose.places[self._ones] - np.einsum("eij,ej->ei", turns, self._edges)
+        )
+        return 1 / (1 + (off**2).sum(axis=1) / (_YIELD**2 * (self._edges**2).sum(axis=1)))
+
+    def _spacing_of(self, points: Float, some: Float) -> float:
+        """The spacing of some of the points, evenly chosen."""
+        return float(self._spacing * np.sqrt(len(points) / len(some)))
 
 
 def _some(points: Float) -> Float:
     """So many of the points (P, 3) as are looked at, evenly."""
-    return np.ascontiguousarray(points[:: max(1, -(-len(points) // _LOOKED_AT))])
+    return np.ascontiguousarray(points[:: max(1, len(points) // _LOOKED_AT)])
 
 
 def _spread(points: Float, count: int) -> tuple[NDArray[np.int64], float]:
@@ -164,12 +238,12 @@ def _spread(points: Float, count: int) -> tuple[NDArray[np.int64], float]:
 
 
 def _rotations(matrices: Float) -> Float:
-    """The rotations nearest to matrices (N, 3, 3) (Kabsch 1976)."""
+    """The rotations nearest to matrices (..., 3, 3) (Kabsch 1976)."""
     left, _, right = np.linalg.svd(matrices)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
     return left @ right
 
 
-def _rotation(weights: Float, turns: Float) -> Float:
-    """The mean of rotations (k, 3, 3) with weights (k,)."""
-    return _rotations(np.tensordot(weights, turns, axes=1)[None])[0]
+def _mean(weights: Float, turns: Float) -> Float:
+    """The means of rotations (..., k, 3, 3) with weights (..., k)."""
+    return _rotations(np.einsum("...k,...kij->...ij", weights, turns))

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...scan.octree.compiled import compiled
+from .surface_kernels import Cells, fit_at, nearest_within
 
-_FAR = 4.0  # deviations from which on a target does not belong to a node
+_FACING = 0.5  # cosine of the angle between the normals of a node and of the surface that it is drawn to
 _ENOUGH = 1e-10  # of the squared residual of a solution, at which it is one
-_MOST = 300  # steps to a solution
 
 Float = NDArray[np.float64]
 
@@ -35,36 +35,54 @@ def spread_out(points: Float, chosen: NDArray[np.int64]) -> float:
 
 
 @compiled
-def share_out(
-    places: Float, targets: Float, deviation: float, stray: float, weights: Float, wanted: Float
-) -> None:
-    """Share targets (T, 3) out among nodes at places (N, 3), by a Gaussian of a deviation, scan units.
+def normals_at(held: Cells, rows: NDArray[np.int64]) -> Float:
+    """The unit normals of the surface at rows (N,), (N, 3), of either side; 0 where there is none."""
+    normals = np.zeros((len(rows), 3))
+    for n in range(len(rows)):
+        if fit_at(held, rows[n]):
+            normals[n] = held.frames[rows[n], 2]
+    return normals
 
-    stray: of a share that belongs to no node. weights: (N,) gets what each has in all; wanted: (N, 3) the
-    mean of that.
+
+@compiled
+def pull_across(
+    held: Cells, places: Float, turns: Float, normals: Float, reach: float, pulls: Float, wanted: Float
+) -> None:
+    """Where the surface wants nodes at places (N, 3): across it, and not along it.
+
+    turns: (N, 3, 3). normals: (N, 3) of the nodes at rest. reach: how far a node may be off, scan units.
+    pulls: (N, 3, 3) gets the weights, 0 where no surface near a node faces as it does. wanted: (N, 3) gets
+    the places.
     """
-    count = len(places)
-    weights[:], wanted[:] = 0.0, 0.0
-    shares, rows = np.empty(count), np.empty(count, np.int64)
-    for t in range(len(targets)):
-        x, y, z = targets[t, 0], targets[t, 1], targets[t, 2]
-        found, total = 0, stray
-        for n in range(count):
-            squared = (places[n, 0] - x) ** 2 + (places[n, 1] - y) ** 2 + (places[n, 2] - z) ** 2
-            if squared < (_FAR * deviation) ** 2:
-                rows[found], shares[found] = n, np.exp(-0.5 * squared / deviation**2)
-                total += shares[found]
-                found += 1
-        for i in range(found):
-            n, share = rows[i], shares[i] / total
-            weights[n] += share
-            wanted[n, 0] += share * x
-            wanted[n, 1] += share * y
-            wanted[n, 2] += share * z
-    for n in range(count):
-        if weights[n] > 0.0:
+    for n in range(len(places)):
+        pulls[n] = 0.0
+        wanted[n] = places[n]
+        row = nearest_within(held, places[n, 0], places[n, 1], places[n, 2], reach)
+        if row < 0:
+            continue
+        if not fit_at(held, row):  # stray points: each is all that there is
+            wanted[n] = held.points[row]
             for k in range(3):
-                wanted[n, k] /= weights[n]
+                pulls[n, k, k] = 1.0
+            continue
+        f, p = held.frames[row], held.parabolas[row]
+        u, v, w, cosine = 0.0, 0.0, 0.0, 0.0
+        for k in range(3):
+            away = places[n, k] - held.points[row, k]
+            u += f[0, k] * away
+            v += f[1, k] * away
+            w += f[2, k] * away
+            for q in range(3):
+                cosine += f[2, k] * turns[n, k, q] * normals[n, q]
+        if u * u + v * v > held.reaches[row] ** 2 or abs(cosine) < _FACING:
+            continue
+        height = p[0, 0] + (p[0, 1] + p[0, 3] * u + p[0, 4] * v) * u + (p[0, 2] + p[0, 5] * v) * v
+        off = w - height
+        weight = max(0.0, 1.0 - (off / reach) ** 2) ** 2
+        for k in range(3):
+            wanted[n, k] -= off * f[2, k]
+            for q in range(3):
+                pulls[n, k, q] = weight * f[2, k] * f[2, q]
 
 
 @compiled
@@ -74,42 +92,49 @@ def settle_nodes(
     edges: Float,
     turns: Float,
     stiffness: float,
-    weights: Float,
+    pulls: Float,
     wanted: Float,
+    holds: Float,
+    most: int,
     places: Float,
     products: Float,
 ) -> None:
     """Move nodes, as they are turned, to where they are held best by those beside them and by what is wanted.
 
     firsts: (N + 1,), others: (E,), edges: (E, 3): beside node n at rest, in the rows firsts[n] to firsts[n +
-    1], are others, at edges from it. turns: (N, 3, 3). stiffness: of the body; weights: (N,) of places that
-    are wanted, (N, 3). places: (N, 3), near them, get the solution (conjugate gradients, Hestenes and Stiefel
-    1952); products: (N, 3, 3), the sums of the edges' products now and at rest.
+    1], are others, at edges from it. turns: (N, 3, 3). stiffness: of the body; holds: (E,), the share of it
+    that each edge keeps. pulls: (N, 3, 3), weights of places that are wanted, (N, 3). places: (N, 3), near
+    them, get the solution (conjugate gradients, Hestenes and Stiefel 1952) after so many steps at most;
+    products: (N, 3, 3), the sums of the edges' products now and at rest.
     """
     count = len(places)
     left, ahead, image = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     before, wished = 0.0, 1e-300
     for n in range(count):
         for k in range(3):
-            right = weights[n] * wanted[n, k]
-            held = weights[n] * places[n, k]
+            right, held = 0.0, 0.0
+            for q in range(3):
+                right += pulls[n, k, q] * wanted[n, q]
+                held += pulls[n, k, q] * places[n, q]
             for e in range(firsts[n], firsts[n + 1]):
                 m = others[e]
-                held += stiffness * (places[n, k] - places[m, k])
+                held += stiffness * holds[e] * (places[n, k] - places[m, k])
                 for q in range(3):
-                    right -= 0.5 * stiffness * (turns[n, k, q] + turns[m, k, q]) * edges[e, q]
+                    right -= 0.5 * stiffness * holds[e] * (turns[n, k, q] + turns[m, k, q]) * edges[e, q]
             left[n, k] = ahead[n, k] = right - held
             before += left[n, k] ** 2
             wished += right**2
-    for _ in range(_MOST):
+    for _ in range(most):
         if before <= _ENOUGH * wished:
             break
         power = 0.0
         for n in range(count):
             for k in range(3):
-                held = weights[n] * ahead[n, k]
+                held = 0.0
+                for q in range(3):
+                    held += pulls[n, k, q] * ahead[n, q]
                 for e in range(firsts[n], firsts[n + 1]):
-                    held += stiffness * (ahead[n, k] - ahead[others[e], k])
+                    held += stiffness * holds[e] * (ahead[n, k] - ahead[others[e], k])
                 image[n, k] = held
                 power += held * ahead[n, k]
         if not power > 0.0:
@@ -129,4 +154,4 @@ def settle_nodes(
         for e in range(firsts[n], firsts[n + 1]):
             for k in range(3):
                 for q in range(3):
-                    products[n, k, q] += (places[others[e], k] - places[n, k]) * edges[e, q]
+                    products[n, k, q] += holds[e] * (places[others[e], k] - places[n, k]) * edges[e, q]

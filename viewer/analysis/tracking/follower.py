@@ -8,14 +8,15 @@ sure the way is.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..spot import Spot
 from .body import DeformableBody, Grip
-from .registration import PatchLevel, Placement, best_registered, patch_of, registered
+from .hold import Hold
+from .registration import WAYS, PatchLevel, Placement, best_registered, patch_of, registered
 from .settings import TrackingSettings
 from .surface import MomentSurface
 
@@ -26,20 +27,29 @@ _NEXT = (
     PatchLevel(points=120, search=9.0, rounds=8, uses_color=False),
     PatchLevel(points=120, search=3.0, rounds=4, uses_color=False),
 )
-_WIDE = PatchLevel(points=500, search=3.5, rounds=8, bending=0.05, turn=0.2)
-_FINE = PatchLevel(points=300, search=2.6, rounds=8, bending=0.1, turn=0.2)
-_BACK = PatchLevel(points=220, search=2.6, rounds=6, bending=0.05, turn=0.1)
+
+
+def _held_too(level: PatchLevel) -> tuple[PatchLevel, PatchLevel]:
+    """A level without a body, and the same with one: there, bending is what patches are off by."""
+    return level, replace(level, bends_alike=True)
+
+
+_WIDE = _held_too(PatchLevel(points=500, search=3.5, rounds=8, bending=0.05, turn=0.2))
+_FINE = _held_too(PatchLevel(points=300, search=2.6, rounds=8, bending=0.1, turn=0.2))
+_BACK = _held_too(PatchLevel(points=220, search=2.6, rounds=6, bending=0.05, turn=0.1))
 _WRONG = 0.3  # of the patch as in the frame before; where less is matched, it is looked for in the region
 _FREE = 8.0  # spacings: standard deviation of a place about which little is known
-_LOOSE = 1.5  # of one that is nearly known
+_LOOSE = 1.5, 1.0  # of one that is nearly known, and of one to which a body has carried it
 _MODEL = 0.06  # spacings that the wide patch is off, as it bends otherwise than the model says
 _MIDDLE = 0.5  # of the points next to the place, that have to be matched
 # How far a patch may be off the surface, standard deviation: times the noise, and spacings besides.
 _OFF_WIDE = 3.0, 0.12
 _OFF_FINE = 2.5, 0.12
-_ASIDE = 2.0  # distances of a body's nodes that it may be off where the body carries it
+_ASIDE = 8.0  # spacings that it may be off where the body carries it
+_LEFT_OUT = 0.2  # of how a patch of a body is deformed, that the model of its deformation leaves out
 _BY_BODY = 0.1  # of the way from where the body carries it: its share in the standard deviation
-_UNSURE = 0.7  # spacings: standard deviation from which on a place of a body is not told
+_UNSURE = 0.6  # spacings: standard deviation of following a body, from which on a place is a gap
+_SLIPPED = 0.35  # the same where the body has not come back to where it was after a step and back
 _CROP = 1.6  # wide radii of the surface that is kept of the frame in which it was set
 _NOISE = 1.2  # factor of variances of registration: residuals are not independent
 _FLOOR = 0.04  # spacings: what sampling leaves at least, standard deviation
@@ -82,15 +92,14 @@ class Follower:
 
         self._wide_radius = radius(settings.wide)
         self._far = patch_of(surface, self._place, radius(settings.far), _FAR.points)
-        self._wide = patch_of(surface, self._place, self._wide_radius, _WIDE.points)
-        self._fine = patch_of(surface, self._place, radius(settings.fine), _FINE.points)
+        self._wide = patch_of(surface, self._place, self._wide_radius, _WIDE[0].points)
+        self._fine = patch_of(surface, self._place, radius(settings.fine), _FINE[0].points)
         self._own = surface.cropped(self._place, _CROP * self._wide_radius)
         self._found = self._fine_found = self._region = Placement(self._place)
         self._velocity = np.zeros(3)
         self._is_lost = False
-        self._body: DeformableBody | None = None
-        self._grip: Grip | None = None
-        self._gripped_turn = np.eye(3)
+        self._hold: Hold | None = None
+        self._grips: tuple[Grip, Grip] | None = None
 
     @property
     def place(self) -> Float | None:
@@ -99,46 +108,52 @@ class Follower:
 
     def hold_on(self, body: DeformableBody) -> None:
         """Go along with a body, which is in the frame that was looked at last, from where it is found."""
-        if body is not self._body:
-            self._body, self._grip = body, None
-        if self._grip is None and not self._is_lost:
-            self._grip, self._gripped_turn = body.gripped(self._found.place), self._found.turn
+        if self._hold is not None and self._hold.body is body:
+            return
+        self._hold = None
+        if not self._is_lost and self._wide is not None and self._fine is not None:
+            self._hold = Hold.at(body, self._found)
+            self._grips = self._hold.gripped(self._wide), self._hold.gripped(self._fine)
 
     def step(self, surface: MomentSurface, before: MomentSurface) -> Sighting:
         """Look for it in the next frame. before: the surface of the frame that it was looked for in
         last. A body that it holds on to has been moved on."""
         if self._wide is None or self._fine is None:
             return Sighting.gap("there is no surface where it was set")
-        loose = (_LOOSE * self.spacing) ** 2 * np.eye(3)
-        carried = self._carried()
-        reason, fits = "the region around it was not found", []
+        hold, carried, is_held = self._hold, None, self._hold is not None
+        wide_patch, fine_patch = self._wide, self._fine
+        if hold is not None and self._grips is not None:
+            carried = hold.carried()
+            wide_patch, fine_patch = (
+                hold.bent(patch, grip)
+                for patch, grip in zip((self._wide, self._fine), self._grips, strict=True)
+            )
+        loose = (_LOOSE[is_held] * self.spacing) ** 2 * np.eye(3)
+        wide, reason = None, "the region around it was not found"
         for start in self._guesses(surface, before, carried):
-            wide = registered(self._wide, surface, start, _WIDE, loose)
-            if wide is None or wide.kept < self._settings.least_kept:
+            fit = registered(wide_patch, surface, start, _WIDE[is_held], loose)
+            if fit is None or fit.kept < self._settings.least_kept:
                 reason = "too little of the surface around it was found"
-            elif wide.deviation > self._limit(_OFF_WIDE):
+            elif fit.deviation > self._limit(_OFF_WIDE):
                 reason = "the surface around it has another shape"
             else:
-                fits.append(wide)
-                if carried is None:
-                    break
-        if not fits:
+                wide = fit
+                break
+        if wide is None:
             return self._lose(reason)
-        wide = fits[0]
-        if any(np.linalg.norm(other.place - wide.place) > self._bound for other in fits[1:]):
-            return self._lose("it fits in two places")
         slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
-        fine = registered(
-            self._fine, surface, Placement(wide.place, wide.turn, self._fine_found.bent), _FINE, slack
-        )
+        bent = np.zeros(WAYS) if is_held else self._fine_found.bent
+        fine = registered(fine_patch, surface, Placement(wide.place, wide.turn, bent), _FINE[is_held], slack)
         if fine is None or fine.middle < _MIDDLE:
             return self._lose("it is hidden, or there is a hole")
         if fine.deviation > self._limit(_OFF_FINE):
             return self._lose("the surface around it has another shape")
-        patch = patch_of(surface, fine.place, self._wide_radius, _BACK.points)
+        patch = patch_of(surface, fine.place, self._wide_radius, _BACK[0].points)
         back = None
         if patch is not None:
-            back = registered(patch, self._own, Placement(self._place, wide.turn.T), _BACK, loose)
+            patch = patch if hold is None else hold.unbent(patch, wide.turn)
+            start = Placement(self._place, wide.turn.T)
+            back = registered(patch, self._own, start, _BACK[is_held], loose)
         if back is None or back.kept < self._settings.least_kept:
             return self._lose("the way back was not found")
         if back.deviation > self._limit(_OFF_WIDE):
@@ -148,36 +163,34 @@ class Follower:
         if apart > self._bound:
             return self._lose(f"forward and backward are {apart:.3g} apart")
         between = fine.place - wide.place
-        aside = np.zeros(3) if carried is None else fine.place - carried.place
-        if self._body is not None and np.linalg.norm(aside) > _ASIDE * self._body.distance:
-            return self._lose("the body around it went elsewhere")
         covariance = (
             _NOISE * fine.covariance
             + _APART**2 * (np.outer(returned, returned) + np.outer(between, between))
             + (_FLOOR * self.spacing) ** 2 * np.eye(3)
-            + wide.turn @ self._spread @ wide.turn.T
         )
-        if carried is not None:
-            covariance += wide.deviation**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
+        unsure = np.inf
+        if hold is not None and carried is not None:
+            aside = fine.place - carried.place
+            if np.linalg.norm(aside) > _ASIDE * self.spacing:
+                return self._lose("the body around it went elsewhere")
+            left_out = _LEFT_OUT * fine_patch.radius * np.linalg.norm(fine.bent)
+            covariance += left_out**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
+            unsure = (_SLIPPED if hold.slip() > self._bound else _UNSURE) * self.spacing
         self._velocity = np.zeros(3) if self._is_lost else fine.place - self._found.place
         self._found, self._fine_found, self._is_lost = wide.at(fine.place), fine, False
         self._region = Placement(fine.place, wide.turn)
-        if carried is not None and np.linalg.eigvalsh(covariance)[-1] > (_UNSURE * self.spacing) ** 2:
+        if np.linalg.eigvalsh(covariance)[-1] > unsure**2:
             return Sighting.gap("its place along the surface is not sure")
-        return Sighting(fine.place + self._origin, covariance)
-
-    def _carried(self) -> Placement | None:
-        """The placement to which the body has carried it, None where it holds on to none."""
-        if self._body is None or self._grip is None:
-            return None
-        place, turn = self._body.carried(self._grip)
-        return Placement(place, turn @ self._gripped_turn, self._found.bent)
+        placed = wide.turn @ self._spread @ wide.turn.T
+        return Sighting(fine.place + self._origin, covariance + placed)
 
     def _guesses(
         self, surface: MomentSurface, before: MomentSurface, carried: Placement | None
     ) -> Iterator[Placement]:
         """About where it may be in a frame, the likelier first. carried: by the body."""
         free = (_FREE * self.spacing) ** 2 * np.eye(3)
+        if carried is not None:
+            yield carried
         if not self._is_lost:
             patch = patch_of(before, self._found.place, self._wide_radius, _NEXT[0].points)
             if patch is not None:
@@ -186,13 +199,9 @@ class Follower:
                 enough = self._limit(_OFF_FINE)
                 moved = best_registered(patch, surface, starts, _NEXT, free, enough)
                 if moved is not None and moved.kept >= _WRONG:
-                    yield Placement(moved.place, moved.turn @ self._found.turn, self._found.bent)
-        if carried is not None:
-            assert self._wide is not None
-            moved = best_registered(self._wide, surface, [carried], _NEXT, free)
-            if moved is not None:
-                yield moved
-        elif self._far is not None:
+                    bent = self._found.bent if carried is None else np.zeros(WAYS)
+                    yield Placement(moved.place, moved.turn @ self._found.turn, bent)
+        if carried is None and self._far is not None:
             region = best_registered(self._far, surface, [self._region], [_FAR], free)
             if region is not None:
                 self._region = Placement(region.place, region.turn)

@@ -110,6 +110,18 @@ def _bends(u: float, v: float, bends: Float) -> None:
 
 
 @compiled
+def bent_by(patch: SurfacePatch, bent: Float) -> Float:
+    """The points of a patch along its axes, deformed by bent (12,): (n, 3)."""
+    local, bends = patch.local.copy(), np.empty((BENT, 3))
+    for i in range(len(local)):
+        _bends(patch.local[i, 0] / patch.radius, patch.local[i, 1] / patch.radius, bends)
+        for b in range(BENT):
+            for k in range(3):
+                local[i, k] += patch.radius * bent[b] * bends[b, k]
+    return local
+
+
+@compiled
 def _median(values: Float, count: int) -> float:
     return np.median(values[:count]) if count else 0.0
 
@@ -127,6 +139,7 @@ def register_patch(
     search: float,
     rounds: int,
     use_color: bool,
+    bends_alike: bool,
     least_scales: Float,
     covariance: Float,
     told: Float,
@@ -139,8 +152,9 @@ def register_patch(
     place: (3,) where the patch's centre is taken to be; turn: (3, 3) and bent: (12,), how it is turned and
     deformed; all three get what is found. bent_prior: (12,) standard deviations, 0 where it stays as it is.
     place_prior: (3, 3), the inverse of the covariance of the place from where it begins; turn_prior: the
-    standard deviation of the turn, radians. search: how far a point's counterpart may be. least_scales: (1
-    + C,) deviations that residuals have at least. covariance: (3, 3) gets that of the place. told: (3,)
+    standard deviation of the turn, radians. search: how far a point's counterpart may be. bends_alike:
+    whether distances are off by how the surface bends more than by noise. least_scales: (1 + C,) deviations
+    that residuals have at least. covariance: (3, 3) gets that of the place. told: (3,)
     gets the share of the patch that is matched, that of its middle, and the deviation of the distances.
     Gives the rounds, 0 where too few points match.
     """
@@ -178,7 +192,7 @@ def register_patch(
                     + turn[p, 1] * patch.axes[q, 1]
                     + turn[p, 2] * patch.axes[q, 2]
                 )
-        found = 0
+        found, reach = 0, 0.0
         for i in range(count):
             matched[i] = 0
             lu, lv, lw = patch.local[i, 0], patch.local[i, 1], patch.local[i, 2]
@@ -238,6 +252,7 @@ def register_patch(
             matched[i] = 1
             scratch[found] = abs(distances[i])
             found += 1
+            reach += held.reaches[row]
         if found < 3 * RIGID:
             return 0
         scales[0] = max(1.4826 * _median(scratch, found), least_scales[0])
@@ -252,6 +267,9 @@ def register_patch(
                 scratch[i] = abs(scratch[i] - shift[c])
             scales[1 + c] = max(1.4826 * _median(scratch, n), least_scales[1 + c])
 
+        # Residuals within one parabola of a bending surface are off for the same cause.
+        pieces = max((patch.radius * found / reach) ** 2, 1.0)
+        alike = max(found / pieces, 1.0) if bends_alike else 1.0
         system[:] = 0.0
         side[:] = 0.0
         cross[:] = 0.0
@@ -287,6 +305,8 @@ def register_patch(
             for term in range(1 + channels):
                 if term == 0:
                     weight = patch.closeness[i] * weights[i] / scales[0] ** 2
+                    if is_last:
+                        weight /= alike
                     ax, ay, az = normals[i, 0], normals[i, 1], normals[i, 2]
                     bx, by, bz = sources[i, 0], sources[i, 1], sources[i, 2]
                     residual = distances[i]

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
-_WAYS = 12  # to deform, see `register_kernels`
+WAYS = 12  # to deform, see `register_kernels`
 _LEAST_DISTANCE = 0.01  # spacings: deviations of distances are taken to be this at least
 _LEAST_COLOR = 0.004  # of a byte's range, as of colours: a step of a byte
 
@@ -27,7 +27,8 @@ class PatchLevel:
 
     points: of the patch at most. search: spacings that a counterpart may be away. rounds: at most. bending:
     the standard deviation of strains and bends over the patch; 0: rigid. turn: that of the turn, radians.
-    uses_color: whether colours are compared.
+    uses_color: whether colours are compared. bends_alike: whether distances are off by how the surface bends
+    more than by noise, so that they tell less.
     """
 
     points: int
@@ -36,6 +37,7 @@ class PatchLevel:
     bending: float = 0.0
     turn: float = 0.3
     uses_color: bool = True
+    bends_alike: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +52,7 @@ class Placement:
 
     place: Float
     turn: Float = field(default_factory=lambda: np.eye(3))
-    bent: Float = field(default_factory=lambda: np.zeros(_WAYS))
+    bent: Float = field(default_factory=lambda: np.zeros(WAYS))
     covariance: Float = field(default_factory=lambda: np.full((3, 3), np.nan))
     kept: float = 0.0
     middle: float = 0.0
@@ -81,6 +83,13 @@ def patch_of(surface: MomentSurface, place: Float, radius: float, points: int) -
     return patch if len(patch.local) > 3 * RIGID else None
 
 
+def placed_points(patch: SurfacePatch, placement: Placement) -> Float:
+    """The points of a patch as it is placed, (n, 3)."""
+    from .register_kernels import bent_by
+
+    return placement.place + bent_by(patch, placement.bent) @ patch.axes @ placement.turn.T
+
+
 def registered(
     patch: SurfacePatch, surface: MomentSurface, start: Placement, level: PatchLevel, slack: Float
 ) -> Placement | None:
@@ -101,12 +110,13 @@ def registered(
         place,
         turn,
         bent,
-        np.full(_WAYS, level.bending),
+        np.full(WAYS, level.bending),
         np.linalg.inv(slack).astype(np.float64),
         level.turn,
         level.search * surface.spacing,
         level.rounds,
         level.uses_color and surface.held.colors.shape[1] == patch.colors.shape[1],
+        level.bends_alike,
         least,
         covariance,
         told,

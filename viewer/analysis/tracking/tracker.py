@@ -245,7 +245,7 @@ class Tracker:
                 body.move_to(there.held.points)
             for done in [pool.submit(_step, share, thread, frame) for thread, share in enumerate(shares)]:
                 done.result()
-            if body is not None or not _move_apart(unmoved, followers, there):
+            if body is not None or not (_move_apart(unmoved, followers, there) or _lose(unmoved, followers)):
                 break
             body = DeformableBody(here.held.points, here.spacing)
             for follower, was in zip(followers, unmoved, strict=True):
@@ -326,6 +326,12 @@ def _move_apart(before: Sequence[Follower], after: Sequence[Follower], surface: 
     distances = np.linalg.norm(places[:, None] - places[None], axis=-1)  # (n, n, 2)
     change = np.abs(distances[..., 1] - distances[..., 0]).max()
     return bool(change > max(_APART[0] * surface.size, _APART[1] * surface.spacing))
+
+
+def _lose(before: Sequence[Follower], after: Sequence[Follower]) -> bool:
+    """Whether a step loses most of the landmarks that were found, as a jump does."""
+    found = [other.place is None for one, other in zip(before, after, strict=True) if one.place is not None]
+    return 2 * sum(found) > len(found)
 
 
 def _passes_of(landmark: Landmark, count: int) -> Iterator[_Pass]:

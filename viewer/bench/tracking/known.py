@@ -187,6 +187,26 @@ def resampled_mesh(
     return KnownScan(name, known.source, names, paths, known.hidden, ~touching, spacing)
 
 
+def shuffled_mesh(source: FrameSource, name: str, landmarks: int = 20, *, seed: int = 0) -> KnownScan:
+    """A sequence of meshes of one topology as bare points, in another order in each frame.
+
+    Its landmarks are random vertices. All frames count, those of contact too.
+    """
+    paths, clouds, chance = [], [], np.random.default_rng(seed)
+    for index in range(len(source)):
+        checkpoint(index / len(source))
+        points = source.load(index)
+        assert isinstance(points, PointCloud), "the formats with faces hold points"
+        vertices = points.world()
+        if not index:
+            rows = chance.choice(len(vertices), landmarks, replace=False)
+        paths.append(vertices[rows])
+        clouds.append(PointCloud.from_arrays(vertices[chance.permutation(len(vertices))]))
+    names = tuple(f"vertex {row}" for row in rows)
+    times = np.arange(len(clouds)) / DEFAULT_FPS
+    return _all_there(KeptFrames(name, clouds, times), names, np.array(paths), typical_spacing(clouds[0]))
+
+
 def _all_there(
     source: KeptFrames, names: tuple[str, ...], paths: NDArray[np.float64], spacing: float
 ) -> KnownScan:

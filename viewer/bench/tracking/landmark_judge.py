@@ -9,6 +9,8 @@ from time import process_time
 import numpy as np
 
 from ...analysis.landmarks import Landmark
+from ...analysis.landmarks.landmark_set import LandmarkSet
+from ...analysis.landmarks.placed import landmarks_of
 from ...analysis.spot import Spot
 from ...analysis.track import Known, Track
 from ...geometry import vector
@@ -16,6 +18,7 @@ from ...scan.spacing import nearest_row
 from ...scan.timeline import Timeline
 from .known import KnownScan
 
+_WRONG = 3.0  # spacings: an error from which on a place is that of another part of the surface
 _EXACT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # covariance of a key: it is the truth
 
 
@@ -25,9 +28,10 @@ class Judgement:
 
     frames, landmarks: how many. spacing: of the points, scan units. median, p95, worst: errors, scan units,
     in frames that are told as tracked where the truth is in the scan. within: share of these errors that are
-    at most two standard deviations (`Track.sigmas`). hidden: in how many frames landmarks are, all counted
-    together. gaps_hit: the share of them that are gaps, NaN without any. gaps_false: the share of gaps where
-    the truth is in the scan. seconds: of processor time, a frame.
+    at most two standard deviations (`Track.sigmas`). wrong: share of them above three spacings. hidden: in
+    how many frames landmarks are, all counted together. gaps_hit: the share of them that are gaps, NaN
+    without any. gaps_false: the share of gaps where the truth is in the scan. seconds: of processor time, a
+    frame.
     """
 
     name: str
@@ -38,6 +42,7 @@ class Judgement:
     p95: float
     worst: float
     within: float
+    wrong: float
     hidden: int
     gaps_hit: float
     gaps_false: float
@@ -60,6 +65,11 @@ def keyed_landmarks(known: KnownScan, keys: int = 1) -> list[Landmark]:
             landmark = landmark.with_key(spot)
         landmarks.append(landmark)
     return landmarks
+
+
+def filed_landmarks(known: KnownScan, timeline: Timeline) -> list[Landmark]:
+    """The landmarks of a scan at their true places in its first frame, as from a file without deviations."""
+    return list(landmarks_of(LandmarkSet.of(known.names, known.paths[:1]), timeline.visit, len(timeline), 0))
 
 
 def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float = np.nan) -> Judgement:
@@ -85,6 +95,7 @@ def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float =
         p95=float(p95),
         worst=float(worst),
         within=share(errors <= 2 * sigmas[told]),
+        wrong=share(errors > _WRONG * known.spacing),
         hidden=int(known.hidden.sum()),
         gaps_hit=share(gaps[known.hidden]),
         gaps_false=share(gaps[asked]),
@@ -93,14 +104,18 @@ def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float =
 
 
 def judge_tracking(
-    known: KnownScan, tracker: Callable[[Timeline, Sequence[Landmark]], Mapping[str, Track]], keys: int = 1
+    known: KnownScan,
+    tracker: Callable[[Timeline, Sequence[Landmark]], Mapping[str, Track]],
+    keys: int = 1,
+    *,
+    from_file: bool = False,
 ) -> Judgement:
     """Judge a tracker on a scan. tracker: tracks the landmarks of a timeline, such as `track_landmarks`.
 
-    keys: in how many frames each landmark is set, see `keyed_landmarks`.
+    keys: in how many frames each landmark is set, see `keyed_landmarks`. from_file: see `filed_landmarks`.
     """
-    landmarks = keyed_landmarks(known, keys)
     with Timeline(known.source, known.source.times()) as timeline:
+        landmarks = filed_landmarks(known, timeline) if from_file else keyed_landmarks(known, keys)
         began = process_time()
         tracks = tracker(timeline, landmarks)
         return judge_tracks(known, tracks, (process_time() - began) / len(timeline))
