@@ -55,7 +55,7 @@ def main() -> None:
     kinds = named or sorted(whole)
     for kind in kinds:  # so that what libraries need is there before memory is limited
         for number, data in enumerate(whole[kind][:_WARM]):
-            _run(Input(kind, data, drawn=not number), folder)
+            _run(Input(kind, data, drawn=share > 0 and not number), folder)
     of = damaged_seeds(int(source), whole, kinds, share) if source.isdecimal() else corpus(Path(source))
     said_before = os.fstat(output).st_size
     warned.clear()
