@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import csv
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from viewer.analysis.measures import Quantity, Series
-from viewer.analysis.measures.curves import NUMBER_COLUMNS, number_rows, unit_of
+from viewer.analysis.measures.curves import NUMBER_COLUMNS, number_rows, numbers_file, unit_of
 from viewer.app.tools.plotting.choices import AGAINST, REPEATS, CurveChoices, Settings
+from viewer.app.tools.plotting.lines import value_in_words
 from viewer.app.tools.plotting.shown import Shown
 from viewer.app.tools.plotting.words import numbers_in_words, with_spread
 from viewer.scan.units import Scale
@@ -148,3 +151,28 @@ def test_numbers_are_told_with_how_sure_they_are() -> None:
     assert with_spread(1234.5, 30, "mm") == "1234 ± 60 mm"
     assert with_spread(12.3456, math.nan, "mm") == "12.35 mm"
     assert with_spread(math.nan, 0.1) == "-"
+
+
+def test_what_is_missing_is_told_with_values_and_warns_of_numbers(tmp_path: Path) -> None:
+    """A frame without a value says why, one with openings how much has surface; amplitude and tables warn."""
+    whole = series("lips", 10, "area")
+    values, shares = whole.values.copy(), np.ones(240)
+    values[100:104], shares[[30, 31]] = np.nan, 0.7
+    why = "the path from r5 to r6 goes around an opening"
+    lips = replace(whole, values=values, reasons=dict.fromkeys(range(100, 104), why), shares=shares)
+    shown = taken(lips, replace(whole, name="other"))
+    first, second = shown.curves
+    assert value_in_words(lips, 100, MM) == f"- ({why})"
+    assert value_in_words(lips, 30, MM).endswith("mm² (surface in 70 % of the outline)")
+    assert value_in_words(whole, 30, MM).endswith("mm²")
+    assert numbers_in_words(first)[0].startswith("(!) ")
+    assert not numbers_in_words(second)[0].startswith("(!)")
+    assert first.warning.startswith(f"no value in 4 of 240 frames: {why}; openings in 2 of 240 frames")
+    assert shown.plot is not None
+    shown.plot.save(tmp_path / "lips.csv")
+    with open(tmp_path / "lips.csv", encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [rows[frame]["lips: note"] for frame in (30, 99, 100)] == [first.notes[30], "", why]
+    assert rows[100]["lips [mm²]"] == ""
+    assert numbers_file(tmp_path / "lips.csv") == tmp_path / "lips_numbers.csv"
+    assert [row[-1] for row in number_rows(shown.curves)] == [first.warning, None]
