@@ -111,12 +111,16 @@ class Walk:
         for _ in range(frames):
             self._context.yield_()
             if (count := self._ui.hovered_id_previous_frame_item_count) > 1:
-                self._problems.append(f"{words}: {count} widgets have its id")
+                self._note(f"{words}: {count} widgets have its id")
         log = self._ui.debug_log_buf
-        lines = [line for line in (log.begin() or "").splitlines() if _ERROR in line]
-        self._problems += [f"{words}: {line}" for line in lines]
-        if lines:
-            log.clear()
+        for line in (log.begin() or "").splitlines():
+            if _ERROR in line:
+                self._note(f"{words}: {line}")
+        log.clear()
+
+    def _note(self, problem: str) -> None:
+        self._problems.append(problem)
+        print(f"walk: PROBLEM: {problem}", file=sys.stderr, flush=True)
 
     # --- what there is ----------------------------------------------------------------
 
@@ -141,6 +145,22 @@ class Walk:
                 found = engine.TestItemList()
                 self._context.gather_items(found, f"//{root.name}", 99)
                 yield from [found.get_by_index(number).id_ for number in range(found.get_size())]
+                if root.flags & imgui.WindowFlags_.menu_bar:
+                    yield from self._in_bar(root)
+
+    def _in_bar(self, window: imgui.internal.Window) -> Iterator[int]:
+        """The menus of a bar, which the engine does not gather: what the mouse finds on its way along it."""
+        bar = window.menu_bar_rect()
+        em, middle = imgui.get_font_size(), bar.get_center().y
+        x, last, found = bar.min.x + em, bar.min.x, []
+        while x < min(last + 6 * em, bar.max.x):
+            self._context.mouse_move_to_pos(ImVec2(x, middle))
+            self._context.yield_()
+            if (item := self._ui.hovered_id_previous_frame) and self._ui.hovered_window.id_ == window.id_:
+                last = x
+                found += [item] * (item not in found)
+            x += 0.75 * em
+        yield from found
 
     def _info(self, item: int) -> engine.TestItemInfo | None:
         """Where a widget is; None where it is not any more."""
@@ -168,7 +188,7 @@ class Walk:
                 self._context.key_press(imgui.Key.escape)
                 self._context.yield_(2)
         if self._popups:
-            self._problems.append(f"Escape does not close what {self._seen[path[-1]] if path else ''} opened")
+            self._note(f"Escape does not close what {self._seen[path[-1]] if path else ''} opened")
             return False
         for item in path:
             if not self._point_at(item):
