@@ -179,6 +179,20 @@ def test_repeats_at_frames_are_the_values_themselves() -> None:
         np.testing.assert_allclose(row, values[frame - 15 : frame + 13])
 
 
+def test_what_stands_out_little_on_one_side_is_no_peak() -> None:
+    """On the shoulder of a higher one, with a deep valley behind; far from zero, which changes nothing."""
+    times = np.arange(360) / RATE
+    values = 100 + np.interp(times, [0, 2, 4, 6, 7, 8, 10, 12], [0, 0, 10, 5, 5, 6, 0, 0])
+    np.testing.assert_allclose(peaks_of(times, values, Smoothing()), [4.0], atol=0.05)
+    np.testing.assert_allclose(peaks_of(times, values, Smoothing(), least=0.05), [4.0, 8.0], atol=0.05)
+
+
+def test_repeats_reach_to_the_last_frame() -> None:
+    values = np.arange(120.0) ** 2
+    repeats = repeats_of(TIMES, values, TIMES[[107]], before=0.5, after=0.4)
+    np.testing.assert_allclose(repeats.curves[0], values[92:120])
+
+
 def test_the_deviation_of_repeats_is_by_one_less_than_are_known() -> None:
     """Two repeats deviate by their difference over the root of 2; one alone has no deviation."""
     curves = np.array([[1.0, 5.0, 2.0], [4.0, 5.0, np.nan], [np.nan, 8.0, np.nan]])
