@@ -28,6 +28,7 @@ from .sources import FrameSource
 from .times import frame_in_words
 from .units import usable_unit
 
+_TRACEBACKS = 10  # of broken frames that are kept: each takes a millisecond to write, and kilobytes
 _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 
 
@@ -285,7 +286,7 @@ class Timeline:
     def _note_broken(self, index: int, error: InputError) -> InputError:
         """Note why a frame cannot be read, once; returns the error to raise. Runs locked."""
         if index not in self._broken:
-            self._broken[index] = _at_rest(error)
+            self._broken[index] = _at_rest(error, len(self._broken) < _TRACEBACKS)
             what = f"{frame_in_words(index)} is left out: {error}"
             self.messages.append(ScanMessage("broken", what, index))
         return copy.copy(self._broken[index])
@@ -450,11 +451,13 @@ def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]
     return checked
 
 
-def _at_rest(error: InputError) -> InputError:
-    """The error as it is kept: its traceback as a note, since frames hold what readers held, perhaps a file.
+def _at_rest(error: InputError, is_told: bool) -> InputError:
+    """The error as it is kept: without its frames, which hold what readers held, perhaps a file. is_told:
+    whether a note has its traceback.
 
     To be raised as a copy, so that it does not gather the frames of those who ask.
     """
     kept = copy.copy(error)
-    kept.add_note("".join(traceback.format_exception(error)))
+    if is_told:
+        kept.add_note("".join(traceback.format_exception(error)))
     return kept
