@@ -29,7 +29,7 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
 from viewer.output.marks import Marks
-from viewer.output.overlays import LINE_COLOR, DrawnLandmark, DrawnPath
+from viewer.output.overlays import LINE_COLOR, DrawnCurve, DrawnLandmark, DrawnPath, DrawnPlot
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan import formats
@@ -152,16 +152,18 @@ def test_landmarks_and_their_lines_stand_in_anonymous_pictures_where_they_are(ru
     turn = Rigid(np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])).in_frame(-away)
     shown = entry(
         scan="away.npz", camera=camera, size=(1200, 800), look=Look(), at=0.0,
-        marks=Marks(landmarks=True, trajectories=True, measure_lines=True),
+        marks=Marks(landmarks=True, trajectories=True, measure_lines=True, plot=True),
         landmarks=(DrawnLandmark(side, "jane", False, 0.1),), held=matrix_of(turn),
         trajectories=(DrawnPath((top, side), (0xFF0000, 0xFF0000)),),
         measure_lines=(DrawnPath((top, side), (0x00FF00,), False, "doe", "1 mm"),),
+        plot=DrawnPlot("time [s]", (0.0, 0.04), (DrawnCurve("doe", "mm", 0x0000FF, (None, 1.0)),)),
     )  # fmt: skip
     Recording((shown,)).save(Path("a.json"))
+    assert Recording.load(Path("a.json")).entries == (shown,)
     assert run("render", "--replay", "a.json", "-o", "p.png").code == 0
     assert run("render", "--replay", "a.json", "--anonymous", "-o", "q.png").code == 0
     assert not any(word in read_description(Path("q.png")) for word in ("jane", "doe", "away", "5000"))
-    for color in ((242, 193, 78), (255, 0, 0), (0, 255, 0)):
+    for color in ((255, 210, 31), (255, 0, 0), (0, 255, 0)):
         named, anonymous = (
             np.abs(picture(Path(name)).astype(int)[..., :3] - color).max(axis=2) < 60
             for name in ("p.png", "q.png")

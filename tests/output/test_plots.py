@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import math
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +63,16 @@ def test_the_png_shows_every_line_and_axis(tmp_path: Path) -> None:
     for color in PLOT_COLORS[:3]:
         rgb = [color >> 16, color >> 8 & 255, color & 255]
         assert (np.abs(pixels.astype(int) - rgb).sum(axis=1) < 12).sum() > 500
+
+
+def test_what_films_have_of_a_plot() -> None:
+    drawn = plot(("mm",)).drawn_below()
+    assert drawn is not None
+    assert drawn.x_label == "time [s]"
+    (curve,) = drawn.curves
+    for told, value in zip(curve.values, plot(("mm",)).lines[0].values.tolist(), strict=True):
+        assert told is None if math.isnan(value) else told == pytest.approx(value)
+    assert replace(plot(), frames=None).drawn_below() is None
 
 
 def test_lines_of_a_fourth_unit_are_in_the_table_alone() -> None:

@@ -44,7 +44,15 @@ from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
 from ..output.marks import Legend, Marks, MeasuredLine
-from ..output.overlays import LINE_SLACK, NOTHING_DRAWN, DrawnLandmark, DrawnMarks, DrawnPath, Overlay
+from ..output.overlays import (
+    LINE_SLACK,
+    NOTHING_DRAWN,
+    DrawnLandmark,
+    DrawnMarks,
+    DrawnPath,
+    DrawnPlot,
+    Overlay,
+)
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import is_demo, searches_folders
@@ -123,6 +131,7 @@ class Entry:
     trajectories: tuple[DrawnPath, ...] = ()
     held: Matrix | None = None
     measure_lines: tuple[DrawnPath, ...] = ()
+    plot: DrawnPlot | None = None
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
     at: Stamp = field(default=0.0, compare=False)
@@ -174,6 +183,7 @@ class Entry:
             trajectories=drawn.trajectories if marks.trajectories else (),
             held=matrix_of(drawn.held) if marks.trajectories else None,
             measure_lines=drawn.measure_lines if marks.measure_lines else (),
+            plot=drawn.plot if marks.plot else None,
         )
 
     def request(self, pose: Pose) -> Request:
@@ -200,6 +210,7 @@ class Entry:
         return Legend(
             self.marks, self.camera, self.look, scale.unit, self.pose, len(timeline), self.time,
             lines=(*lines, *pinned), notes=on_frame, factor=scale.factor, overlay=self._overlay(pose),
+            plot=self.plot if self.marks.plot else None,
         )  # fmt: skip
 
     def _overlay(self, pose: Pose) -> Overlay | None:
@@ -263,6 +274,7 @@ class Entry:
             self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(), automatic=None,
             landmarks=tuple(replace(one, name="") for one in self.landmarks),
             measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
+            plot=None,
         )  # fmt: skip
 
     def description(self) -> str:

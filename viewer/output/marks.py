@@ -26,6 +26,9 @@ from .overlays import (
     LEADER_OPACITY,
     LEADER_THICK,
     LINE_COLOR,
+    LINE_THICK,
+    DrawnCurve,
+    DrawnPlot,
     Overlay,
     ToldLine,
     draw_line,
@@ -47,6 +50,7 @@ _MOST_DIGITS = 15  # that a float64 holds
 # In heights of the text:
 _MARGIN, _PAD, _GAP = 0.8, 0.5, 0.35
 _TICK, _LINE = 0.5, 0.14  # height of a scale bar's ends, thickness of its line
+_PLOT_LEFT, _PLOT_HEIGHT = 0.25, 0.24  # where a plot begins, and its height, in shares of the picture
 _LINE_STEP = 1.2  # from one line of a label to the next
 _MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
 _SWATCH_LINE = 1.4  # from one swatch to the next
@@ -70,6 +74,7 @@ class Marks:
     landmarks: bool = param(False, "Landmarks, as they stand in the frame")
     trajectories: bool = param(False, "Ways of landmarks through all frames, those that the view shows")
     measure_lines: bool = param(False, "What measures measure in the frame, with their values")
+    plot: bool = param(False, "The plot of measures, where it is shown, with a line at the frame")
 
     def __bool__(self) -> bool:
         return any(getattr(self, field.name) for field in fields(self))
@@ -105,7 +110,8 @@ class Legend:
     says of its numbers. lines: that were measured, and notes at places. notes: on the frame. factor: how many
     of `unit` one unit of the scan is. overlay: landmarks and lines of them, None where none are drawn.
     covered: the cells of the picture that show the subject (see `labels.covered_cells`), None where not
-    known. places: of labels in the pictures before, which change with this one.
+    known. places: of labels in the pictures before, which change with
+    this one. plot: None where none is drawn.
     """
 
     marks: Marks
@@ -120,6 +126,7 @@ class Legend:
     notes: tuple[str, ...] = ()
     factor: float = 1.0
     overlay: Overlay | None = None
+    plot: DrawnPlot | None = None
     covered: NDArray[np.bool_] | None = field(default=None, compare=False)
     places: LabelPlaces = field(default_factory=LabelPlaces, compare=False)
 
@@ -228,23 +235,26 @@ def draw(
     legend: Legend,
     values: tuple[float, float] | None,
     kind: ValueKind | None = None,
+    foot: float | None = None,
 ) -> list[Box]:
     """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp and notes on
     the frame upper left. Returns where they are.
 
     size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar. kind: of
-    its numbers, where the backend found them.
+    its numbers, where the backend found them. foot: below which nothing is drawn at the right; None: the
+    picture's.
     """
     drawn = []
+    lower_right = size[0], size[1] if foot is None else foot
     if legend.marks.scale_bar:
         drawn.append(_draw_scale_bar(painter, size, legend))
     if legend.marks.color_bar:
-        foot = size[1] - _MARGIN * painter.em
+        bottom = lower_right[1] - _MARGIN * painter.em
         if values is not None:
-            drawn.append(_draw_color_bar(painter, size, legend, values, kind))
-            foot = drawn[-1][1] - _GAP * painter.em
+            drawn.append(_draw_color_bar(painter, lower_right, legend, values, kind))
+            bottom = drawn[-1][1] - _GAP * painter.em
         if told := swatches(legend.look):
-            drawn.append(_draw_swatches(painter, size, told, foot))
+            drawn.append(_draw_swatches(painter, size, told, bottom))
     upper_left = [stamp(legend)] if legend.marks.stamp else []
     return [*drawn, *_draw_plates(painter, size, [*upper_left, *legend.notes])]
 
@@ -348,6 +358,76 @@ def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequenc
     return boxes
 
 
+def _draw_plot(painter: _Overlay, size: tuple[float, float], plot: DrawnPlot, pose: int) -> list[Box]:
+    """Draw a plot at the lower right, with a line at a frame; returns where it is, nothing where it has no
+    values."""
+    em, x = painter.em, _numbers(plot.x)
+    curves = [(curve, _numbers(curve.values)) for curve in plot.curves if len(curve.values) == len(x)]
+    curves = [(curve, values) for curve, values in curves if np.isfinite(x + values).any()]
+    if not curves:
+        return []
+    left, right = round(_PLOT_LEFT * size[0]), round(size[0] - _MARGIN * em)
+    top, bottom = round((1 - _PLOT_HEIGHT) * size[1]), round(size[1] - _MARGIN * em)
+    painter.box((left, top, right, bottom), PLATE)
+    start, stop, high, low = left + _PAD * em, right - _PAD * em, top + 2 * em, bottom - 2 * em
+    across = _scaled(x, x, start, stop)
+    for curve, values in curves:
+        of_unit = np.concatenate([others for other, others in curves if other.unit == curve.unit])
+        places = np.stack([across, _scaled(values, of_unit, low, high)], axis=1)
+        count = len(places)
+        inks, none = [curve.color] * count, np.zeros(count, bool)
+        painter.polyline(places, LINE_THICK * em, inks, np.ones(count), none, 0.0)
+    if pose < len(across) and np.isfinite(across[pose]):
+        half = max(0.5, 0.05 * em)
+        painter.box((across[pose] - half, high, across[pose] + half, low), INK)
+    _draw_plot_words(painter, (start, low + 0.4 * em, stop, top + 0.45 * em), plot, curves, pose)
+    return [(left, top, right, bottom)]
+
+
+def _draw_plot_words(
+    painter: _Overlay,
+    room: Box,
+    plot: DrawnPlot,
+    curves: Sequence[tuple[DrawnCurve, NDArray[np.float64]]],
+    pose: int,
+) -> None:
+    """Write the names of a plot's curves with their values at a frame, and its abscissa. room: from the left
+    to the right; the tops of the abscissa's numbers and of the names."""
+    em, (start, below, stop, above), x = painter.em, room, _numbers(plot.x)
+    at = start
+    for curve, values in curves:
+        there = values[np.isfinite(values)]
+        now = values[pose] if pose < len(values) else np.nan
+        words = f"{number(float(now), float(np.ptp(there)))} {curve.unit}" if np.isfinite(now) else "-"
+        text = f"{curve.name}: {words}"
+        if at + em + painter.width(text) > stop:
+            break
+        painter.box(
+            (at, above + 0.15 * em, at + 0.7 * em, above + 0.85 * em), (*rgba(f"#{curve.color:06x}")[:3], 255)
+        )
+        painter.text(at + em, above, text)
+        at += painter.width(text) + 2 * em
+    least, most = float(np.nanmin(x)), float(np.nanmax(x))
+    for text, share in (
+        (number(least, most - least), 0.0),
+        (plot.x_label, 0.5),
+        (number(most, most - least), 1.0),
+    ):
+        painter.text(start + share * (stop - start - painter.width(text)), below, text)
+
+
+def _numbers(values: Sequence[float | None]) -> NDArray[np.float64]:
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def _scaled(
+    values: NDArray[np.float64], span: NDArray[np.float64], start: float, stop: float
+) -> NDArray[np.float64]:
+    """Find where values are between start and stop, at which the least and the largest of a span lie."""
+    least, most = np.nanmin(span), np.nanmax(span)
+    return np.asarray(start + (stop - start) * (values - least) / (most - least or 1.0))
+
+
 def _draw_lines(painter: _Overlay, size: tuple[float, float], legend: Legend, taken: Sequence[Box]) -> None:
     """Draw landmarks and their lines, and the measured lines, and their labels; what has an end behind the
     eye
@@ -445,8 +525,9 @@ def marked(
         return image
     below = Image.fromarray(image)
     lines, above = _Overlay(below.size), _Overlay(below.size)
-    taken = draw(above, below.size, legend, values, kind)
-    _draw_lines(lines, below.size, legend, taken)
+    plot = [] if legend.plot is None else _draw_plot(above, below.size, legend.plot, legend.pose)
+    taken = draw(above, below.size, legend, values, kind, plot[0][1] if plot else None)
+    _draw_lines(lines, below.size, legend, [*plot, *taken])
     return np.asarray(Image.alpha_composite(Image.alpha_composite(below, lines.image), above.image))
 
 

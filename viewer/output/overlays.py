@@ -76,22 +76,45 @@ class DrawnPath:
 
 
 @dataclass(frozen=True)
+class DrawnCurve:
+    """A curve of a plot. unit: of its values, one for each frame, None where not known. color: 0xRRGGBB."""
+
+    name: str
+    unit: str
+    color: int
+    values: tuple[float | None, ...]
+
+
+@dataclass(frozen=True)
+class DrawnPlot:
+    """A plot of curves that a tool shows below the picture. x: the abscissa in each frame, None where not
+    known. x_label: its name and unit."""
+
+    x_label: str
+    x: tuple[float | None, ...]
+    curves: tuple[DrawnCurve, ...]
+
+
+@dataclass(frozen=True)
 class DrawnMarks:
     """Landmarks and lines that tools draw over a frame, in the scan's coordinates.
 
-    held: the motion that brings the trajectories to where they are about this frame.
+    held: the motion that brings the trajectories to where they are about this frame. plot: None where none is
+    shown.
     """
 
     landmarks: tuple[DrawnLandmark, ...] = ()
     trajectories: tuple[DrawnPath, ...] = ()
     held: Rigid = STILL
     measure_lines: tuple[DrawnPath, ...] = ()
+    plot: DrawnPlot | None = None
 
     def with_more(self, other: DrawnMarks) -> DrawnMarks:
         """Add the marks of another tool."""
         return DrawnMarks(
             (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
             other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
+            other.plot or self.plot,
         )  # fmt: skip
 
 

@@ -17,6 +17,7 @@ from ..csv_text import save_rows
 from ..files import whole_file
 from ..imports import require
 from ..scan.units import Scale
+from .overlays import DrawnCurve, DrawnPlot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -90,6 +91,16 @@ class CurvePlot:
     def is_known(self) -> bool:
         """Whether any line has a value."""
         return any(np.isfinite(line.values).any() for line in self.lines)
+
+    def drawn_below(self) -> DrawnPlot | None:
+        """Find the plot that saved pictures and films have; None where its abscissa is not known by frame."""
+        if self.frames is None:
+            return None
+        curves = (
+            DrawnCurve(line.label, line.unit, line.color, _rounded(line.values))
+            for line in self.drawn if not line.is_thin
+        )  # fmt: skip
+        return DrawnPlot(f"{self.x_label} [{self.x_unit}]", _rounded(self.x), tuple(curves))
 
     def rows(self) -> list[list[object]]:
         """A table: a row for each x, a column for each line, and for its band and its notes where it has
@@ -203,6 +214,10 @@ def plot_against(x: PlotLine, frames: NDArray[np.intp], lines: Sequence[PlotLine
 
 def _band(sigmas: NDArray[np.float64], has_band: bool) -> NDArray[np.float64]:
     return BAND_SIGMAS * sigmas if has_band else np.full(len(sigmas), np.nan)
+
+
+def _rounded(values: NDArray[np.float64]) -> tuple[float | None, ...]:
+    return tuple(float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values.tolist())
 
 
 def _cells(values: NDArray[np.float64]) -> list[object]:

@@ -17,7 +17,14 @@ from .steering import Steering
 from .viewport import Viewport
 
 SHOWN_FIRST = Marks(scale_bar=True, color_bar=True)  # until the user chooses
-_OF_TOOLS = ("measurements", "notes", "landmarks", "trajectories", "measure_lines")  # as the tools draw them
+_OF_TOOLS = (
+    "measurements",
+    "notes",
+    "landmarks",
+    "trajectories",
+    "measure_lines",
+    "plot",
+)  # as the tools draw them
 _STEPS = 32  # of a colour bar; colours between them are blended
 
 

@@ -228,6 +228,8 @@ class Tool:
             return NOTHING_DRAWN
         radius = self.desk.viewport.bounds(pose).radius
         found = self.ways.drawn(self.settings, self.choices, frame, radius)
+        if self.is_below() and self.shown.plot is not None:
+            found = replace(found, plot=self.shown.plot.drawn_below())
         if not self.settings.lines:
             return found
         lines = self.lines.drawn(self.landmarks.measures, self.choices.hidden, frame, radius)
