@@ -274,7 +274,7 @@ class Entry:
             self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(), automatic=None,
             landmarks=tuple(replace(one, name="") for one in self.landmarks),
             measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
-            plot=None,
+            plot=self.plot and self.plot.without_names(),
         )  # fmt: skip
 
     def description(self) -> str:

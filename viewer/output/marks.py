@@ -50,7 +50,7 @@ _MOST_DIGITS = 15  # that a float64 holds
 # In heights of the text:
 _MARGIN, _PAD, _GAP = 0.8, 0.5, 0.35
 _TICK, _LINE = 0.5, 0.14  # height of a scale bar's ends, thickness of its line
-_PLOT_LEFT, _PLOT_HEIGHT = 0.25, 0.24  # where a plot begins, and its height, in shares of the picture
+_PLOT_HEIGHT = 0.24  # of a plot, in shares of the picture, which becomes smaller by that above it
 _LINE_STEP = 1.2  # from one line of a label to the next
 _MAP_WIDTH, _MAP_HEIGHT = 1.0, 8.0
 _SWATCH_LINE = 1.4  # from one swatch to the next
@@ -235,23 +235,20 @@ def draw(
     legend: Legend,
     values: tuple[float, float] | None,
     kind: ValueKind | None = None,
-    foot: float | None = None,
 ) -> list[Box]:
     """Draw the legend's marks: scale bar lower left, colour bar and swatches lower right, stamp and notes on
     the frame upper left. Returns where they are.
 
     size: (width, height), pixels. values: where the colour map begins and ends; None: no colour bar. kind: of
-    its numbers, where the backend found them. foot: below which nothing is drawn at the right; None: the
-    picture's.
+    its numbers, where the backend found them.
     """
     drawn = []
-    lower_right = size[0], size[1] if foot is None else foot
     if legend.marks.scale_bar:
         drawn.append(_draw_scale_bar(painter, size, legend))
     if legend.marks.color_bar:
-        bottom = lower_right[1] - _MARGIN * painter.em
+        bottom = size[1] - _MARGIN * painter.em
         if values is not None:
-            drawn.append(_draw_color_bar(painter, lower_right, legend, values, kind))
+            drawn.append(_draw_color_bar(painter, size, legend, values, kind))
             bottom = drawn[-1][1] - _GAP * painter.em
         if told := swatches(legend.look):
             drawn.append(_draw_swatches(painter, size, told, bottom))
@@ -358,15 +355,14 @@ def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequenc
     return boxes
 
 
-def _draw_plot(painter: _Overlay, size: tuple[float, float], plot: DrawnPlot, pose: int) -> list[Box]:
-    """Draw a plot at the lower right, with a line at a frame; returns where it is, nothing where it has no
-    values."""
+def _draw_plot(painter: _Overlay, size: tuple[float, float], plot: DrawnPlot, pose: int) -> bool:
+    """Draw a plot at the bottom of a picture, with a line at a frame; whether it has any values."""
     em, x = painter.em, _numbers(plot.x)
     curves = [(curve, _numbers(curve.values)) for curve in plot.curves if len(curve.values) == len(x)]
     curves = [(curve, values) for curve, values in curves if np.isfinite(x + values).any()]
     if not curves:
-        return []
-    left, right = round(_PLOT_LEFT * size[0]), round(size[0] - _MARGIN * em)
+        return False
+    left, right = round(_MARGIN * em), round(size[0] - _MARGIN * em)
     top, bottom = round((1 - _PLOT_HEIGHT) * size[1]), round(size[1] - _MARGIN * em)
     painter.box((left, top, right, bottom), PLATE)
     start, stop, high, low = left + _PAD * em, right - _PAD * em, top + 2 * em, bottom - 2 * em
@@ -381,7 +377,7 @@ def _draw_plot(painter: _Overlay, size: tuple[float, float], plot: DrawnPlot, po
         half = max(0.5, 0.05 * em)
         painter.box((across[pose] - half, high, across[pose] + half, low), INK)
     _draw_plot_words(painter, (start, low + 0.4 * em, stop, top + 0.45 * em), plot, curves, pose)
-    return [(left, top, right, bottom)]
+    return True
 
 
 def _draw_plot_words(
@@ -396,10 +392,9 @@ def _draw_plot_words(
     em, (start, below, stop, above), x = painter.em, room, _numbers(plot.x)
     at = start
     for curve, values in curves:
-        there = values[np.isfinite(values)]
         now = values[pose] if pose < len(values) else np.nan
-        words = f"{number(float(now), float(np.ptp(there)))} {curve.unit}" if np.isfinite(now) else "-"
-        text = f"{curve.name}: {words}"
+        words = f"{now:.4g} {curve.unit}" if np.isfinite(now) else "-"
+        text = f"{curve.name}: {words}" if curve.name else words
         if at + em + painter.width(text) > stop:
             break
         painter.box(
@@ -525,10 +520,16 @@ def marked(
         return image
     below = Image.fromarray(image)
     lines, above = _Overlay(below.size), _Overlay(below.size)
-    plot = [] if legend.plot is None else _draw_plot(above, below.size, legend.plot, legend.pose)
-    taken = draw(above, below.size, legend, values, kind, plot[0][1] if plot else None)
-    _draw_lines(lines, below.size, legend, [*plot, *taken])
-    return np.asarray(Image.alpha_composite(Image.alpha_composite(below, lines.image), above.image))
+    taken = draw(above, below.size, legend, values, kind)
+    _draw_lines(lines, below.size, legend, taken)
+    made = Image.alpha_composite(Image.alpha_composite(below, lines.image), above.image)
+    plot = _Overlay(below.size)
+    if legend.plot is None or not _draw_plot(plot, below.size, legend.plot, legend.pose):
+        return np.asarray(made)
+    wide, high = (round((1 - _PLOT_HEIGHT) * extent) for extent in below.size)
+    with_room = Image.new("RGBA", below.size, rgba(legend.look.background))
+    with_room.paste(made.resize((max(wide, 1), max(high, 1))), ((below.width - wide) // 2, 0))
+    return np.asarray(Image.alpha_composite(with_room, plot.image))
 
 
 class _Overlay:

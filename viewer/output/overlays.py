@@ -94,6 +94,10 @@ class DrawnPlot:
     x: tuple[float | None, ...]
     curves: tuple[DrawnCurve, ...]
 
+    def without_names(self) -> DrawnPlot:
+        """Leave out the names of measures."""
+        return replace(self, x_label="", curves=tuple(replace(one, name="") for one in self.curves))
+
 
 @dataclass(frozen=True)
 class DrawnMarks:
