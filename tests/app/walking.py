@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, imgui
 
 engine = imgui.test_engine
 
-_DRAG = ImVec2(23, 9)  # pixels
+_DRAG = ImVec2(2, 7)  # pixels: enough to be one, and not off a menu
 _ESCAPES = 5  # presses after which what is still open counts as stuck
 _DELAYS = ("hover_stationary_delay", "hover_delay_short", "hover_delay_normal")
 _ERROR = "[imgui-error]"  # begins the lines of ImGui's log on what its callers do wrong
@@ -72,6 +72,7 @@ class Walk:
     def _new(self, path: Path) -> list[int]:
         """The widgets that nothing was done with, but for most of those that are alike."""
         found = []
+        self._context.yield_(2)  # in which a popup that was opened appears
         for item in self._reachable(() if path else self._windows):
             if item not in self._seen:
                 words = self._seen[item] = self._words(item)
