@@ -246,3 +246,7 @@ def test_names_of_files_that_are_not_utf_8_come_back_and_impossible_ones_do_not(
     assert load(file)[0].recent == (name,)
     data = json.loads(file.read_text()) | {"recent": ["\ud800"]}
     assert load(written(file, data))[0].recent == ()
+
+
+def test_exports_have_the_plot_that_is_shown_unless_a_user_says_otherwise() -> None:
+    assert Settings().export_marks == Marks(plot=True)

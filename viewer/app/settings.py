@@ -102,7 +102,7 @@ class Settings:
     cube: bool = True
     turn_seconds: TurnTime = turntable.USUAL
     export: Choices = field(default_factory=Choices)
-    export_marks: Marks = field(default_factory=Marks)
+    export_marks: Marks = field(default_factory=lambda: Marks(plot=True))  # where it is shown
     recent: Annotated[tuple[str, ...], ReadBy(_read_recent)] = ()
     panel: PanelChoices = field(default_factory=PanelChoices)
     drawer: drawer.DrawerHeight = drawer.USUAL
