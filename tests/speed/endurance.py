@@ -37,6 +37,7 @@ def draw_pictures(count: int) -> None:
     """Draw frames of the demo with each renderer in turn, from another side each, and watch memory."""
     renderer, sizes = shared_renderer(), []
     names = sorted(backends())
+    every = max(1, count // 50 // len(names)) * len(names)  # after the same renderer each time
     with open_scan("demo") as timeline:
         poses = [timeline.pose(index) for index in range(4)]
         for number in range(count):
@@ -48,10 +49,10 @@ def draw_pictures(count: int) -> None:
                     pass
                 surface.image()
             surface.release()
-            if number % max(1, count // 50) == count // 50 - 1:
+            if number % every == every - 1:
                 sizes.append(own_bytes())
                 print(f"{number + 1:6} pictures {sizes[-1] / 1e6:8.1f} MB", flush=True)
-    begun = sizes[len(sizes) // 10 - 1]
+    begun = sizes[len(sizes) // 10]
     print(f"{begun / 1e6:.1f} MB after a tenth, {sizes[-1] / 1e6:.1f} MB in the end")
     if sizes[-1] > GROWTH * begun:
         sys.exit(f"memory has grown by {100 * (sizes[-1] / begun - 1):.1f} %")
