@@ -366,7 +366,9 @@ def _weights(ground: LabelGround) -> NDArray[np.float64]:
     at = at[((at >= 0) & (at < (columns, rows))).all(axis=1)].astype(int)
     marked = np.zeros(covered.shape, bool)
     marked[at[:, 1], at[:, 0]] = True
-    squares = np.prod(ground.size) / covered.size / ground.em**2  # a cell, however small, has a whole mark
+    squares = (
+        ground.size[0] * ground.size[1] / covered.size / ground.em**2
+    )  # a cell, however small, has a whole mark
     weights = _COVERS * (covered + 0.5 * _grown(covered)) + _COVERS_MARK * marked / min(squares, 1.0)
     near = marked
     for _ in range(_AROUND):
