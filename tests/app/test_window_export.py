@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 from range_scenes import sphere_view
 from scenes import sphere
-from virtual_screen import ROOT, SIZE, RunningApp, running_app, virtual_screen
+from virtual_screen import PANEL, ROOT, SIZE, RunningApp, running_app, virtual_screen
 from written import film
 
 from viewer.document.recording import Recording
@@ -30,11 +30,8 @@ LEFT = (SIZE[0] - 34 * 16) // 2  # of the dialog
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The working directory, with the scan jane_doe/; the look colours by height."""
+    """The working directory, with the scan jane_doe/."""
     folder = tmp_path_factory.mktemp("app")
-    config = folder / "config" / "scan4d"
-    config.mkdir(parents=True)
-    (config / "settings.json").write_text(json.dumps({"format": 1, "look": {"color_by": "height"}}))
     (folder / "jane_doe").mkdir()
     for index in range(COUNT):
         formats.write(folder / "jane_doe" / f"{index}.npz", sphere(3000, radius=1 + 0.1 * index))
@@ -43,10 +40,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def app(tmp_path_factory: pytest.TempPathFactory, folder: Path) -> Iterator[RunningApp]:
+    """The window on the scan, coloured by height."""
     with (
         virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
         running_app(screen, folder, "jane_doe") as app,
     ):
+        app.choose(PANEL, "color_by/##value", "###height")
+        app.settle()
         yield app
 
 
