@@ -38,6 +38,7 @@ from viewer.gpu.context import Gpu, headless
 from viewer.gpu.present import Presenter
 from viewer.gpu.pyramid import Image, add_expanded, expand, subtract_expanded
 from viewer.gpu.shader import Source
+from viewer.gpu.soften import soften
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
@@ -108,6 +109,7 @@ def draw_all(renderer: Renderer, whole: bool) -> None:
     touching = replace(request, params=backend("points").params({"point_size": 0}))
     render_frame(renderer, touching, surface)
     render_frame(renderer, touching, surface, share=0.5, moving=True, before=surface)
+    soften(surface)
 
     def draw(
         scanned: PointCloud | Pose,

@@ -32,7 +32,7 @@ class Drawer:
 
     @property
     def shown_height(self) -> float:
-        """Its height now, in heights of the font: the user's; of its few words while tools have no more."""
+        """The height now, in heights of the font: the user's, or that of its few words."""
         return min(self._content, self.height) if self._tools.is_below_bare else self.height
 
     def draw_grip(self, width: float) -> None:

@@ -162,5 +162,5 @@ class Tasks:
     def _draw_task(self, task: Task) -> None:
         width = _WIDTH * imgui.get_font_size()
         imgui.text_unformatted(widgets.fitted(task.name, width))
-        if widgets.progress(task, width):
+        if widgets.progress_row(task, width):
             self.cancel(task)

@@ -359,7 +359,7 @@ def how_far(task: Task) -> str:
     return f"{done}{task.seconds:.0f} s"
 
 
-def progress(task: Task, width: float) -> bool:
+def progress_row(task: Task, width: float) -> bool:
     """Declare a bar of this width that shows how far work has come, and a button that cancels the work;
     whether the user pressed it."""
     # Of a negative share ImGui draws a bar that only moves.

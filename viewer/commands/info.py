@@ -75,7 +75,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
 
 
 class _Found:
-    """What the parts of a pose add up to.
+    """The sums over the parts of a pose.
 
     count, dropped: of points with finite coordinates, and of others. low, high: (3,) relative to the origin.
     ranges: of each attribute.

@@ -191,7 +191,7 @@ def kept(scan: str) -> SavedSession | None:
 
 
 def kept_elsewhere(scan: str, hash: str) -> list[SavedSession]:
-    """What is kept of other scans with this hash, or was put aside, and holds what a user has made: the last
+    """Kept sessions of other scans with this hash, or put aside, that hold what a user has made: the last
     written first, of equal ones that alone. What cannot be read is left out.
 
     scan: its path from the root; what is kept of this itself does not count.

@@ -87,7 +87,7 @@ def _turned(faces: Rows) -> Rows:
 
 
 def _conflicts(faces: Rows) -> Rows:
-    """Of each two faces that run along each other at their edge, the one of the higher number."""
+    """The face of the higher number of each two that run along each other at their edge."""
     before, after = across_edges(faces)
     return after[faces.ravel()[before] == faces.ravel()[after]] // 3
 

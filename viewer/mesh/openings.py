@@ -115,8 +115,8 @@ def detour(patch: Patch, line: Line) -> float:
 
 
 def _turn(patch: Patch, vertex: int, before: NDArray[np.float64], after: NDArray[np.float64]) -> float:
-    """By how much a path turns at a vertex on a border, from one place of the faces around it to another,
-    (3,) each: the angle between these over the faces less pi, to the left positive, radians."""
+    """The angle by which a path turns at a vertex on a border, from one place of the faces around it to
+    another, (3,) each: the angle between these over the faces less pi, to the left positive, radians."""
     faces = patch.faces[(patch.faces == vertex).any(axis=1)]
     first = (faces == vertex).argmax(axis=1)[:, None]
     right, left = np.take_along_axis(faces, (first + np.array([1, 2])) % 3, axis=1).T

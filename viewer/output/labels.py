@@ -91,10 +91,12 @@ class _Kept:
 
 @dataclass(frozen=True, eq=False)
 class LabelGround:
-    """What labels keep off. size: width and height of the picture. em: the height of the text. covered: (R,
-    C), which cells of the picture show the subject, None where that is not known. marks: (N, 2), places of
-    landmarks and of lines. taken: boxes of what else lies over the picture. view: equal while the camera
-    is."""
+    """The things that labels keep off.
+
+    size: width and height of the picture. em: the height of the text. covered: (R, C), which cells of the
+    picture show the subject, None where that is not known. marks: (N, 2), places of landmarks and of lines.
+    taken: boxes of what else lies over the picture. view: equal while the camera is.
+    """
 
     size: tuple[float, float]
     em: float
@@ -150,7 +152,7 @@ class LabelPlaces:
         self._before: object = None  # the view of the picture before
 
     def copy(self) -> LabelPlaces:
-        """The same places, to go on from."""
+        """A copy of the places, to go on from."""
         made = LabelPlaces()
         made._kept, made._placed_in, made._before = dict(self._kept), self._placed_in, self._before
         return made
@@ -196,7 +198,7 @@ class _Layout:
     # --- what places cost -----------------------------------------------------------------
 
     def covering(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What boxes (N, 4) cost by what they cover, (N,)."""
+        """The cost of boxes (N, 4) by what they cover, (N,)."""
         rows, columns = self._sums.shape
         left, top = np.floor(boxes[:, 0] / self._cell[0]), np.floor(boxes[:, 1] / self._cell[1])
         right, bottom = np.ceil(boxes[:, 2] / self._cell[0]), np.ceil(boxes[:, 3] / self._cell[1])
@@ -215,7 +217,7 @@ class _Layout:
         return _meet(boxes, others).sum(axis=1)
 
     def crossing(self, number: int, leaders: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What leaders (N, 2, 2) of a label cost by the leaders and lines of others that they cross, (N,)."""
+        """The cost (N,) of leaders (N, 2, 2) of a label by the leaders and lines that they cross."""
         cost = _CROSSES * _cross(leaders, self.leaders[self._placed(number)]).sum(axis=1)
         lines = [label.line for other, label in enumerate(self.labels) if other != number]
         pieces = [line[None, [0, -1]] for line in lines if len(line) > 1]
@@ -322,7 +324,7 @@ class _Layout:
     # --- what comes of it -----------------------------------------------------------------
 
     def kept(self, number: int) -> _Kept:
-        """What is kept of a label's place."""
+        """The part of a label's place that is kept."""
         left, top, right, bottom = self.boxes[number].tolist()
         is_right = self.leaders[number, 0, 0] > 0.5 * (left + right)
         edge = np.divide((right if is_right else left, 0.5 * (top + bottom)), self.ground.size).tolist()
@@ -357,7 +359,7 @@ def _starts(line: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _weights(ground: LabelGround) -> NDArray[np.float64]:
-    """What covering a square of the text's height costs in each cell, (R, C)."""
+    """The cost of covering a square of the text's height in each cell, (R, C)."""
     covered = ground.covered
     if covered is None:
         covered = np.zeros((_ROWS, max(1, round(_ROWS * ground.size[0] / ground.size[1]))), bool)

@@ -66,7 +66,7 @@ class Series:
         )
 
     def note(self, frame: int) -> str:
-        """What to know about the value in a frame: why there is none, or how much of a region has surface
+        """A remark on the value in a frame: why there is none, or how much of a region has surface
         where that is not all of it; "" for nothing."""
         if frame in self.reasons and np.isnan(self.values[frame]):
             return self.reasons[frame]
@@ -75,7 +75,7 @@ class Series:
 
     @property
     def warning(self) -> str:
-        """What to know about all values together, such as a movement: in how many frames there are none, and
+        """A remark on all values together, such as a movement: in how many frames there are none, and
         why; in how many a region has openings. "" for nothing."""
         count, told = len(self.times), []
         gaps = [frame for frame in sorted(self.reasons) if np.isnan(self.values[frame])]

@@ -84,7 +84,7 @@ class MeasureCurve:
 
 
 def numbers_file(table: Path) -> Path:
-    """Where the numbers of movements stand whose values are in a table: beside it, NAME_numbers.csv."""
+    """The file beside a table of values that holds the numbers of their movements: NAME_numbers.csv."""
     return table.with_name(f"{table.stem}_numbers{table.suffix}")
 
 

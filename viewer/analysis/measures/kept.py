@@ -51,7 +51,7 @@ class KeptValues:
         return values if isinstance(values, dict) else {}
 
     def get(self, frame: int, surface: str) -> Found | Refused | None:
-        """What was found in a frame on the surface of this hash; None: nothing was."""
+        """The value that was found in a frame on the surface of this hash; None where there is none."""
         held: Any = self._values.get(str(frame))
         try:
             if held["surface"] != surface:

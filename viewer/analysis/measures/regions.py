@@ -36,7 +36,7 @@ class Refused:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """What lies within a loop. share: of the area within the loop, as seen across its plane, that has
+    """The surface within a loop. share: of the area within the loop, as seen across its plane, that has
     surface; the rest is openings."""
 
     piece: Piece
@@ -71,13 +71,13 @@ def region_within(patch: Patch, lines: Sequence[Line]) -> Region | Refused:
         [piece for piece, share in zip(pieces, shares, strict=True) if share > 0.5 or share == most]
     )
     length = sum(map(length_of, lines))
-    if piece.areas.sum() > length**2 / (2 * np.pi) and below(piece, *facing(piece, around)) < 0:
+    if piece.areas.sum() > length**2 / (2 * np.pi) and below(piece, *plane_facing(piece, around)) < 0:
         return Refused(_BAG)
     share = abs(float(across(piece, normal).sum())) / area_of(outline)
     return Region(piece, min(share, 1.0))
 
 
-def facing(piece: Piece, around: Line) -> tuple[Vector, Vector]:
+def plane_facing(piece: Piece, around: Line) -> tuple[Vector, Vector]:
     """The plane of an outline, (P, 3): a point, and the normal to the side to which the piece faces."""
     center, normal = plane_of(around, THROUGH)
     return center, normal if across(piece, normal).sum() >= 0 else -normal

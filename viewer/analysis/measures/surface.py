@@ -65,7 +65,7 @@ class Circuit:
 
     @cached_property
     def region(self) -> Region | Refused:
-        """What lies within the paths, which come back to the first landmark."""
+        """The surface within the paths, which come back to the first landmark."""
         return region_within(self.patch, self.lines)
 
 

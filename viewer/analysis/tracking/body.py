@@ -152,7 +152,7 @@ class DeformableBody:
         )
 
     def at_rest(self, grip: Grip) -> tuple[Float, Float]:
-        """Where the places of a grip, (..., 3), were when the body was at rest, and how each has been turned
+        """The places of a grip, (..., 3), when the body was at rest, and how each has been turned
         from when it was gripped to there, (..., 3, 3)."""
         places = grip.offsets + self._rest[grip.nodes]
         return np.einsum("...k,...ki->...i", grip.weights, places), np.swapaxes(grip.turns, -1, -2)

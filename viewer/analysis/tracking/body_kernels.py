@@ -48,7 +48,7 @@ def normals_at(held: Cells, rows: NDArray[np.int64]) -> Float:
 def pull_across(
     held: Cells, places: Float, turns: Float, normals: Float, reach: float, pulls: Float, wanted: Float
 ) -> None:
-    """Where the surface wants nodes at places (N, 3): across it, and not along it.
+    """The targets (N, 3) that the surface gives to nodes at places: across it, and not along it.
 
     turns: (N, 3, 3). normals: (N, 3) of the nodes at rest. reach: how far a node may be off, scan units.
     pulls: (N, 3, 3) gets the weights, 0 where no surface near a node faces as it does. wanted: (N, 3) gets

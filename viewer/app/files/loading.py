@@ -27,7 +27,7 @@ _FLAGS = (
 
 
 class Awaited(NamedTuple):
-    """What the view waits for. words: as users read it. task: how far that is, None where nobody can tell."""
+    """A thing that the view waits for. words: as users read it. task: None where nobody knows how far."""
 
     words: str
     task: Task | None
@@ -83,6 +83,6 @@ class Loading:
         imgui.text_unformatted(widgets.fitted(printable(words), room))
         style = imgui.get_style()
         button = imgui.calc_text_size("Cancel").x + 2 * style.frame_padding.x + style.item_spacing.x
-        if task is not None and widgets.progress(task, room - button):
+        if task is not None and widgets.progress_row(task, room - button):
             cancel(task)
         imgui.end()

@@ -42,8 +42,8 @@ _FREE = 180 << 20  # bytes that reading any file may take
 
 
 @dataclass
-class Budget:
-    """What the files of one frame may take together.
+class ReadBudget:
+    """The memory that the files of one frame may take together.
 
     sizes: bytes of the files read so far, each once, by what tells it from all others. kept: bytes that hold
     what was read of them.
@@ -58,13 +58,13 @@ class Budget:
         return sum(self.sizes.values())
 
 
-_shared: ContextVar[Budget | None] = ContextVar("budget", default=None)  # of the frame that is read
+_shared: ContextVar[ReadBudget | None] = ContextVar("budget", default=None)  # of the frame that is read
 
 
 @contextmanager
-def shared() -> Iterator[Budget]:
+def shared() -> Iterator[ReadBudget]:
     """Have all files that are read meanwhile share one budget; who keeps what was read adds it to `kept`."""
-    token = _shared.set(Budget())
+    token = _shared.set(ReadBudget())
     try:
         budget = _shared.get()
         assert budget is not None

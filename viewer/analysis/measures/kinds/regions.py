@@ -10,7 +10,7 @@ from ....mesh.patch import Patch
 from .. import WHOLE
 from ..outlines import Prism, crosses_itself
 from ..prism import area_through, near_rim, patch_through, rim_through
-from ..regions import CROSSES, NO_PLANE, across, below, facing
+from ..regions import CROSSES, NO_PLANE, across, below, plane_facing
 from ..surface import Circuit, Found, PoseSurface, Refused
 from . import MeasureKind, Options
 from .along import direction, off_smooth
@@ -103,7 +103,7 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
     piece = region.piece
     edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]
     around = np.concatenate(edges)
-    center, normal = facing(piece, around)
+    center, normal = plane_facing(piece, around)
     value = below(piece, center, normal)
     normals = _upright(loop.patch, around)  # across which nothing moves: the outline stays on the surface
     gradient, step = np.zeros_like(positions), _STEP * surface.spacing
@@ -112,7 +112,7 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
             sides = []
             for side in (step, -step):
                 moved = around + side * pulled[:, None] * (np.eye(3)[axis] - normals[:, [axis]] * normals)
-                sides.append(below(piece, *facing(piece, moved)))
+                sides.append(below(piece, *plane_facing(piece, moved)))
             gradient[number, axis] = (sides[0] - sides[1]) / (2 * step)
     flat = np.abs(across(piece, normal))
     sag = np.sqrt(piece.areas * loop.patch.bends[piece.sources]) / 8
