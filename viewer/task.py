@@ -22,11 +22,11 @@ class Cancelled(BaseException):
 class Task:
     """One piece of work. Any thread may read, report and cancel it.
 
-    name: as users read it. progress: 0..1, None while nobody can tell.
+    progress: 0..1, None while nobody can tell.
     """
 
     def __init__(self, name: str) -> None:
-        self.name = name
+        self._names = [name]
         self.progress: float | None = None
         self._began = time.monotonic()
         self._lock = threading.Lock()
@@ -36,6 +36,11 @@ class Task:
     def begin(self) -> None:
         """Count from now, where it had to wait for its turn."""
         self._began = time.monotonic()
+
+    @property
+    def name(self) -> str:
+        """What it does now, as users read it: its own name, or what was announced last and is not over."""
+        return self._names[-1]
 
     @property
     def seconds(self) -> float:
@@ -104,15 +109,22 @@ def checkpoint(progress: float | None = None) -> None:
 
 
 def announce(what: str) -> None:
-    """Say why work takes longer than at other times: the task of this thread takes it as its name.
+    """Say why work takes longer than at other times: the task of this thread bears it as its name.
 
-    Whoever is `listening` is told as well.
+    It does so until `over` is called. Whoever is `listening` is told as well.
     """
     task = _current.get()
     if task is not None:
-        task.name = what
+        task._names.append(what)
     for listener in list(_listeners):
         listener(what)
+
+
+def over() -> None:
+    """Say that what was announced last in this thread is done: its task gets the name back that it had."""
+    task = _current.get()
+    if task is not None:
+        task._names.pop()
 
 
 @contextmanager

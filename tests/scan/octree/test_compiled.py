@@ -48,7 +48,8 @@ def written(tmp_path: Path) -> tuple[Path, Path]:
 
 
 def announced(folder: Path, cache: Path | None, limit: str = "") -> list[str]:
-    """What a task is called after each of two calls, on a thread of several, in a process of its own."""
+    """What a task is called while it waits in two calls, on a thread of several, and after them; in a process
+    of its own."""
     script = f"""{limit}
 import kernel
 from viewer.scan.octree.threads import together
@@ -56,10 +57,10 @@ from viewer.task import Task, listening
 
 heard = []
 task = Task("Reading")
-with task.current(), listening(heard.append):
+with task.current(), listening(lambda what: heard.extend((what, task.name))):
     together(10**6, [lambda: kernel.twice(21)] * 2)
     together(10**6, [lambda: kernel.twice(21)] * 2)
-print(task.name, *heard, sep="|")
+print(*heard, task.name, sep="|")
 """
     return output(script, folder, cache).strip().split("|")
 
@@ -68,9 +69,9 @@ print(task.name, *heard, sep="|")
 def test_what_has_to_be_compiled_is_announced_and_what_is_kept_is_not(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     once = "Preparing once for this machine"
-    assert announced(folder, cache) == [once, once]
+    assert announced(folder, cache) == [once, once, "Reading"]
     assert announced(folder, cache) == ["Reading"]
-    assert announced(folder, None, NOWHERE) == ["Preparing", "Preparing"]
+    assert announced(folder, None, NOWHERE) == ["Preparing", "Preparing", "Reading"]
 
 
 def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:

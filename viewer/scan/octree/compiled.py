@@ -14,7 +14,7 @@ from typing import Any, TypeVar, cast
 from numba import njit
 from numba.core.caching import FunctionCache, NullCache
 
-from ...task import announce
+from ...task import announce, over
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -64,6 +64,7 @@ class _Kept(FunctionCache):
         return found
 
     def save_overload(self, *args: Any) -> None:
+        over()  # numba asks to save each that was not found, once it is compiled
         with suppress(OSError):
             super().save_overload(*args)
 
@@ -73,3 +74,6 @@ class _NotKept(NullCache):
 
     def load_overload(self, *_: Any) -> None:
         announce("Preparing")
+
+    def save_overload(self, *_: Any) -> None:
+        over()
