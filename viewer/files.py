@@ -106,12 +106,12 @@ def parsed_toml(text: str) -> dict[str, Any]:
 def named_inside(folder: Path, name: str, where: object) -> Path:
     """The file in a folder that another file names: the rule for every path that stands in a scan's files.
 
-    where: the file that names it. Raises InputError, which names that, where the name leads out of the folder
-    or cannot be one. Links that stand in the folder are the user's own, and may lead out.
+    where: the file that names it. Raises InputError, which names that, where the name leads out of the
+    folder, is the folder itself, or cannot be one. Links in the folder are the user's own, and may lead out.
     """
     path = Path(name)
     leads_out = path.is_absolute() or path.drive or path.root or ".." in re.split(r"[\\/]", name)
-    if leads_out or not name.isprintable() or not 0 < len(name) <= _LONGEST_NAME:
+    if leads_out or not path.name or not name.isprintable() or not 0 < len(name) <= _LONGEST_NAME:
         hint = "Put that file into the folder, and name it from there"
         raise InputError(f"names '{shortened(name)}', which is no file in its folder", where, hint)
     return folder / path

@@ -228,3 +228,13 @@ def test_real_folders_are_films_or_range_scans(kind: str, data_dir: Path) -> Non
         except InputError:
             continue
         assert named_scans([str(folder)])[0] == [str(folder)]
+
+
+def test_links_that_lead_in_circles_add_nothing(tmp_path: Path) -> None:
+    """Two of them would double the folders to search at each of forty levels."""
+    (tmp_path / "bad.npz").write_bytes(b"no archive")
+    for name in ("one", "other"):
+        (tmp_path / name).symlink_to(tmp_path, target_is_directory=True)
+    scans, problems = named_scans([str(tmp_path)])
+    assert not scans
+    assert [problem.where for problem in problems] == [tmp_path / "bad.npz"]

@@ -115,16 +115,29 @@ def named_scans(names: Iterable[str]) -> tuple[list[str], list[InputError]]:
     scans: list[str] = []
     problems: list[InputError] = []
     for name in names:
-        try:
-            source = find_source(name)
-            if os.path.isdir(name) and isinstance(source, FileSequence) and is_collection(source.files):
-                raise InputError("holds scans that are no frames of one", name)
-            scans.append(name)
-        except InputError as problem:
-            inner, wrong = named_scans(_inside(Path(name)))
-            scans += inner
-            problems += wrong if inner else [problem]
+        found, wrong = _scans_named(name, set())
+        scans += found
+        problems += wrong
     return scans, problems
+
+
+def _scans_named(name: str, entered: set[str]) -> tuple[list[str], list[InputError]]:
+    """The scans that a name stands for, and what is wrong with others.
+
+    entered: real paths of the folders that were searched. Where a link leads there again, it adds nothing.
+    """
+    try:
+        source = find_source(name)
+        if os.path.isdir(name) and isinstance(source, FileSequence) and is_collection(source.files):
+            raise InputError("holds scans that are no frames of one", name)
+        return [name], []
+    except InputError as problem:
+        if (folder := os.path.realpath(name)) in entered:
+            return [], []
+        entered.add(folder)
+        inner = [_scans_named(one, entered) for one in _inside(Path(name))]
+        scans = [scan for found, _ in inner for scan in found]
+        return scans, [one for _, wrong in inner for one in wrong] if scans else [problem]
 
 
 def is_collection(files: Sequence[Path]) -> bool:

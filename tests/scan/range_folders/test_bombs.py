@@ -166,6 +166,32 @@ def test_no_file_leads_out_of_its_folder(kind: str, file: str, old: str, name: s
     assert str(caught.value.where) == str(folder / file)
 
 
+@pytest.mark.parametrize("name", [".", "./", "././."])
+def test_a_folder_is_no_file_in_itself(name: str, tmp_path: Path) -> None:
+    """Another suffix of it would be a file beside it."""
+    folder = tmp_path / "scan"
+    folder.mkdir()
+    np.savez(tmp_path / "scan.npz", xyz=np.zeros((4, 4, 3)))
+    (folder / "scans.conf").write_text(f"bmesh {name} 0 0 0 0 0 0 1\n")
+    with pytest.raises(InputError, match=OUT):
+        find_source(folder)
+
+
+def test_patterns_of_pods_that_all_name_the_same_files_are_refused(tmp_path: Path) -> None:
+    """Each of them would be a list of all files, and of as many frames."""
+    for number in range(1200):
+        (tmp_path / f"{'a' * 64}{number}.tif").touch()
+    images = {"texture": "{}*f", "mask": "{}*if", "confidence": "{}*tif", "range": "{}*"}
+    pods = [
+        {"name": start, "fx": 1, "fy": 1, "cx": 0, "cy": 0}
+        | {image: pattern.format(start) for image, pattern in images.items()}
+        for start in ("a" * count for count in range(1, 65))
+    ]
+    (tmp_path / "pods.json").write_text(json.dumps({"pods": pods}))
+    with pytest.raises(InputError, match=TOO_MUCH):
+        find_source(tmp_path)
+
+
 def test_names_in_the_folder_are_taken_as_they_are(tmp_path: Path) -> None:
     for name in ("a.png", "./a.png", "depth/a b.png", "..a.png", "a..png", "ä/…/b.png"):
         assert named_inside(tmp_path, name, "list") == tmp_path / name

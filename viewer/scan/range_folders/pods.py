@@ -14,9 +14,8 @@ axes, 4 x 4.
 
 from __future__ import annotations
 
-import glob
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
 from ...files import named_inside
+from ..formats._admission import admit
 from ..image_poses import UPRIGHT, from_camera_to_world
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView
@@ -42,6 +42,7 @@ _MOST_PODS = 64
 _FORM = 'It holds {"unit": "mm", "pods": [{"name": "left", "range": "left_*.tif", "fx": ...}]}'
 _RANGE, _TEXTURE, _MASK, _CONFIDENCE = _IMAGES = ("range", "texture", "mask", "confidence")
 _ANY = "*"
+_NAME_BYTES = 1000  # of memory for a file that a pattern names
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         unit, pods = _rig(object_of(folder / FILE))
     except InputError as error:
         raise InputError(error.what, folder / FILE, error.hint or _FORM) from error
-    found = {pattern: _matches(folder, pattern) for pod in pods for pattern in pod.patterns.values()}
+    found = _matches(folder, {pattern for pod in pods for pattern in pod.patterns.values()})
     frames = sorted({key for pod in pods for key in found[pod.patterns[_RANGE]]}, key=natural_key)
     if not frames:
         looked = ", ".join(pod.patterns[_RANGE] for pod in pods)
@@ -135,14 +136,37 @@ def _pattern(stored: dict[str, Any], image: str) -> str:
     return told
 
 
-def _matches(folder: Path, pattern: str) -> set[str]:
-    """Texts for the star in the names of the files of this pattern; without a star, none or an empty one."""
-    place = folder / pattern
-    if _ANY not in pattern:
-        return {""} if place.is_file() else set()
-    start, end = place.name.split(_ANY)
-    found = [file.name for file in place.parent.glob(glob.escape(start) + _ANY + glob.escape(end))]
-    return {key for name in found if (key := name[len(start) : len(name) - len(end)])}
+def _matches(folder: Path, patterns: Set[str]) -> dict[str, set[str]]:
+    """Texts for the star in the names of the files of each pattern; without a star, none or an empty one.
+
+    Raises InputError where patterns name the same files so often that it would take too much memory.
+    """
+    names = {place: _listed(place) for place in {(folder / pattern).parent for pattern in patterns}}
+    held = _NAME_BYTES * sum(map(len, names.values()))
+    found: dict[str, set[str]] = {}
+    for pattern in sorted(patterns):
+        place = folder / pattern
+        start, star, end = map(os.path.normcase, place.name.partition(_ANY))
+        there = names[place.parent] if star else []
+        found[pattern] = {
+            name[len(start) : len(name) - len(end)]
+            for name in there
+            if len(name) > len(start) + len(end)
+            and (compared := os.path.normcase(name)).startswith(start)
+            and compared.endswith(end)
+        }
+        if not star and place.is_file():
+            found[pattern].add("")
+        admit(held, _NAME_BYTES * sum(map(len, found.values())))
+    return found
+
+
+def _listed(folder: Path) -> list[str]:
+    """The names in a folder; none where it is not there."""
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
 
 
 def _files(folder: Path, pod: _Pod, key: str) -> dict[str, Path]:
