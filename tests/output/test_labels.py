@@ -163,6 +163,20 @@ def test_other_things_over_the_picture_are_left_free_and_labels_become_narrow_fo
     assert forms_of(["a note"]) == [["a note"]]
 
 
+def test_a_label_wider_than_the_picture_takes_the_form_that_fits() -> None:
+    line = np.linspace((236.0, 300.0), (266.0, 320.0), 9)
+    size, em = (512.0, 374.0), 26.0  # a small window with large text
+    label = Callout("distance", ((560.0, 44.0), (400.0, 80.0)), line)
+    small = LabelGround(size, em, None, line, ((26.0, 258.0, 143.0, 348.0),))
+    (place,) = LabelPlaces().place([label], small)
+    assert place.form == 1
+    assert place.box[0] >= 0
+    assert place.box[2] <= size[0]
+    too_wide = Callout("distance", ((900.0, 44.0), (600.0, 80.0)), line)
+    (place,) = LabelPlaces().place([too_wide], small)
+    assert place.form == 1, "where none fits, the one that is cut least"
+
+
 def test_many_labels_and_landmarks_all_have_a_place() -> None:
     labels = callouts(30)
     rng = np.random.default_rng(1)

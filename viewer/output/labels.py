@@ -216,6 +216,10 @@ class _Layout:
         others = np.concatenate([self.taken, self.boxes[placed] + gap])
         return _meet(boxes, others).sum(axis=1)
 
+    def outside(self, boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far boxes (N, 4) reach beyond the area for labels, in heights of the text, (N,)."""
+        return np.asarray(np.maximum(boxes[:, 2:] - self.high, 0).sum(axis=1) / self.em)
+
     def crossing(self, number: int, leaders: NDArray[np.float64]) -> NDArray[np.float64]:
         """The cost (N,) of leaders (N, 2, 2) of a label by the leaders and lines that they cross."""
         cost = _CROSSES * _cross(leaders, self.leaders[self._placed(number)]).sum(axis=1)
@@ -286,7 +290,8 @@ class _Layout:
         of_forms = [self._candidates(size) for size in self.labels[number].sizes]
         forms = np.repeat(np.arange(len(of_forms)), [len(boxes) for boxes in of_forms])
         boxes = np.concatenate(of_forms)
-        cost = self.covering(boxes) + _OVERLAPS * self.overlapping(boxes) + _OTHER_FORM * forms
+        cost = self.covering(boxes) + _OTHER_FORM * forms
+        cost += _OVERLAPS * (self.overlapping(boxes) + self.outside(boxes))
         leaders = self.leaders_to(number, boxes)
         cost += np.hypot(*(leaders[:, 1] - leaders[:, 0]).T * ((1.0,), (_UPRIGHT,))) / self.em
         judged = np.argsort(cost, kind="stable")[:_JUDGED]
