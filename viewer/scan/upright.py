@@ -58,7 +58,7 @@ class Upright:
     front: float = 0.0
 
 
-UNTOLD = Upright(UP, "nothing tells otherwise", 0.4)
+UNTOLD = Upright(UP, "nothing in the scan says otherwise", 0.4)
 
 
 def guess_up(cloud: PointCloud, views: Sequence[RangeView] = ()) -> Upright:
@@ -108,12 +108,12 @@ def _of_pictures(views: Sequence[RangeView], points: NDArray[np.float64]) -> Upr
         back = np.mean([view.world_to_camera[2, :3] for view in views], axis=0)
         above = nearest_axis(vector(back))
         if first_elevation(Bounds(low, high), above):
-            return Upright(above, "it is a map of heights", 0.95)
-    return Upright(told, "its range images stand so", 0.95)
+            return Upright(above, "the scan is a map of heights", 0.95)
+    return Upright(told, "it is up in the range images", 0.95)
 
 
 def _of_a_map(points: NDArray[np.float64], normals: object) -> Upright | None:
-    return Upright("+z", "it has map coordinates", 0.95) if _is_map(_body(points)) else None
+    return Upright("+z", "the scan has map coordinates", 0.95) if _is_map(_body(points)) else None
 
 
 def _of_a_camera(points: NDArray[np.float64], normals: NDArray[np.float64] | None) -> Upright | None:
@@ -126,7 +126,7 @@ def _of_a_camera(points: NDArray[np.float64], normals: NDArray[np.float64] | Non
     is_seen_from_there = is_in_picture and _is_one_sided(rays, points[:, 2])
     if normals is not None:
         is_seen_from_there |= bool(np.nanmean(normals[:, 2]) < -_FACING)
-    return Upright("-y", "it was seen by a depth camera", 0.8) if is_seen_from_there else None
+    return Upright("-y", "a depth camera took the scan", 0.8) if is_seen_from_there else None
 
 
 def _of_ground(points: NDArray[np.float64], normals: object) -> Upright | None:
@@ -139,7 +139,7 @@ def _of_ground(points: NDArray[np.float64], normals: object) -> Upright | None:
         for up in ("+z", "+y"):
             is_low = _THINNEST * width < thickness and first_elevation(body, up) > 0
             if is_low and _filled(points, body, "xyz".index(up[1])) > _FILLED:
-                return Upright(up, "it is wide and low", 0.8)
+                return Upright(up, "the scan is wide and low", 0.8)
     return None
 
 
@@ -154,13 +154,13 @@ def _of_a_body(points: NDArray[np.float64], normals: object) -> Upright | None:
     near = body.grown(0.5 * max(wide, high, deep))
     points = points[((points > near.low) & (points < near.high)).all(axis=1)]
     if _stands(points, 1):
-        return _facing(points, Upright(UP, "it stands so", 0.7))
+        return _facing(points, Upright(UP, "the scan stands steadily that way", 0.7))
     if not _is_one_sided(points[:, :2], points[:, 2]):  # a relief, of a face perhaps, stands otherwise
         if _stands(points, 2):
-            return _facing(points, Upright("+z", "it stands so", 0.7))
+            return _facing(points, Upright("+z", "the scan stands steadily that way", 0.7))
         if high > _UPENDED * max(wide, deep) and _stands(points * (1, -1, 1), 1):
-            return Upright("-y", "it stands so", 0.6)
-    return Upright("+z", "it is slender", 0.6) if deep > _SLENDER * max(wide, high) else None
+            return Upright("-y", "the scan stands steadily that way", 0.6)
+    return Upright("+z", "the scan is longest along it", 0.6) if deep > _SLENDER * max(wide, high) else None
 
 
 def _facing(points: NDArray[np.float64], told: Upright) -> Upright:

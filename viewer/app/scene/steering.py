@@ -220,9 +220,8 @@ class Steering:
                 look = replace(self._session.document.look, up=pose.upright.up)
                 self._session.amend(look=look, front=pose.upright.front)
                 if pose.upright.up != UP:
-                    self._note(
-                        f"Up axis guessed: {pose.upright.up} ({pose.upright.why}). Change it beside the cube."
-                    )
+                    guess = f"{pose.upright.up} is up: {pose.upright.why}"
+                    self._note(f"Scan4D guesses that {guess}. Change it below the cube.")
             if camera is not None and not navigation.shows(camera, self.bounds(pose), self._viewport.aspect):
                 camera = None
             self.extent.visit()
