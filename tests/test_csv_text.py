@@ -19,6 +19,7 @@ from viewer.csv_text import save_rows, text_of_cell, to_text
 from viewer.scan.times import read_times_csv
 
 FORMULAS = ("=1+1", "+1+1", "-1-cmd", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "=cmd|' /C calc'!A0", "-", "+")
+WIDE_FORMULAS = ("\uff1d1+1", "\uff0b1", "\uff0d1", "\uff20SUM(A1)", "'\uff1d1")
 NUMBERS = ("-1", "+2.5", "-3e-7", "-.5")
 PACKAGE = Path(viewer.__file__).parent
 
@@ -30,9 +31,10 @@ def cells(rows: list[list[object]], separator: str = ",") -> list[list[str]]:
 
 @pytest.mark.parametrize("separator", [",", "\t"])
 def test_no_text_begins_like_a_formula(separator: str) -> None:
-    (row,) = cells([list(FORMULAS)], separator)
-    assert not [cell for cell in row if cell[0] in "=+-@\t\r\n"]
-    assert [text_of_cell(cell) for cell in row] == list(FORMULAS)
+    texts = [*FORMULAS, *WIDE_FORMULAS]
+    (row,) = cells([texts], separator)
+    assert all(cell == f"'{text}" for cell, text in zip(row, texts, strict=True))
+    assert [text_of_cell(cell) for cell in row] == texts
 
 
 def test_numbers_and_other_texts_stay_as_they_are() -> None:

@@ -46,6 +46,17 @@ def modes(folder: Path) -> dict[str, int]:
 
 
 @posix
+@pytest.mark.parametrize("umask", [0o000, 0o002])
+def test_nobody_else_can_replace_the_folders_that_are_made_for_a_user(umask: int, tmp_path: Path) -> None:
+    """Who can write to the folder around it can put another one in its place."""
+    os.umask(umask)
+    save(Settings(), user_folder() / FILE)
+    assert {mode(folder) for folder in user_folder().parents if folder.is_relative_to(tmp_path / "home")} == {
+        0o700
+    }
+
+
+@posix
 def test_nobody_else_can_read_what_is_kept_of_a_user(run: Run, tmp_path: Path) -> None:
     keep(SavedSession("/scans/doe.ply", None, 0, Document()))
     save(Settings(), user_folder() / FILE)

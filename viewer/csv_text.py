@@ -1,8 +1,8 @@
 """Tables as comma separated values, RFC 4180, whose texts no spreadsheet takes for formulas.
 
-A spreadsheet computes what begins with one of =+-@, and what has that behind a tab or a line break. Names
-come from files, so such a text gets an apostrophe in front, which spreadsheets take for the mark of a text.
-Readers take it off again with `text_of_cell`.
+A spreadsheet computes what begins with one of =+-@, in full width, too, and what has that behind a tab or a
+line break. Names come from files, so such a text gets an apostrophe in front, which spreadsheets take for the
+mark of a text. Readers take it off again with `text_of_cell`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,9 @@ from pathlib import Path
 
 from .files import whole_file
 
-_FORMULA = re.compile(r"'*[=+\-@\t\r\n]")  # also a text that begins like one with an apostrophe
+_WIDE = "\uff1d\uff0b\uff0d\uff20"  # the same signs as East Asian keyboards have them
+# Also a text that begins like one with an apostrophe.
+_FORMULA = re.compile(rf"'*[=+\-@\t\r\n{_WIDE}]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 
 

@@ -61,12 +61,12 @@ def own_folder(folder: Path) -> bool:
     root = next((root for root in own if folder.is_relative_to(root)), None)
     if root is None:
         return False
-    root.parent.mkdir(parents=True, exist_ok=True)
     inner = folder.relative_to(root).parts
     levels = [root.joinpath(*inner[:depth]) for depth in range(len(inner) + 1)]
-    for level in levels:
-        with suppress(FileExistsError):
-            level.mkdir(mode=0o700)
+    for level in [*reversed(root.parents), *levels]:  # who can write to a parent can put another folder here
+        if not level.is_dir():
+            with suppress(FileExistsError):
+                level.mkdir(mode=0o700)
     if os.name != "nt":  # where modes say nothing, and the folder of a user is closed by itself
         found = [os.stat(level) for level in levels]
         if any(level.st_uid != os.geteuid() for level in found):

@@ -23,7 +23,7 @@ LONG_COLUMNS = ("kind", "frame", "time", "name", "x", "y", "z", "state", "value"
 STATES = {Known.PENDING: "", Known.GAP: "gap", Known.TRACKED: "tracked", Known.PLACED: "placed"}
 _KNOWN = {word: known for known, word in STATES.items()}
 _NAMES = ("name", "label", "landmark", "id")
-_AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE)
+_AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE | re.DOTALL)
 _FRAMES, _TIMES = ("frame", "frames"), ("time", "seconds", "t")
 _HINT = "Give each row as many values as there are names in the first line"
 
