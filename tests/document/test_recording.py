@@ -24,7 +24,7 @@ from viewer.output.marks import Marks
 from viewer.output.overlays import DrawnLandmark, DrawnMarks, DrawnPath
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers
-from viewer.scan.open import open_scan
+from viewer.scan.open import find_source, open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
@@ -384,3 +384,28 @@ def test_a_recording_neither_searches_nor_leads_to_another_machine(scan: str, wh
 def test_without_files_there_is_no_hash(tmp_path: Path) -> None:
     assert fingerprint([]) is None
     assert fingerprint([tmp_path / "gone.ply"]) is None
+
+
+@pytest.mark.parametrize(
+    ("list_name", "image", "text"),
+    [
+        (
+            "pods.json",
+            "left.tif",
+            json.dumps({"pods": [{"name": "left", "range": "left.tif", "fx": 1, "fy": 1, "cx": 0, "cy": 0}]}),
+        ),
+        ("scans.conf", "scan.ply", "bmesh scan.ply 0 0 0 0 0 0 1"),
+    ],
+)
+def test_a_subject_between_empty_borders_tells_range_scans_apart(
+    list_name: str, image: str, text: str, tmp_path: Path
+) -> None:
+    """The scans share list and size, and the ends of their images are empty."""
+    hashes = []
+    for number in range(2):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        (folder / list_name).write_text(text)
+        (folder / image).write_bytes(bytes(1 << 17) + bytes([number]) + bytes(1 << 17))
+        hashes.append(fingerprint(find_source(folder).files))
+    assert len(set(hashes) - {None}) == 2

@@ -24,9 +24,9 @@ class RangeFrames:
     """Frames of range views, each of them in files of its own.
 
     name: the scan's. labels: a file's name for each frame, at least one. read: the views of a frame one after
-    the other, which may raise anything. files: all that is read, calibration and poses among them. unit: of
-    all views, as the files tell it. recorded: the times that were stored with the frames, (T,) seconds, or
-    None.
+    the other, which may raise anything. files: all that is read, images first, as scans of one camera share
+    calibration and poses, and the first file tells them apart. unit: of all views, as the files tell it.
+    recorded: the times that were stored with the frames, (T,) seconds, or None.
     """
 
     name: str

@@ -15,7 +15,7 @@ axes, 4 x 4.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -61,7 +61,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         unit, pods = _rig(object_of(folder / FILE))
     except InputError as error:
         raise InputError(error.what, folder / FILE, error.hint or _FORM) from error
-    found = _matches(folder, {pattern for pod in pods for pattern in pod.patterns.values()})
+    found = _matches(folder, dict.fromkeys(pattern for pod in pods for pattern in pod.patterns.values()))
     frames = sorted({key for pod in pods for key in found[pod.patterns[_RANGE]]}, key=natural_key)
     if not frames:
         looked = ", ".join(pod.patterns[_RANGE] for pod in pods)
@@ -83,7 +83,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
 
     labels = tuple(next(pod.patterns[_RANGE].replace(_ANY, key) for pod in pods) for key in frames)
     used = (pattern.replace(_ANY, key) for pattern, keys in found.items() for key in sorted(keys))
-    files = tuple(folder / name for name in (FILE, *dict.fromkeys(used)))
+    files = tuple(folder / name for name in (*dict.fromkeys(used), FILE))
     return RangeFrames(folder.resolve().name, labels, read, files, unit)
 
 
@@ -136,7 +136,7 @@ def _pattern(stored: dict[str, Any], image: str) -> str:
     return told
 
 
-def _matches(folder: Path, patterns: Set[str]) -> dict[str, set[str]]:
+def _matches(folder: Path, patterns: Collection[str]) -> dict[str, set[str]]:
     """Texts for the star in the names of the files of each pattern; without a star, none or an empty one.
 
     Raises InputError where patterns name the same files so often that it would take too much memory.
@@ -144,7 +144,7 @@ def _matches(folder: Path, patterns: Set[str]) -> dict[str, set[str]]:
     names = {place: _listed(place) for place in {(folder / pattern).parent for pattern in patterns}}
     held = _NAME_BYTES * sum(map(len, names.values()))
     found: dict[str, set[str]] = {}
-    for pattern in sorted(patterns):
+    for pattern in patterns:
         place = folder / pattern
         start, star, end = map(os.path.normcase, place.name.partition(_ANY))
         there = names[place.parent] if star else []

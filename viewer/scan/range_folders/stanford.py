@@ -47,7 +47,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     if missing := [file.name for file in files if not file.is_file()]:
         raise InputError(f"there is no {missing[0]}, which {conf} places", folder)
     read = partial(_read, [(file, to_scan) for file, (_, to_scan) in zip(files, placed, strict=True)])
-    return RangeFrames(folder.resolve().name, (conf,), read, (folder / conf, *files), _UNIT)
+    return RangeFrames(folder.resolve().name, (conf,), read, (*files, folder / conf), _UNIT)
 
 
 def _lines(conf: Path) -> list[str]:
