@@ -225,7 +225,7 @@ def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
     assert way.known.tolist() == [Known.TRACKED, Known.GAP, Known.TRACKED]
     assert [way.note(frame) for frame in range(3)] == ["", "the path from a to b goes around an opening", ""]
     assert way.warning == "no value in 1 of 3 frames: the path from a to b goes around an opening"
-    assert area.note(1) == f"surface in {100 * area.shares[1]:.0f} % of the outline"
+    assert area.note(1) == f"surface fills {100 * area.shares[1]:.0f} % of the outline"
     assert area.note(2) == "c3 is a gap"
     assert "no value in 1 of 3 frames: c3 is a gap; openings in 1 of 3 frames" in area.warning
     assert way.in_frames([1, 2]).note(0) == way.note(1)

@@ -71,7 +71,7 @@ class Series:
         if frame in self.reasons and np.isnan(self.values[frame]):
             return self.reasons[frame]
         share = self.shares[frame] if len(self.shares) else np.nan
-        return f"surface in {100 * share:.0f} % of the outline" if share < WHOLE else ""
+        return f"surface fills {100 * share:.0f} % of the outline" if share < WHOLE else ""
 
     @property
     def warning(self) -> str:
@@ -86,5 +86,5 @@ class Series:
         if open_.any():
             least = 100 * float(self.shares[open_].min())
             words = f"openings in {int(open_.sum())} of {count} frames"
-            told.append(f"{words}: as little as {least:.0f} % of the outline has surface")
+            told.append(f"{words}: surface fills as little as {least:.0f} % of the outline")
         return "; ".join(told)
