@@ -408,7 +408,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         press(app, "alt+c")
         screen.do("mousemove", x, y, "sleep", 0.2)
         app.settle()
-        place, _ = pointed(app)
+        place = place_under_mouse(app)
         assert place == pytest.approx((100, 0, 3), abs=0.05), "it is fitted and picked where it is moved to"
         moved = saved_picture(app)
         assert (pixels(moved) != pixels(plain)).any(axis=2).mean() > 0.02
@@ -448,4 +448,8 @@ def pointed(app: RunningApp) -> tuple[list[float], float]:
     """The place under the mouse, and the number of the layer there."""
     words = app.state.pointed
     (number,) = (float(word.split()[1]) for word in words if word.startswith("rising "))
-    return [float(part) for part in words[0].partition(" ±")[0].split(",")], number
+    return place_under_mouse(app), number
+
+
+def place_under_mouse(app: RunningApp) -> list[float]:
+    return [float(part) for part in app.state.pointed[0].partition(" ±")[0].split(",")]
