@@ -72,6 +72,19 @@ def test_units_of_markups(unit: Any, tmp_path: Path) -> None:
     np.testing.assert_allclose(found.positions[0, 0], [0.01, -0.0025, 0.03])
 
 
+@pytest.mark.parametrize("unit", ["survey foot", "%s%s", "mm\n", "mm##x", "m" * 100_000])
+@pytest.mark.parametrize("of_scan", [None, "mm"])
+def test_a_unit_that_is_none_is_not_passed_over_in_silence(
+    unit: str, of_scan: str | None, tmp_path: Path
+) -> None:
+    found = read(tmp_path, "m.mrk.json", markups(coordinateUnits=unit), unit=of_scan)
+    assert found.unit == of_scan
+    np.testing.assert_array_equal(found.positions[0, 0], [10, -2.5, 30])
+    (remark,) = found.told
+    assert remark.startswith(f"Lengths are in '{unit[:5]}")
+    assert len(remark) < 200
+
+
 def test_states_of_markups(tmp_path: Path) -> None:
     points: list[dict[str, Any]] = [
         {"label": "a", "position": [1, 2, 3]},

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...bounds import Bounds
 from ...errors import InputError, shortened
-from ...scan.units import conversion
+from ...scan.units import conversion, usable_unit
 from ..track import Known, Track
 
 LONGEST_LANDMARK_NAME = 200  # characters
@@ -64,13 +64,16 @@ class LandmarkSet:
         told: Sequence[str] = (),
     ) -> LandmarkSet:
         """A set of what a file tells. Names that are empty, long or there twice are made usable; positions
-        that are not finite are not defined, the others PLACED where nothing else is said. Raises InputError
-        where there is no landmark."""
+        that are not finite are not defined, the others PLACED where nothing else is said. A unit may be any
+        text; `told` says so where it is no unit. Raises InputError where there is no landmark."""
         if not len(names):
             raise InputError("holds no landmarks")
         positions = np.array(positions, np.float64).reshape(-1, len(names), 3)
         count = len(positions)
-        usable, renamed = _usable_names(names)
+        usable, remarks = _usable_names(names)
+        if unit and usable_unit(unit) is None:
+            named = f"'{shortened(unit)}', which is no short word such as mm"
+            remarks = [*remarks, f"Lengths are in {named}: they are taken as they are"]
         there = np.isfinite(positions).all(axis=2)
         if known is None:
             known = np.where(there, Known.PLACED, Known.PENDING)
@@ -85,10 +88,10 @@ class LandmarkSet:
             np.full(count, np.nan) if times is None else np.array(times, np.float64),
             np.arange(count) if frames is None else np.array(frames, np.int64),
             frames is not None,
-            unit,
+            usable_unit(unit),
             tuple(about) or ("",) * len(names),
             axes,
-            (*told, *renamed),
+            (*told, *remarks),
         )
 
     @classmethod

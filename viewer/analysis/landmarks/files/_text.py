@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from ....errors import InputError, shortened
 from ....files import open_plain, parsed_json
-from ....scan.units import usable_unit
 from ...track import Known
 from ..landmark_set import LandmarkSet
 
@@ -141,7 +140,7 @@ def own_frames(frames: Sequence[float]) -> NDArray[np.int64] | None:
 def own_unit(values: Mapping[str, Any]) -> str | None:
     """The unit that a comment tells."""
     unit = values.get("unit")
-    return usable_unit(unit) if isinstance(unit, str) else None
+    return unit if isinstance(unit, str) else None
 
 
 def without_states(landmarks: LandmarkSet, title: str) -> str | None:

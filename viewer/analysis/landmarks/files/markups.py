@@ -17,7 +17,7 @@ import numpy as np
 
 from ....errors import InputError, shortened
 from ....files import parsed_json
-from ....scan.units import conversion, usable_unit
+from ....scan.units import conversion
 from ...track import Known
 from ..landmark_set import LandmarkSet
 from ._tables import STATES
@@ -61,7 +61,7 @@ def read(path: Path) -> LandmarkSet:
             "its markups are in several coordinate systems or units", hint="Save them one by one"
         )
     own = _own(data)
-    unit = usable_unit(_word(own["unit"])) if "unit" in own else parts[0]["unit"]
+    unit = _word(own["unit"]) if "unit" in own else parts[0]["unit"]
     return LandmarkSet.of(
         [name for part in parts for name in part["names"]],
         np.concatenate([part["positions"] for part in parts])[np.newaxis],
@@ -160,12 +160,12 @@ def _axes(value: Any, where: str) -> str:
     return name
 
 
-def _unit(value: Any, where: str) -> str | None:
+def _unit(value: Any, where: str) -> str:
     """A unit as a word, or as a code of a scheme with its meaning: ["mm", "UCUM", "millimeter"]."""
     word = value[0] if isinstance(value, list) and value else value
     if not isinstance(word, str):
         raise InputError(f"its coordinateUnits are {shortened(value)}", where, "Known: mm, um")
-    return usable_unit("µm" if word == "um" else word)
+    return "µm" if word == "um" else word
 
 
 def write(path: Path, landmarks: LandmarkSet) -> None:

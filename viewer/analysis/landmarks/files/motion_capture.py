@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....errors import InputError
-from ....scan.units import usable_unit
 from ...track import Known
 from ..landmark_set import LandmarkSet, check_cells
 from ._text import read_bytes, without_states
@@ -118,7 +117,7 @@ def _unit(reader: Reader) -> str | None:
     parameter = reader.get("POINT:UNITS")
     if parameter is None or not parameter.dimensions:
         return None
-    return usable_unit(_decoded(parameter.bytes[: parameter.dimensions[0]]).strip())
+    return _decoded(parameter.bytes[: parameter.dimensions[0]]).strip()
 
 
 def write(path: Path, landmarks: LandmarkSet) -> str | None:
