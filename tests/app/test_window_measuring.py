@@ -207,3 +207,26 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
             "a drag turns the view and sets no end"
         )
         assert "Traceback" not in app.log()
+
+
+SLOW = """
+import time
+from viewer.app.window import Window
+end = Window.end
+def end_late(self):
+    time.sleep(0.2)
+    end(self)
+Window.end = end_late
+"""
+
+
+@pytest.mark.slow
+def test_a_double_click_in_a_slow_window_sets_one_end(screen: Screen, tmp_path: Path) -> None:
+    points = grid(1.0)
+    write_mesh(tmp_path / "scan.ply", points, FACES)
+    with running_app(screen, tmp_path, tmp_path / "scan.ply", before=SLOW) as app:
+        screen.do("key", "m")
+        app.see(clicking="measuring")
+        measure(app, points, 34, 128)
+        after = app.settle()
+        assert (after.is_under_way, len(after.measurements)) == (False, 1)

@@ -10,6 +10,7 @@ import ctypes
 import os
 import sys
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -31,6 +32,7 @@ _SIZE = (1600, 1000)
 _LEAST = (640, 420)  # times the display's scale; in less, menus and timeline are cut
 _SCREEN_SHARE = 0.9  # that a window takes at most
 _SETTLE_FRAMES = 3  # until ImGui has taken in an event: press, release, layout
+_DOUBLE_CLICK = 0.3  # seconds from one press to the next at most, without what frames take
 _TOOLTIP_DELAY = 0.6  # seconds; ImGui shows tooltips a moment after the last event
 _MODIFIERS = {
     glfw.KEY_LEFT_CONTROL, glfw.KEY_RIGHT_CONTROL, glfw.KEY_LEFT_SHIFT, glfw.KEY_RIGHT_SHIFT,
@@ -81,6 +83,8 @@ class Window(GlfwWindow):
         self._is_alt_alone = self._was_alt = False  # pressed without anything else; and released so
         self._frames_due = _SETTLE_FRAMES
         self._tooltips_at: float | None = None
+        self._began = 0.0  # when the last frame began, by the clock
+        self._took: deque[float] = deque(maxlen=2)  # seconds of the last frames
         self._start_imgui()
         self._take_events()
 
@@ -219,11 +223,16 @@ class Window(GlfwWindow):
 
     def begin(self) -> None:
         """Begin a frame: widgets may be declared from here on."""
+        self._began = time.monotonic()
         if imgui.get_current_context().within_frame_scope:  # the one before did not come to its end
             imgui.end_frame()
         self._set_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
+        # ImGui takes in a press, a release and a press by three frames, however fast they came. So the time
+        # of the two frames before does not count: a double click is one in a slow window, too.
+        io, seconds = imgui.get_io(), _DOUBLE_CLICK + sum(self._took)
+        io.mouse_double_click_time, io.mouse_single_click_delay = seconds, 2 * seconds  # more, for ImGui
         imgui.new_frame()
         # ImGui takes in one press or release of a key at a time.
         queued = imgui.get_current_context().input_events_queue.size()
@@ -246,6 +255,7 @@ class Window(GlfwWindow):
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         gl.reverse_depth()
         glfw.swap_buffers(self._window)
+        self._took.append(time.monotonic() - self._began)
 
     def fill(self, color: int) -> None:
         """Paint all of it. color: 0xRRGGBB."""
