@@ -91,7 +91,9 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
     settings = tmp_path / "config" / "scan4d" / FILE
     kept = load(settings)[0]
     assert kept.recent == tuple(str(study / name) for name in ("one", "two.npy", "three.npy"))
-    assert (kept.theme, kept.backend, kept_of(tmp_path, study / "one").pose) == ("light", "pyramidal", 1)
+    assert (kept.theme, kept.backend) == ("light", None), "no renderer was chosen for all scans"
+    own = kept_of(tmp_path, study / "one")
+    assert (own.document.backend, own.pose) == ("codeword", 1)
 
     np.save(study / "three.npy", np.random.default_rng(9).random((500, 3)) * 1e4 + 1e6)
     with running_app(screen, tmp_path, study / "one") as app:
