@@ -39,7 +39,7 @@ class Task:
 
     @property
     def name(self) -> str:
-        """What it does now, as users read it: its own name, or what was announced last and is not over."""
+        """The name of what it does now, as users read it: its own, or the last announced one not yet over."""
         return self._names[-1]
 
     @property
