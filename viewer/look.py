@@ -56,15 +56,16 @@ _EYE_DOME = {"eye_dome": (None, True)}
 class Look:
     """Lighting, colouring and background.
 
-    `color_by` and `light` are "auto" by default: own colours where the scan has them, a
-    head light where it has normals, else eye-dome lighting, which needs depth alone; the photographs
-    of range images are shown as they are. "level" shows measured pixels in grey, filled ones in a
-    colour for each level that fills. `quality`: see `frame.supersample`.
+    `color_by` and `light` are "auto" by default. Then the picture has the scan's own colours. It is lit from
+    the viewer if the scan has normals, else it has eye-dome lighting, which needs depth alone. Photographs of
+    range images are shown unlit. "level" shows measured pixels in grey and filled pixels in a colour for each
+    level.
     """
 
     quality: str = param(
         "balanced",
-        "Smooth edges at rest: fast: one sample of each pixel; balanced: the mean of 5; fine: of 17",
+        "Anti-aliasing of still pictures. fast: one sample a pixel; balanced: the mean of 5; fine: the "
+        "mean of 17",
         choices=tuple(SAMPLES), words=QUALITY_WORDS, title="Anti-aliasing", basic=True,
     )  # fmt: skip
     color_by: str = param(
@@ -78,7 +79,7 @@ class Look:
     )
     color_map: str = param(
         "batlow",
-        "Colour map of numbers",
+        "Colour map for numbers",
         title="Colour map",
         choices=COLOR_MAPS,
         group="Colour",
@@ -87,28 +88,28 @@ class Look:
     )
     range: str = param(
         "sequence",
-        "Whose values the colour map spans, but for ends that are given: of all frames, so that a colour is "
-        "the same value in each, or of each frame",
+        "Values that the colour map spans. sequence: those of all frames, so that a colour means one "
+        "value; frame: those of each frame",
         choices=tuple(RANGE_WORDS), words=RANGE_WORDS, group="Colour", unless=_UNRANGED, basic=True,
     )  # fmt: skip
     low: float | None = param(
-        None, "Value at the map's start; auto: from the data",
+        None, "Value at the start of the colour map; auto: from the data",
         type=float, group="Colour", unless=_UNMAPPED, basic=True,
     )  # fmt: skip
     high: float | None = param(
-        None, "Value at the map's end; auto: from the data",
+        None, "Value at the end of the colour map; auto: from the data",
         type=float, group="Colour", unless=_UNMAPPED, basic=True,
     )  # fmt: skip
     up: str = param(
         "+y",
-        "The axis that points up, and that height is measured along: ±x, ±y, ±z, or three numbers",
+        "Axis that points up, along which height is measured: ±x, ±y, ±z, or three numbers",
         group="Colour",
     )
     plain: str = param(
-        "#c8c2b8", "Colour of points that have none, #rrggbb",
+        "#c8c2b8", "Colour of points without a colour, #rrggbb",
         title="Surface colour", group="Colour", basic=True,
     )  # fmt: skip
-    background: str = param("#1a1c20", "Background, #rrggbb or #rrggbbaa", group="Colour", basic=True)
+    background: str = param("#1a1c20", "Background colour, #rrggbb or #rrggbbaa", group="Colour", basic=True)
     holes: bool = param(
         False,
         f"Paint holes red: gaps of up to {2 * HOLE_REACH} pixels between what is shown",
@@ -118,30 +119,34 @@ class Look:
         basic=True,
     )
     light: str = param(
-        "auto", "flat: none; head: from the eye; fixed: from azimuth and elevation",
+        "auto", "flat: no light; head: light from the viewer; fixed: light from an azimuth and an elevation",
         choices=("auto", "flat", "head", "fixed"), words=LIGHT_WORDS, group="Light", basic=True,
     )  # fmt: skip
     azimuth: float = param(
-        -35.0, "Where the fixed light stands",
+        -35.0, "Azimuth of the fixed light",
         low=-180, high=180, unit="degrees", group="Light", when=_FIXED, basic=True,
     )  # fmt: skip
     elevation: float = param(
-        40.0, "How high the fixed light stands",
+        40.0, "Elevation of the fixed light",
         low=-90, high=90, unit="degrees", group="Light", when=_FIXED, basic=True,
     )  # fmt: skip
-    ambient: float = param(0.25, "Light from everywhere", low=0, high=1, group="Light", unless=_FLAT)
-    diffuse: float = param(0.75, "Phong's diffuse share", low=0, high=1, group="Light", unless=_FLAT)
-    specular: float = param(0.12, "Phong's specular share", low=0, high=1, group="Light", unless=_FLAT)
-    shininess: float = param(24.0, "Phong's exponent", low=1, high=200, group="Light", unless=_FLAT)
+    ambient: float = param(0.25, "Ambient light", low=0, high=1, group="Light", unless=_FLAT)
+    diffuse: float = param(
+        0.75, "Diffuse share of Phong lighting", low=0, high=1, group="Light", unless=_FLAT
+    )
+    specular: float = param(
+        0.12, "Specular share of Phong lighting", low=0, high=1, group="Light", unless=_FLAT
+    )
+    shininess: float = param(24.0, "Exponent of Phong lighting", low=1, high=200, group="Light", unless=_FLAT)
     eye_dome: bool | None = param(
-        None, "Darken edges where the depth steps back; auto: only where nothing is lit",
+        None, "Darken edges where the depth steps back; auto: if the picture has no other light",
         type=bool, title="Edge shading (eye-dome)", group="Light", basic=True,
     )  # fmt: skip
     eye_dome_strength: float = param(
-        1.0, "Strength of eye-dome lighting", low=0, high=20, group="Light", when=_EYE_DOME
+        1.0, "Strength of the edge shading", low=0, high=20, group="Light", when=_EYE_DOME
     )
     eye_dome_radius: int = param(
-        1, "Reach of eye-dome lighting", low=1, high=16, unit="px", group="Light", when=_EYE_DOME
+        1, "Width of the edge shading", low=1, high=16, unit="px", group="Light", when=_EYE_DOME
     )
 
     @property

@@ -2,43 +2,43 @@
 
 A backend answers one question: which surface does each pixel see? Its module has
 
-    a docstring          the first line says in the panel what it is
+    a docstring          the first line appears in the panel and says what the backend draws
     TITLE                its name in the panel
-    GOOD_FOR             what to choose it for, in a few words, such as "Range images; fills holes"
+    GOOD_FOR             a few words on when to choose it, such as "Range images; fills holes"
     Params               a frozen dataclass of parameters (see viewer/params.py)
-    needs(pose, params) -> what the pose must have: "normals" and "radii" of its points are estimated where
-                         they are missing; "views": range views, without which it cannot be drawn;
-                         where it names these alone, rows are samples of them and no point is read
+    needs(pose, params) -> names of what the pose must have. "normals" and "radii": Scan4D estimates them if
+                         the scan lacks them. "views": the pose must have range views. ("views",) alone means
+                         that rows are samples of the views and that no point is read
     draw(gpu_pose, frame, surface) -> bool
-                         on the GL thread: write `surface.depths` and `surface.rows`, and what it has of its
-                         own (`Surface.own`); True if a later call would refine the picture
+                         runs on the GL thread; writes `surface.depths`, `surface.rows` and the channels of
+                         its own (`Surface.own`). True if a later call would refine the picture
 
-and, where it prepares something for a pose,
+A backend that prepares data for a pose also has
 
     derive(pose, params) -> arrays      CPU only, on any thread
     upload(gpu, arrays) -> derived      GL thread; `derived.nbytes` and `derived.release()`
 
-which `draw` then finds as `frame.derived`. A window runs `derive` in a process of its own, or, with
-DERIVES_ON_THREAD = True, on a thread, which is sooner done: for what lets go of the interpreter's lock.
-With DERIVED_BY_CAMERA = True it is derive(pose, params, view), and made for each view: the last few are kept.
+`draw` gets the result as `frame.derived`. A window runs `derive` in a process of its own. With
+DERIVES_ON_THREAD = True it runs on a thread, which starts sooner; use it for code that releases the
+interpreter's lock. With DERIVED_BY_CAMERA = True the call is derive(pose, params, view), once for each view;
+the last few results are kept.
 
-It may declare
+Optional declarations:
 
-    ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" where it says nothing
-    BLENDS               True: what a pixel shows may be of several points
-    KEEPS                True: moving pictures of a share of the points draw again what the one before showed
-    FILLS                True: pixels may be filled that no point gave
-    FINDS_NORMALS        True: it writes normals of its own, so that looks need none of the pose
-    VALUES               numbers that it finds for the rows that it draws, for looks to colour by:
+    ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" by default
+    BLENDS               True: a pixel may show a blend of several points
+    KEEPS                True: in motion, a picture of a share of the points adds those of the last picture
+    FILLS                True: it may fill pixels that no point covers
+    FINDS_NORMALS        True: it writes normals of its own, so that a look needs no normals of the pose
+    VALUES               numbers that it computes for its rows, for looks to colour by:
                          name -> `ValueKind`; see `Surface.wanted`
-    suits(pose) -> Suited   how well it does as the default for a scan; None where it does not
-    offers(pose) -> several   values in place of its defaults, by name, with each of which it draws the scan
-                         from what is stored, nothing being prepared: what is chosen automatically for a time
-                         or an error (viewer/choice) is one of these
-    KEPT                 parameter -> why its default stays where a benchmark finds a value that beats it
+    suits(pose) -> Suited   how well it works as the default for a scan; None if it does not
+    offers(pose) -> several   sets of parameter values that draw the scan without preparation. The automatic
+                         choice for a time or an error (viewer/choice) picks one of these sets
+    KEPT                 parameter -> why its default stays although a benchmark finds a better value
     LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`, or several
 
-Names that begin with an underscore are no backends. No list of backends exists anywhere else.
+A module whose name begins with an underscore is no backend. No list of backends exists anywhere else.
 """
 
 from __future__ import annotations
@@ -61,14 +61,14 @@ from ..scan.pose import Pose
 from ..view import View
 
 ROWS = ("points", "octants", "samples")
-SHARES = (0.5, 0.25, 0.1)  # levels of detail that are chosen automatically
-_MANY = 200_000  # points of a scan, from which on they are
-CHANGES = ("pose", "camera", "parameters", "size", "values")  # of one picture against the one before
+SHARES = (0.5, 0.25, 0.1)  # levels of detail that the automatic choice may take
+_MANY = 200_000  # least number of points of a scan for these levels
+CHANGES = ("pose", "camera", "parameters", "size", "values")  # what can differ from the last picture
 
 
 class Suited(NamedTuple):
-    """How well a backend does as the default for a scan. rank: against others, the highest is taken. params:
-    the values in place of its defaults with which it does, by name."""
+    """How well a backend works as the default for a scan. rank: Scan4D takes the backend of the highest rank.
+    params: values that replace its defaults, by name."""
 
     rank: int
     params: Mapping[str, object] = {}
@@ -76,11 +76,11 @@ class Suited(NamedTuple):
 
 @dataclass(frozen=True)
 class Limit:
-    """Looser bound of a row of the stability suite whose own cannot be held in principle.
+    """A looser bound for a row of the stability suite, where the algorithm cannot keep the suite's own bound.
 
-    pixels: the share of the pixels that may be apart by more than the suite's coarse steps. reason: why
-    finer ones cannot be held; the same words for the same principle. when: parameters -> the values of them
-    with which it cannot be held; empty: any.
+    pixels: the share of the pixels that may differ by more than the suite's coarse steps. reason: why the
+    algorithm cannot do better; the same words for the same principle. when: parameter -> the values for which
+    the limit applies; empty: all values.
     """
 
     pixels: float
@@ -88,28 +88,28 @@ class Limit:
     when: Mapping[str, tuple[Any, ...]] = field(default_factory=dict)
 
     def applies(self, params: object) -> bool:
-        """Whether it does with these parameters of the backend."""
+        """Whether the limit applies to these parameters of the backend."""
         return all(getattr(params, name) in values for name, values in self.when.items())
 
 
 # Reasons of limits that several backends have.
 AROUND_ALL = (
-    "octants and sectors divide the cube or the directions around all points, upright: with others, or "
-    "turned ones, points lie in other ones"
+    "octants divide the upright cube around all points, sectors the directions to them: other or turned "
+    "points give other octants and sectors"
 )
 NO_SPACING = (
-    "points are drawn as large as they lie apart, which a line of them end on, or one alone, does not tell"
+    "points are drawn as large as their spacing, which is unknown for one point or a line seen end on"
 )
-NO_DETAIL = "what is divided is the whole scan: a detail, tiny beside it, is within few of the parts"
+NO_DETAIL = "octants and sectors divide the whole scan: a tiny detail lies within few of them"
 
 
 def share_param(default: float | None = 1.0, auto: str = "", group: str = "") -> Any:
-    """The parameter `share` of a backend: a coarser level of detail. Whatever draws it finds the share in
-    `FrameView.share`, with that of a preview. auto: what None stands for."""
+    """The parameter `share` of a backend: a coarser level of detail. `FrameView.share` is this share times
+    that of a preview. auto: the meaning of None, in words."""
     return param(
         default,
-        "Share of the points that are drawn, evenly chosen and larger to match; less is faster and coarser"
-        + (f"; auto: {auto}" if auto else ""),
+        "Share of the points to draw, chosen evenly and enlarged to match. A smaller share is faster and "
+        "coarser" + (f"; auto: {auto}" if auto else ""),
         type=float,
         low=1e-3,
         high=1.0,
@@ -119,13 +119,13 @@ def share_param(default: float | None = 1.0, auto: str = "", group: str = "") ->
 
 
 def with_levels(pose: Pose, *offered: dict[str, object]) -> tuple[dict[str, object], ...]:
-    """The values that a backend offers, each with all points and, of a scan of many, with shares of them."""
+    """The offered values, each with all points and, for a large scan, with shares of the points."""
     levels = SHARES if pose.count >= _MANY else ()
     return (*offered, *({**values, "share": share} for values in offered for share in levels))
 
 
 class Derived(Protocol):
-    """Data that a backend prepared for a pose and put on the GPU."""
+    """Data on the GPU that a backend prepared for a pose."""
 
     nbytes: int
 
@@ -135,18 +135,16 @@ class Derived(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FrameView:
-    """Order for a frame, as a backend gets it: a view, its own parameters, and what it derived.
+    """Order for one frame, as a backend gets it: a view, its own parameters, and its derived data.
 
-    share: of the points that need to be drawn, less than 1 while the picture moves and all would
-    take too long. A backend that leaves some out says that a later call would refine the picture,
-    and counts them (`Points.of` does); one that is fast enough may draw all. budget_ms: after which a
-    backend that can draw something coarser does, and says that a later call would refine it; None: never.
-    changed: what of `CHANGES` is another than in the call before for this surface; all in the first one, and
-    after one that failed. "values": what `row_values` and `resolve` of the Surface give, by look and layers.
-    before: the picture before of the same pose with the same parameters, whose points a moving picture may
-    draw again where it draws a share; see gpu/kept.py. moving: whether other pictures will follow at once; a
-    backend that then draws more simply says so by `surface.stats.simplified`, and is called again at
-    rest.
+    share: share of the points to draw, less than 1 while the picture moves and all points take too long.
+    A backend that leaves points out returns True and counts them (`Points.of` does). A fast backend may draw
+    all points. budget_ms: time after which a backend draws something coarser, if it can, and returns True;
+    None: no limit. changed: the members of `CHANGES` that differ from the last call for this surface; all of
+    them in the first call and after a failed one. "values" stands for the results of `Surface.row_values` and
+    `Surface.resolve`. moving: whether other pictures follow at once. A backend that then draws something
+    simpler sets `surface.stats.simplified`; it is called again at rest. before: the last picture of this pose
+    with these parameters; a moving picture of a share may draw its points again (gpu/kept.py).
     """
 
     view: View
@@ -176,12 +174,12 @@ class Backend:
 
     @property
     def good_for(self) -> str:
-        """Words on what to choose it for."""
+        """A few words on when to choose it."""
         return self.module.GOOD_FOR
 
     @property
     def help(self) -> str:
-        """One line on what it does."""
+        """One line on what it draws."""
         return (self.module.__doc__ or "").splitlines()[0]
 
     @property
@@ -196,17 +194,17 @@ class Backend:
 
     @property
     def blends(self) -> bool:
-        """Whether what a pixel shows may be of several points."""
+        """Whether a pixel may show a blend of several points."""
         return getattr(self.module, "BLENDS", False)
 
     @property
     def keeps(self) -> bool:
-        """Whether moving pictures of a share of the points draw again what the one before showed."""
+        """Whether a moving picture of a share of the points also draws those of the last picture."""
         return getattr(self.module, "KEEPS", False)
 
     @property
     def fills(self) -> bool:
-        """Whether pixels may be filled that no point gave."""
+        """Whether the backend may fill pixels that no point covers."""
         return getattr(self.module, "FILLS", False)
 
     @property
@@ -216,15 +214,15 @@ class Backend:
 
     @property
     def values(self) -> Mapping[str, ValueKind]:
-        """Numbers that it finds for the rows that it draws, by name."""
+        """Numbers that the backend computes for its rows, by name."""
         return getattr(self.module, "VALUES", {})
 
     def suits(self, pose: Pose) -> Suited | None:
-        """How well it does as the default for a scan, None where it does not."""
+        """How well it works as the default for a scan; None if it does not."""
         return self.module.suits(pose) if hasattr(self.module, "suits") else None
 
     def offers(self, pose: Pose) -> tuple[Mapping[str, object], ...]:
-        """Values in place of its defaults, each a way to draw a scan that may be chosen for time or error."""
+        """Sets of parameter values that the automatic choice for a time or an error may take."""
         return self.module.offers(pose) if hasattr(self.module, "offers") else ()
 
     @property
@@ -237,7 +235,7 @@ class Backend:
 
     @property
     def kept(self) -> Mapping[str, str]:
-        """Why defaults stay that another value beats on some scene, by parameter."""
+        """Why a default stays although another value beats it on some scene, by parameter."""
         return getattr(self.module, "KEPT", {})
 
     def params(self, values: Mapping[str, object] | None = None) -> Any:

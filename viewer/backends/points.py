@@ -1,6 +1,6 @@
-"""Each point as a square of pixels; the nearest wins. The fastest, and exact.
+"""Each point as a square of pixels; the nearest wins. The fastest renderer, with exact positions.
 
-Where surfaces have gaps between their points, `hide_hidden` leaves out what is seen through these.
+A surface can have gaps between its points. `hide_hidden` leaves out the points seen through these gaps.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class Params:
 
     point_size: int = param(
         1,
-        "Edge of a point's square; 0: as far as the next point",
+        "Edge of a point's square; 0: the distance to the next point",
         low=0,
         high=LARGEST_SQUARE,
         unit="px",
@@ -35,7 +35,7 @@ class Params:
     )
     hide_hidden: bool = param(
         False,
-        "Leave out points that a surface through others hides, as nearly as points alone tell",
+        "Leave out points behind a surface that other points form. An estimate from the points alone",
         key="Shift+V",
         title="Hide what lies behind",
         sweep=(False, True),

@@ -32,8 +32,8 @@ class Params:
 
     quality: str = param(
         "table",
-        "table: shapes, places and depths in the steps of the paper; exact: outlines are the discs' own, and "
-        "depth follows their planes",
+        "table: shapes, places and depths in the steps of the paper; exact: exact outlines, and depths "
+        "along the disc",
         choices=("table", "exact"),
         title="Code table",
         sweep=("table", "exact"),
@@ -44,7 +44,7 @@ class Params:
         17, "Number of radii in the table", low=2, high=65, group="Words", when={"quality": ("table",)}
     )
     size_parts: int = param(
-        2, "Radii of the table to a pixel", low=1, high=8, group="Words", when={"quality": ("table",)}
+        2, "Radii of the table for each pixel", low=1, high=8, group="Words", when={"quality": ("table",)}
     )
     normals: int = param(
         61,
@@ -56,7 +56,7 @@ class Params:
     )
     normal_parts: int = param(
         5,
-        "Values of n'x and n'y to 1, which is a tilt by 45 degrees",
+        "Values of n'x and n'y from 0 to 1, a tilt of 45 degrees",
         low=1,
         high=20,
         group="Words",
@@ -64,16 +64,22 @@ class Params:
     )
     radius: str = param(
         "own",
-        "own: the scan's own, estimated where it has none; uniform: one for all",
+        "own: the scan's own radii, estimated if missing; uniform: one radius for all",
         choices=("own", "uniform"),
         group="Splats",
     )
     radius_scale: float = param(
-        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group="Splats", basic=True
+        1.0,
+        "Factor on the radius of splats",
+        low=0.01,
+        high=100,
+        sweep=(0.5, 1.0, 2.0),
+        group="Splats",
+        basic=True,
     )
-    cull_back: bool = param(False, "Leave out discs that face away", group="Splats")
+    cull_back: bool = param(False, "Leave out discs that face away from the viewer", group="Splats")
     window: int = param(
-        16, "Lines of the window that slides down the picture", low=8, high=64, affects="speed", group="Speed"
+        16, "Number of picture lines that are drawn at once", low=8, high=64, affects="speed", group="Speed"
     )
 
     @property

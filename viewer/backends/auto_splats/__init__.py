@@ -1,9 +1,9 @@
-"""Splats from bare positions, found anew for each picture from the points that it shows.
+"""A smooth surface from points without normals: each picture fits splats to the points that it shows.
 
-Preiner 2012. Points are projected; each one that is seen finds its nearest neighbors among them in space, a
-plane through these, and a splat as large as they are apart. Neighborhoods are exact, so that they do not
-change with the view (`neighborhoods.py`); points that another hides take part, so that none is missed at
-outlines.
+Preiner 2012. The renderer projects the points. Each visible point finds its nearest neighbours in space, fits
+a plane through them, and gets a splat as large as the distance between them. The search is exact
+(`neighborhoods.py`), so neighbourhoods do not change with the view. Points that another point hides take part
+in the search, so that neighbourhoods at outlines are complete.
 """
 
 from __future__ import annotations
@@ -27,13 +27,14 @@ GOOD_FOR = "Best look for points without normals"
 BLENDS = True
 FINDS_NORMALS = True
 
-_HIDDEN_COPIES = "points in one place are one where they are seen; hidden ones are neighbors each"
+_HIDDEN_COPIES = "visible copies of a point count as one neighbour, hidden copies as several"
 KEPT = {
-    "adaptive": "normals of other scans: 1.3° in place of 1.4° on the bunny, 2.6° of 3.1° on the armadillo",
-    "hidden_neighbors": "outlines of other scans: spill of 1.2 % in place of 1.8 % on the bunny, 2.2 % of "
-    "3.0 % on the armadillo",
-    "instancing": "on software drivers auto is tiles, so what their times differ by is no gain; on others "
-    "it is the fastest",
+    "adaptive": "it improves normals of other scans: 1.3° instead of 1.4° on the bunny, 2.6° instead of 3.1° "
+    "on the armadillo",
+    "hidden_neighbors": "it improves outlines of other scans: spill of 1.2 % instead of 1.8 % on the bunny, "
+    "2.2 % instead of 3.0 % on the armadillo",
+    "instancing": "on software drivers auto means tiles, so the difference is noise; on hardware auto means "
+    "the fastest way",
 }
 LIMITS = {
     "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
@@ -42,7 +43,7 @@ LIMITS = {
 }
 
 _FEW = 200  # points
-_NEIGHBORS, _SPLATS, _SPEED = "Neighbors", "Splats", "Speed"
+_NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,8 @@ class Params:
 
     k: int = param(
         10,
-        "Points of a neighborhood, the point itself among them: more smooth away noise, fewer keep details",
+        "Number of points in a neighbourhood, including the point itself. A larger number smooths noise, "
+        "a smaller one keeps detail",
         low=3,
         high=MOST_NEIGHBORS,
         sweep=(6, 10, 20),
@@ -61,60 +63,73 @@ class Params:
     )
     adaptive: bool = param(
         True,
-        "Normals go by as few of these as tell the plane in spite of noise",
+        "Fit each normal to as few of the k neighbours as the noise allows",
         group=_NEIGHBORS,
         sweep=(True, False),
     )
     hidden_neighbors: bool = param(
-        True, "Points that another one of about the same surface hides are neighbors too", group=_NEIGHBORS
+        True,
+        "Count a point as a neighbour even if a nearer point of the same surface covers its pixel",
+        group=_NEIGHBORS,
     )
-    outliers: bool = param(False, "Show points that have no neighbors near", key="Shift+O", group=_NEIGHBORS)
+    outliers: bool = param(False, "Show points without close neighbours", key="Shift+O", group=_NEIGHBORS)
     expansions: int = param(
         3,
-        "How often the usual radius is doubled in search of a second point, before one counts as an outlier",
+        "How many times the search doubles its radius before a point without a neighbour counts as an "
+        "outlier",
         low=0,
         high=10,
         group=_NEIGHBORS,
     )
     growth: float = param(
         4.0,
-        "A neighborhood ends before k where its area could be so many times as large without a further point",
+        "End a neighbourhood with fewer than k points if its area can grow by this factor without "
+        "reaching another point",
         low=1,
         high=100,
         group=_NEIGHBORS,
     )
     orient: str = param(
         "eye",
-        "Which side normals point to: the eye's, or that of the range view that saw the point",
+        "Side that normals point to: the eye, or the scanner of the range view that saw the point",
         choices=("eye", "scanner"),
         group=_NEIGHBORS,
     )
     passes: str = param(
         "two",
-        "one: the nearest splat is seen; two: those close behind it are blended with it",
+        "one: show the nearest splat; two: blend the nearest splat with those close behind it",
         choices=("one", "two"),
         group=_SPLATS,
     )
     elliptical: bool = param(
-        False, "Splats are longer where neighbors are farther apart, else round", group=_SPLATS
+        False,
+        "Stretch splats along the direction in which neighbours lie farther apart; off: round splats",
+        group=_SPLATS,
     )
     radius_scale: float = param(
-        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group=_SPLATS, basic=True
+        1.0,
+        "Factor on the radius of splats",
+        low=0.01,
+        high=100,
+        sweep=(0.5, 1.0, 2.0),
+        group=_SPLATS,
+        basic=True,
     )
     refine: bool = param(
         True,
-        "Make splats of points that others hide as small as those: they reach beyond outlines",
+        "Shrink the splats of hidden points to the size of the splats in front, so that they do not show "
+        "beyond outlines",
         group=_SPLATS,
     )
     cull: bool = param(
         True,
-        "Leave out points far behind the nearest around them, until they turn out to be seen",
+        "Skip points far behind the nearest ones around them, until a picture needs them",
         affects="speed",
         group=_SPEED,
     )
     instancing: str = param(
         "auto",
-        "How points become splats. auto: what is fastest on this device",
+        "How the GPU draws splats. auto: the fastest way on this device",
         choices=("auto", *WAYS),
         affects="speed",
         group=_SPEED,

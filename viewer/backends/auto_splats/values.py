@@ -11,18 +11,17 @@ from .neighborhoods import Neighborhoods
 
 VALUES = {
     "neighborhood": ValueKind(
-        "Radius of the neighborhood that a splat is fitted to: how sparse points are",
+        "Radius of the neighbourhood of a splat. It shows how sparse the points are",
         is_length=True,
         is_log=True,
     ),
-    "curvature": ValueKind(
-        "Share of a neighborhood's variance that is across its plane: 0 where flat, at most 1/3"
-    ),
+    "curvature": ValueKind("Share of the neighbourhood's variance across its plane: 0 if flat, at most 1/3"),
     "splat_radius": ValueKind(
-        "Radius of a splat, the shorter one of an ellipse", is_length=True, is_log=True
+        "Radius of a splat; of an ellipse, the shorter half-axis", is_length=True, is_log=True
     ),
     "outlier": ValueKind(
-        "1 where no neighbor is near, else 0; `outliers` shows such points", range=(0.0, 1.0)
+        "1 if a point has no close neighbour, else 0. The parameter `outliers` shows such points",
+        range=(0.0, 1.0),
     ),
 }
 

@@ -1,8 +1,8 @@
-"""Discs from tables of shapes, as code words of 64 bits, drawn by whole numbers in bands.
+"""Discs as 64-bit code words from a table of shapes, drawn in whole numbers.
 
-Maršík 2010: points are encoded line by line, with the shape of their disc by its quantised size and normal;
-an engine draws the words in a window that slides down the picture. Here a work group draws each band of it.
-See viewer/codewords/ for words, tables and lighting, and docs/codeword.md.
+Maršík 2010. The encoder turns each disc into code words, one for each picture line. A word names the shape of
+the disc by its size and normal, in steps. An engine draws the words in a window that slides down the picture.
+Here each GPU work group draws one band of the picture. viewer/codewords/ has the words, tables and lighting.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ TITLE = "Code words"
 GOOD_FOR = "Research: discs from compact tables"
 
 _HELD = (
-    "words hold places, shapes, depths and colours in steps: the last bit moves some by a whole step, and "
-    "what else there is moves the steps"
+    "words store places, shapes, depths and colours in steps: the last bit can move a value by a whole step, "
+    "and other points move the steps"
 )
 _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
 LIMITS = {
@@ -57,8 +57,8 @@ class Params(settings.Params):
 
     lighting: str = param(
         "common",
-        "common: colours and light of all backends; own: Phong by the words' indices, materials and whole "
-        "numbers, one colour for each disc",
+        "common: the colours and light of all renderers; own: Phong lighting in whole numbers with "
+        "indexed materials, one colour a disc",
         choices=("common", "own"),
         sweep=("common", "own"),
         group="Light",

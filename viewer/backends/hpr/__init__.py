@@ -1,11 +1,12 @@
-"""Only the points that the eye sees, found without normals or faces: hidden ones are removed.
+"""Only the points that the viewer can see; needs no normals and no faces.
 
-Machado e Silva 2014: the operator of Katz 2007, for which the points on the hull of the flipped scan are
-visible, by sectors of directions, each of which keeps the point whose flip lies farthest along it (3 to 5).
-Its radius and the number of sectors and steps are found as in 6. Unlike there, angles are divided evenly to
-both sides, so that sectors are alike up to 45 degrees off the middle, and an eye nearer than that has six
-such grids around it, as the faces of a cube; and points that are no sector's are compared with the candidates
-around them, which keeps those that share a sector and needs fewer of these.
+Machado e Silva 2014 approximates the operator of Katz 2007: flip the points about a sphere around the eye; a
+point is visible if its flip lies on the convex hull. Directions are divided into sectors, and each sector
+keeps the point whose flip lies farthest along it (sections 3 to 5). The radius, the number of sectors and the
+number of steps follow section 6. Scan4D differs in two ways. It divides angles evenly, so that sectors have
+about the same size up to 45 degrees off the middle, and uses six such grids, like the faces of a cube, around
+an eye near the scan. It also compares points that lost their sector with the candidates around them, which
+keeps points that share a sector and needs fewer sectors.
 """
 
 from __future__ import annotations
@@ -71,8 +72,8 @@ class Params:
 
     output: str = param(
         "splats",
-        "What is drawn of the visible points: they themselves; faces between neighbours; splats; or what "
-        "closes the picture between them",
+        "What to draw of the visible points. points: the points; faces: triangles between neighbours; "
+        "splats: discs; reconstruction: points, with the gaps between them filled",
         choices=OUTPUTS,
         sweep=("faces", "reconstruction", "splats"),
         title="Shown as",
@@ -81,7 +82,7 @@ class Params:
     )
     point_size: int = param(
         1,
-        "Edge of a point's square; 0: as far as the next point",
+        "Edge of a point's square; 0: the distance to the next point",
         low=0,
         high=32,
         unit="px",
@@ -90,7 +91,7 @@ class Params:
     )
     longest: float = param(
         6.0,
-        "Faces have no edge longer than so many times the distance between points at either end",
+        "Longest edge of a face, in distances between points",
         low=1,
         high=1000,
         sweep=(3, 6, 12),
@@ -108,8 +109,8 @@ class Params:
     )
     mode: str = param(
         MODES[0],
-        "hull: points of the hull of the flipped ones; combined: those that no others cover, by how far "
-        "apart they lie, which finds what the hull drops in folds and hides what it shows behind gaps",
+        "hull: the points on the hull of the flipped points; combined: the points that no discs around "
+        "other points cover. combined keeps points in folds and hides points behind gaps",
         choices=MODES,
         title="Visible by",
         basic=True,
@@ -117,7 +118,7 @@ class Params:
     )
     quality: float = param(
         _QUALITY,
-        "Sectors, as many times those of which half would have a point",
+        "Number of sectors, relative to the number of which half would hold a point",
         title="Sector density",
         low=0.05,
         high=64,
@@ -128,8 +129,8 @@ class Params:
     )
     depth: float = param(
         _DEPTH,
-        "How far behind a surface points are hidden by it, in distances between points; more shows deeper "
-        "folds, and more of what lies behind gaps",
+        "How far behind a surface points still count as hidden, in distances between points. A larger "
+        "value shows deeper folds and more of what lies behind gaps",
         low=1e-3,
         high=1e6,
         title="Hides from",
@@ -140,8 +141,8 @@ class Params:
     )
     radius: float | None = param(
         None,
-        "R, where points are flipped, in distances of the farthest point; auto: from the depth and how "
-        "densely points lie",
+        "Radius R of the flip, in distances from the eye to the farthest point; auto: from the depth and "
+        "the density of points",
         type=float,
         low=1,
         high=1e9,
@@ -150,7 +151,7 @@ class Params:
     )
     sectors: int | None = param(
         None,
-        "Sectors in all, k; auto: from the quality",
+        "Total number of sectors, k; auto: from the quality",
         type=int,
         low=1,
         high=_MOST_SECTORS,
@@ -159,7 +160,7 @@ class Params:
     )
     steps: int | None = param(
         None,
-        "Sectors that a candidate reaches beyond its own; auto: as many as lie between visible points",
+        "How many sectors a candidate can reach beyond its own; auto: as many as lie between visible points",
         type=int,
         low=0,
         high=UNLIMITED,

@@ -1,9 +1,9 @@
-"""Laplacian projection: several range views merged without seams, band by band.
+"""Several range views merged without visible seams, one frequency band at a time.
 
-Farooq 2013, chapter 6, and the GRAPP 2009 paper behind it; Burt and Adelson 1983. Each view is a picture of
-the surface that pixels show; the pictures are merged by the multi-resolution spline: per band of frequencies,
-with weights whose transition is as wide as the band's waves. Where one view wins, its details are shown
-alone, so nothing is seen twice; where views differ in gain or colour, that fades over the coarsest band.
+Laplacian projection: Farooq 2013, chapter 6, and the GRAPP 2009 paper behind it; Burt and Adelson 1983. Each
+view gives a picture of the visible surface. The multi-resolution spline merges these pictures band by band;
+the transition between two views is as wide as the waves of the band. A view that wins a place gives its
+detail alone, so nothing appears twice. Differences in gain or colour fade over the coarsest band.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ class Params:
 
     levels: int = param(
         6,
-        "Bands, each of half the frequency of the one before, the first of single pixels",
+        "Number of frequency bands. The first band holds detail of single pixels, each further band half "
+        "the frequency of the one before",
         low=3,
         high=6,
         group=_BANDS,
@@ -45,49 +46,49 @@ class Params:
     )
     bands: str = param(
         "picture",
-        "What bands are of: the picture that each view gives, or levels of the captured image, whose samples "
-        "are drawn as Gaussians",
+        "Where bands come from. picture: the picture that each view gives; capture: the captured image, "
+        "whose samples are drawn as Gaussians",
         choices=("picture", "capture"),
         group=_BANDS,
         sweep=("picture", "capture"),
     )
     kernel: str = param(
         "5x5",
-        "What the levels of pictures are made by: Burt and Adelson's filter, or one of spread 0.5",
+        "Filter that makes coarser levels. 5x5: Burt and Adelson's; 3x3: a Gaussian of spread 0.5",
         choices=tuple(FILTERS),
         group=_BANDS,
         sweep=("5x5", "3x3"),
     )
-    detail: float = param(1.0, "Gain of the finest band", low=0, high=4, group=_BANDS)
+    detail: float = param(1.0, "Factor on the finest band", low=0, high=4, group=_BANDS)
     weights: str = param(
         "mixed",
-        "Whose bands are shown: those of the view that sees a place best, those of all by how well they do, "
-        "or the best's but for the coarsest",
+        "Which views give the bands. crisp: the best view at each place; soft: all views, weighted by "
+        "quality; mixed: the best view, but all views in the coarsest band",
         choices=("mixed", "crisp", "soft"),
         group=_BANDS,
         sweep=("mixed", "crisp", "soft"),
     )
     light: str = param(
         "logarithm",
-        "What bands are of: the logarithm of light, in which views whose gains differ differ by the same "
-        "everywhere, or light",
+        "Scale on which bands are computed. logarithm: a view with another gain differs by a constant; "
+        "linear: linear light",
         choices=("logarithm", "linear"),
         group=_BANDS,
         sweep=("logarithm", "linear"),
     )
     tolerance: float = param(
         4.0,
-        "How far apart surfaces of two views may be to be merged, in samples",
+        "Largest distance at which surfaces of two views are merged, in samples",
         low=0,
         high=100,
         unit="samples",
         group=_VIEWS,
     )
-    cull_back: bool = param(False, "Leave out surfaces of range images that show their backs", group=_VIEWS)
+    cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
     quality: str = param(
         "fast",
-        "How a pixel looks up what a view sees where samples lie closer than pixels: at one place, between "
-        "two levels; or, for pictures that can wait, at four places of a finer level",
+        "Samples per pixel where samples lie closer than pixels. fast: one place, between two levels; "
+        "fine: four places of a finer level, for pictures that can wait",
         choices=("fast", "fine"),
         title="Texture sampling",
         group=_VIEWS,

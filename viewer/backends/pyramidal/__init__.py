@@ -1,7 +1,7 @@
-"""Pyramidal projection: the picture at several sizes, the holes of one filled from the next.
+"""A filled surface: holes between samples are filled from pictures of smaller size.
 
-Farooq 2013, chapters 4 to 6. Samples are scattered into the picture, and that is reduced to targets of half,
-a quarter, ... of its size; what the picture lacks shows through from the finest target that has it.
+Pyramidal projection, Farooq 2013, chapters 4 to 6. The renderer scatters samples into the picture and
+reduces it to targets of half, a quarter, ... of its size. A hole shows the finest target that covers it.
 """
 
 from __future__ import annotations
@@ -33,8 +33,10 @@ GOOD_FOR = "Range images; fills holes"
 FILLS = True
 BLENDS = True
 
-_BY_CELLS = "a pixel is filled by whole cells; at their edges the last bit tells which, and what encloses it"
-KEPT = {"fill": "holes of clouds; polygons of dense range views leave few to fill"}
+_BY_CELLS = (
+    "whole cells fill a pixel; at their edges the last bit decides which cells, and what encloses the pixel"
+)
+KEPT = {"fill": "point clouds have holes to fill; the polygons of dense range views leave few"}
 LIMITS = {
     "eye inside the cloud": Limit(0.01, _BY_CELLS),
     "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
@@ -63,21 +65,29 @@ class Params:
         title="Fill holes",
         basic=True,
     )
-    level_0: bool = param(True, "Show what was measured", key="0", group=_LEVELS)
-    level_1: bool = param(True, "Fill from half the size", key="1", group=_LEVELS, when=_FILLING)
-    level_2: bool = param(True, "Fill from a quarter of the size", key="2", group=_LEVELS, when=_FILLING)
-    level_3: bool = param(True, "Fill from an eighth of the size", key="3", group=_LEVELS, when=_FILLING)
-    level_4: bool = param(True, "Fill from a sixteenth of the size", key="4", group=_LEVELS, when=_FILLING)
+    level_0: bool = param(True, "Show the measured samples", key="0", group=_LEVELS)
+    level_1: bool = param(
+        True, "Fill holes from the picture of half the size", key="1", group=_LEVELS, when=_FILLING
+    )
+    level_2: bool = param(
+        True, "Fill holes from the picture of a quarter of the size", key="2", group=_LEVELS, when=_FILLING
+    )
+    level_3: bool = param(
+        True, "Fill holes from the picture of an eighth of the size", key="3", group=_LEVELS, when=_FILLING
+    )
+    level_4: bool = param(
+        True, "Fill holes from the picture of a sixteenth of the size", key="4", group=_LEVELS, when=_FILLING
+    )
     upsampling: str = param(
         "bilinear",
-        "How samples of a coarser level are blended",
+        "How a filled pixel is interpolated from samples of a coarser level",
         choices=("nearest", "bilinear", "bicubic"),
         group=_LEVELS,
         when=_FILLING,
     )
     step: float = param(
         6.0,
-        "Depth step between neighbours of one surface, in cells of their level",
+        "Depth step up to which neighbours belong to one surface, in cells of their level",
         low=0.1,
         high=100,
         group=_LEVELS,
@@ -85,8 +95,8 @@ class Params:
     )
     margin: float | None = param(
         None,
-        "How far outside its samples a surface is filled, in distances between samples; auto: 0.15 of those "
-        "that polygons join, 0.4 of others",
+        "How far filling extends beyond the samples of a surface, in distances between samples; auto: "
+        "0.15 for samples that polygons join, 0.4 for others",
         type=float,
         low=0,
         high=1,
@@ -95,7 +105,7 @@ class Params:
     )
     reach: float = param(
         2.25,
-        "How far a pixel between samples may lie from those that fill it, in distances between samples",
+        "Largest distance of a filled pixel from the samples that fill it, in distances between samples",
         low=0.1,
         high=100,
         group=_LEVELS,
@@ -103,7 +113,7 @@ class Params:
     )
     widest: float = param(
         1.0,
-        "Widest hole that is filled beyond the gaps between samples, in cells of its level",
+        "Widest hole that a level fills beyond the gaps between samples, in cells of the level",
         low=0,
         high=3,
         group=_LEVELS,
@@ -120,7 +130,7 @@ class Params:
     )
     tolerance: float = param(
         2.0,
-        "How far behind a nearer surface they lie, in cells of its level",
+        "How far behind a nearer surface a sample must lie to be hidden, in cells of its level",
         low=0,
         high=100,
         group=_HIDDEN,
@@ -129,17 +139,17 @@ class Params:
 
     neighbors: int = param(
         4,
-        "Samples of a range image so near to one of the nearer surface are not hidden by it",
+        "Samples of a range image this close to a sample of the nearer surface stay visible",
         low=0,
         high=100,
         unit="samples",
         group=_HIDDEN,
         when={"hide": (True,)},
     )
-    first_level: int = param(0, "The finest level of range images that is drawn", low=0, high=5, group=_VIEWS)
+    first_level: int = param(0, "Finest level of range images to draw", low=0, high=5, group=_VIEWS)
     primitive: str = param(
         "polygons",
-        "What samples of range images are drawn as",
+        "How samples of range images are drawn",
         choices=("points", "polygons"),
         group=_VIEWS,
         sweep=("points", "polygons"),
@@ -148,43 +158,43 @@ class Params:
         True, "Draw the level of range images whose samples fit the pixels", group=_VIEWS, affects="draw"
     )
     detail: float = param(
-        1.0, "Pixels between samples above which a finer level is drawn", low=0.25, high=16, unit="px",
-        group=_VIEWS, when={"lod": (True,)},
+        1.0, "Distance between samples, in pixels, above which a finer level is drawn",
+        low=0.25, high=16, unit="px", group=_VIEWS, when={"lod": (True,)},
     )  # fmt: skip
     filter: str = param(
         "box",
-        "What coarser levels of range images are made by",
+        "Filter that makes the coarser levels of range images",
         choices=tuple(_FILTERS),
         group=_VIEWS,
     )
     blend: str = param(
         "linear",
-        "Where several views see one surface: the mean of all, the best of them, or the nearest",
+        "Where several views see one surface. linear: mean of all views; best: the best view; nearest: "
+        "the nearest sample",
         choices=MODES,
         group=_VIEWS,
         sweep=("linear", "best", "nearest"),
     )
-    cull_back: bool = param(False, "Leave out surfaces of range images that show their backs", group=_VIEWS)
-    skip: bool = param(
-        True, "Leave out tiles of range images that no pixel shows", group=_VIEWS, affects="speed"
-    )
+    cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
+    skip: bool = param(True, "Skip tiles of range images that no pixel shows", group=_VIEWS, affects="speed")
     antialias: str = param(
         "off",
-        "Colours as sums of point spread functions, of samples that are drawn as points",
+        "Draw points as point spread functions and add up their colours. table: from a table; analytic: "
+        "computed for each point",
         choices=FUNCTIONS,
         group=_SMOOTHING,
         sweep=("off", "table", "analytic"),
     )
     kernel: str = param(
         "3x3",
-        "Pixels that a point spread function reaches",
+        "Size of a point spread function, in pixels",
         choices=KERNELS,
         group=_SMOOTHING,
         unless={"antialias": ("off",)},
     )
     fade: bool = param(
         False,
-        "Fade colours into the next coarser level as samples come to lie closer than pixels",
+        "Fade colours into the next coarser level as samples come closer together than pixels",
         group=_SMOOTHING,
         when={"lod": (True,)},
     )

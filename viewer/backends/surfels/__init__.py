@@ -1,7 +1,8 @@
-"""Each point as a disc that lies in the surface. Closes the gaps between points.
+"""Each point as a disc in the surface. Discs close the gaps between points.
 
-Slomp 2014, IV and V: a template quad, aligned to the normal, with a Gaussian mask that is cut
-off; in one pass, or in two that blend what overlaps. Elliptical where the scan has half-axes.
+Slomp 2014, sections IV and V: a square, aligned to the normal, with a Gaussian mask that is cut off. Discs
+are drawn in one pass, or in two passes that blend overlapping discs. They are elliptical if the scan stores
+half-axes.
 """
 
 from __future__ import annotations
@@ -38,8 +39,8 @@ BLENDS = FILLS = True
 
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
-    "splats drawn over each other let some of what is behind them through: how much goes by their radii, by "
-    "how often a point is there, and of two at one depth by the last bit"
+    "splats drawn over each other are partly transparent; their radii, the number of copies and, at equal "
+    "depths, the last bit decide how much shows through"
 )
 LIMITS = {
     "zoomed in on 10^-6 of the scan": Limit(0.0, _SEEN_THROUGH, _SORTED),
@@ -58,8 +59,8 @@ LIMITS = {
 }
 
 KEPT = {
-    "cull_back": "open scans, and eyes inside: 2.2 % of the pixels of the bunny, which has no base, show "
-    "what is behind; nothing that tells closed scans was both safe and faster (docs/surfels.md)"
+    "cull_back": "open scans, and eyes inside a scan: 2.2 % of the pixels of the bunny, which has no base, "
+    "show what is behind; no test for closed scans was both safe and faster (docs/surfels.md)"
 }
 
 _WAYS = ("tiles", *FEEDS)
@@ -78,19 +79,17 @@ class Params:
 
     passes: str = param(
         "auto",
-        "How splats that overlap become one surface. one: the nearest is seen, and where all are about a "
-        "pixel or less, the mean of those close behind it; two: those close behind it are blended with it; "
-        "auto: two, without enlarging any, but one where that is too slow for a picture that moves. "
-        "The others show why (letters: Slomp 2014, Fig. 3): one_blended (a); one_no_depth (b); visibility, "
-        "the first of two alone (c); two_large, the first enlarged as well (e); sorted, each over those "
-        "behind it",
+        "How overlapping splats become one surface. one: the nearest splat; two: the nearest, blended "
+        "with those close behind; auto: two without enlarging, or one if two is too slow in motion. The "
+        "others are the pictures of Slomp 2014, Fig. 3, for comparison: one_blended (a), one_no_depth "
+        "(b), visibility (c), two_large (e), and sorted, blended from back to front",
         choices=("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
         sweep=("auto", "one", "two"),
         group="Surface",
     )
     enlarge: float = param(
         2.0,
-        "Factor on splats in the second pass (f); 1: none (d)",
+        "Factor on the size of splats in the second pass (Fig. 3 f); 1: not enlarged (Fig. 3 d)",
         low=1.0,
         high=8.0,
         group="Surface",
@@ -98,7 +97,7 @@ class Params:
     )
     epsilon: float = param(
         1.0,
-        "How far behind the nearest splat others are blended with it, in its radii",
+        "How far behind the nearest splat others are blended with it, in radii of the nearest",
         low=0.0,
         high=100.0,
         group="Surface",
@@ -106,37 +105,43 @@ class Params:
     )
     radius: str = param(
         "auto",
-        "auto: the scan's own; where it has none, or they leave gaps, as large as the gaps round each point; "
-        "own: estimated where the scan has none; uniform: one for all",
+        "auto: the scan's own radii, enlarged if they leave gaps; without any, the size of the gaps around "
+        "each point; own: the scan's own, estimated if missing; uniform: one radius for all",
         choices=("auto", "own", "uniform"),
         group="Splats",
     )
     radius_scale: float = param(
-        1.0, "Factor on the radius", low=0.01, high=100, sweep=(0.5, 1.0, 2.0), group="Splats", basic=True
+        1.0,
+        "Factor on the radius of splats",
+        low=0.01,
+        high=100,
+        sweep=(0.5, 1.0, 2.0),
+        group="Splats",
+        basic=True,
     )
     mask_falloff: float = param(
         4.0,
-        "How fast the mask fades, exp(-falloff d^2), d = 1 at the radius",
+        "How fast the mask fades: exp(-falloff d^2), with d = 1 at the radius",
         low=0.1,
         high=100.0,
         group="Splats",
     )
     mask_cutoff: float = param(
         0.0183,
-        "Value of the Gaussian mask where the splat ends; it ends at its radius at the latest",
+        "Value of the mask at which a splat ends. It ends at its radius at the latest",
         low=0.0183,
         high=0.99,
         group="Splats",
     )
-    cull_back: bool = param(False, "Leave out surfels that face away", group="Splats")
+    cull_back: bool = param(False, "Leave out splats that face away from the viewer", group="Splats")
     share: float | None = share_param(
-        None, "all, or where software drivers have no room to list them, as many as these have", "Splats"
+        None, "all points, or as many as fit into the lists of a software driver", "Splats"
     )
     instancing: str = param(
         "auto",
-        "How points become splats. auto: what is fastest on this device; tiles: computed without quads; "
-        "the others: quads from a geometry shader, uniform blocks, buffer textures, vertex attributes or "
-        "pulled vertices",
+        "How the GPU draws splats. auto: the fastest way on this device; tiles: in a compute shader; the "
+        "others draw quads, from a geometry shader, uniform blocks, buffer textures, vertex attributes or"
+        " pulled vertices",
         choices=("auto", *_WAYS),
         affects="speed",
         group="Speed",

@@ -1,7 +1,7 @@
-"""A sparse octree of the points, drawn as discs or cubes as coarse as the picture allows.
+"""An octree of the points, drawn as discs or cubes, coarser where far away.
 
-Slomp 2014, VI: octants are divided as long as that tells points apart, and drawn from where
-they are no larger than a pixel.
+Slomp 2014, section VI. The octree divides octants as long as that separates points. A picture draws the
+octants that are about as large as a pixel.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ LIMITS = {
     ),
 }
 KEPT = {
-    "cull_back": "open scans, and eyes inside: 1.5 % of the pixels of the bunny, which has no base, show "
-    "what is behind",
-    "radius_scale": "holes: 0.8 leaves 0.1 % of the armadillo open, and 1 % of a dancing body",
+    "cull_back": "open scans, and eyes inside a scan: 1.5 % of the pixels of the bunny, which has no base, "
+    "show what is behind",
+    "radius_scale": "0.8 leaves holes: 0.1 % of the armadillo and 1 % of a dancing body stay open",
 }
 
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
@@ -75,15 +75,15 @@ class Params:
 
     stop: str = param(
         "delta",
-        "Where octants are not divided any more. delta: when few positions share one; depth: at a level; "
-        "occupancy: each by itself, when it holds few points",
+        "When to stop dividing octants. delta: when nearly every position has its own; depth: at a fixed "
+        "level; occupancy: when an octant holds few points",
         choices=STOPS,
         affects="derive",
         group="Octree",
     )
     delta: float = param(
         0.05,
-        "The share of the positions that may lack an octant of their own",
+        "Share of the positions that may lack an octant of their own",
         low=0,
         high=1,
         affects="derive",
@@ -92,7 +92,7 @@ class Params:
     )
     depth: int = param(
         10,
-        "The level of the leaves",
+        "Level of the leaves",
         low=0,
         high=DEEPEST,
         affects="derive",
@@ -101,7 +101,7 @@ class Params:
     )
     occupancy: int = param(
         8,
-        "How many points are not divided any more",
+        "Number of points up to which an octant is not divided",
         low=1,
         high=1 << 20,
         affects="derive",
@@ -111,8 +111,8 @@ class Params:
     )
     shape: str = param(
         "discs",
-        "What octants look like. discs: a piece of the surface, at the mean position and along the mean "
-        "normal of what they hold; cubes: the octant, lit by the mean normal; flat_cubes: lit by its faces",
+        "How octants are drawn. discs: a piece of the surface, at the mean position and along the mean "
+        "normal; cubes: cubes lit by the mean normal; flat_cubes: cubes lit by their faces",
         choices=("discs", *_CUBES),
         words={"discs": "Pieces of the surface", "cubes": "Cubes", "flat_cubes": "Flat cubes"},
         basic=True,
@@ -121,7 +121,7 @@ class Params:
     )
     radius_scale: float = param(
         1.0,
-        "Factor on the radius of discs, which closes the surface at 1",
+        "Factor on the radius of discs. 1 closes the surface",
         low=0.01,
         high=100.0,
         sweep=(0.8, 1.0),
@@ -130,8 +130,8 @@ class Params:
     )
     passes: str = param(
         "auto",
-        "one: the nearest disc is seen; two: those close behind it are blended with it; auto: two, but one "
-        "where that is too slow for a picture that moves",
+        "one: show the nearest disc; two: blend the nearest disc with those close behind it; auto: two, "
+        "or one if two is too slow in motion",
         choices=("auto", "one", "two"),
         sweep=("auto", "one"),
         group="Octants",
@@ -139,8 +139,8 @@ class Params:
     )
     least: float = param(
         0.75,
-        "Least half edge of a cube, in radii of its disc: what closes the surface where octants lie apart; "
-        "0: as large as octants",
+        "Smallest half edge of a cube, in radii of the disc in its place. Larger cubes close the surface;"
+        " 0: the exact octant",
         low=0.0,
         high=10.0,
         group="Octants",
@@ -148,7 +148,7 @@ class Params:
     )
     max_depth: int = param(
         DEEPEST,
-        "The deepest level drawn",
+        "Deepest level to draw",
         low=0,
         high=DEEPEST,
         sweep=(6, 7, 8, 9, 10, 11),
@@ -158,17 +158,19 @@ class Params:
     )
     pixel_threshold: float = param(
         1.0,
-        "Octants whose edge is less are drawn in place of what they hold",
+        "Draw an octant in place of its children if its edge is shorter than this",
         low=0.25,
         high=64.0,
         unit="px",
         group="Octants",
     )
-    cull_back: bool = param(False, "Leave out octants whose normals all face away", group="Octants")
+    cull_back: bool = param(
+        False, "Leave out octants whose normals all face away from the viewer", group="Octants"
+    )
     instancing: str = param(
         "auto",
-        "How octants become shapes. auto: what is fastest on this device; tiles: computed without quads, or "
-        "faces where cubes are small; the others: by a geometry shader, uniform blocks, buffer textures, "
+        "How the GPU draws octants. auto: the fastest way on this device; tiles: in a compute shader, or "
+        "as faces if cubes are small; the others use a geometry shader, uniform blocks, buffer textures, "
         "vertex attributes or pulled vertices",
         choices=("auto", *WAYS),
         affects="speed",
