@@ -52,8 +52,14 @@ def values_table(values: Mapping[str, ValueKind]) -> str:
     return "\n".join([*rows, *(f"| `{name}` | {kind.help} |" for name, kind in values.items())])
 
 
+def page_named(name: str) -> Path:
+    """The one page below docs/ that has this file name."""
+    (page,) = (ROOT / "docs").rglob(name)
+    return page
+
+
 def backends_page() -> str:
-    """docs/backends.md as the declarations have it."""
+    """docs/reference/parameters.md as the declarations have it."""
     parts = [
         "# Backends and looks",
         "This page is made from the declarations in the code: `python -m pytest tests/test_docs.py --bless`.",
@@ -71,8 +77,8 @@ def backends_page() -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def test_the_page_of_backends_is_up_to_date(bless: bool) -> None:
-    page = ROOT / "docs" / "backends.md"
+def test_the_page_of_parameters_is_up_to_date(bless: bool) -> None:
+    page = page_named("parameters.md")
     if bless:
         page.write_text(backends_page(), encoding="utf-8")
     assert page.read_text(encoding="utf-8") == backends_page()
@@ -82,7 +88,7 @@ def test_the_page_of_backends_is_up_to_date(bless: bool) -> None:
     "tables", [table_two, octree_tables, farooq, preiner], ids=lambda tables: tables.NAME
 )
 def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: bool) -> None:
-    page = ROOT / "docs" / f"{tables.NAME}.md"
+    page = page_named(f"{tables.NAME}.md")
     files = sorted((ROOT / "docs" / "data").glob(f"{tables.NAME}*.json"))
     assert files
     made = tables.page([tables.read_measurement(file) for file in files])
@@ -97,7 +103,7 @@ def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: boo
     ids=lambda made: made.NAME,
 )
 def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
-    page = ROOT / "docs" / made.PAGE
+    page = page_named(made.PAGE)
     files = sorted((ROOT / "docs" / "data").glob(f"{made.NAME}*.json"))
     assert files
     text = page.read_text(encoding="utf-8")
@@ -178,9 +184,9 @@ def test_what_the_docs_name_is_there(page: Path) -> None:
 
 
 def test_the_architecture_lists_all_decisions() -> None:
-    page = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    page = page_named("architecture.md").read_text(encoding="utf-8")
     listed = re.findall(r"^\| \[\d+\]\((decisions/[^)]+)\) \| (.+) \|$", page, re.M)
-    there = sorted((ROOT / "docs" / "decisions").glob("*.md"))
+    there = sorted((ROOT / "docs" / "developing" / "decisions").glob("*.md"))
     titles = [path.read_text(encoding="utf-8").partition("\n")[0].removeprefix("# ") for path in there]
     assert listed == [(f"decisions/{path.name}", title) for path, title in zip(there, titles, strict=True)]
 

@@ -237,7 +237,7 @@ def test_tools_know_their_desk_and_not_the_whole_window() -> None:
         if node.value.attr == "desk" and node.attr.startswith("_")
     }
     assert beyond | private == set()
-    page = (PACKAGE.parent / "docs" / "adding-a-tool.md").read_text(encoding="utf-8")
+    page = (PACKAGE.parent / "docs" / "developing" / "adding-a-tool.md").read_text(encoding="utf-8")
     told = re.findall(r"`viewer\.app\.([a-z_.]+)`", page)
     assert set(told) == TOOLS_KNOW - {"tools"}, "the page names what tools may import"
 

@@ -1,4 +1,4 @@
-"""The tables of docs/auto-splats.md, measured anew.
+"""The tables of docs/how-it-works/auto-splats.md, measured anew.
 
     python docs/tables/auto_splats.py [NAME ...]
 
@@ -21,7 +21,7 @@ from viewer.bench.scenes import catalog
 from viewer.bench.scenes.viewpoints import viewpoints
 from viewer.gpu.surface import Surface
 
-PAGE = DOCS / "auto-splats.md"
+PAGE = DOCS / "how-it-works" / "auto-splats.md"
 BACKEND = "auto_splats"
 VIEWS, SIZE = 2, (880, 450)
 ROUNDS = 3

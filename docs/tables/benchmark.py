@@ -1,4 +1,4 @@
-"""The table of docs/benchmark.md that no suite makes: how far scans lie off their truths.
+"""The table of docs/developing/benchmark.md that no suite makes: how far scans lie off their truths.
 
     python docs/tables/benchmark.py
 
@@ -15,7 +15,7 @@ from viewer.bench.report.measurement import markdown_table, remeasure_tables
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.subjects import Moment
 
-PAGE = DOCS / "benchmark.md"
+PAGE = DOCS / "developing" / "benchmark.md"
 MOMENTS = 5  # of a sequence
 SCENES = {"demo": 1, "dragon-scans": 1000, "bunny-scans": 1000, "truedepth-head": 1000}  # with mm a scan unit
 

@@ -1,4 +1,4 @@
-"""The picture of docs/landmarks.md, made anew: ways of landmarks over the demo, tracked and true.
+"""The picture of docs/guide/landmarks.md, made anew: ways of landmarks over the demo, tracked and true.
 
     python docs/tables/landmark_picture.py
 

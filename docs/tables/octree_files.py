@@ -1,4 +1,4 @@
-"""The tables of docs/octree-files.md, measured anew.
+"""The tables of docs/reference/octree-files.md, measured anew.
 
     python docs/tables/octree_files.py [NAME ...]
 
@@ -22,7 +22,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "octree-files.md"
+PAGE = ROOT / "docs" / "reference" / "octree-files.md"
 DATA = ROOT.parent / "shared" / "data"
 GEOMETRY = ("masks", "intra", "inter", "chosen", "draco", "lzma")
 STOP = "5 %"

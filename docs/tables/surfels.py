@@ -1,4 +1,4 @@
-"""The tables of docs/surfels.md, measured anew.
+"""The tables of docs/how-it-works/surfels.md, measured anew.
 
     python docs/tables/surfels.py [NAME ...]
 
@@ -51,7 +51,7 @@ from viewer.scan.spacing import typical_spacing
 from viewer.simulate.scanner import Faults, around, capture, rig
 from viewer.view import View
 
-PAGE = DOCS / "surfels.md"
+PAGE = DOCS / "how-it-works" / "surfels.md"
 SURFELS = backend("surfels")
 THINNED = "-ramp"
 SCANS = ("armadillo", "bunny", "horse", "igea", "crane")

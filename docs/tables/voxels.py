@@ -1,4 +1,4 @@
-"""The tables of docs/voxels.md, measured anew.
+"""The tables of docs/how-it-works/voxels.md, measured anew.
 
     python docs/tables/voxels.py [NAME ...]
 
@@ -27,7 +27,7 @@ from viewer.scan.octree.traverse import Traversal
 from viewer.scan.spacing import typical_spacing
 from viewer.view import View
 
-PAGE = DOCS / "voxels.md"
+PAGE = DOCS / "how-it-works" / "voxels.md"
 SIZE = (480, 360)
 AROUND = ((140, 20), (20, 10), (260, 30))  # degrees
 LOOK = Look(light="head")

@@ -1,4 +1,4 @@
-"""The tasks of docs/survey.md (Farooq 2013, 7.2.1), done in a real window, and the actions each takes."""
+"""The tasks of docs/developing/survey.md (Farooq 2013, 7.2.1), done in a real window, with their actions."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def holes(surface: Surface) -> float:
 def told(tasks: str) -> dict[str, int]:
     """The actions that the survey's tables give for each task of a set."""
     rows = re.findall(
-        rf"^\| ({tasks}\d) \|.*\| (\d+) \|$", (ROOT / "docs" / "survey.md").read_text(), re.MULTILINE
+        rf"^\| ({tasks}\d) \|.*\| (\d+) \|$", (ROOT / "docs/developing/survey.md").read_text(), re.MULTILINE
     )
     return {task: int(count) for task, count in rows}
 

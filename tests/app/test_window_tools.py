@@ -63,7 +63,8 @@ def close(app: RunningApp) -> None:
 
 @pytest.mark.slow
 def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Path) -> None:
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "adding-a-tool.md").read_text(), re.DOTALL)
+    page = (ROOT / "docs/developing/adding-a-tool.md").read_text()
+    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     (tmp_path / "tools" / "pins").mkdir(parents=True)
     (tmp_path / "tools" / "pins" / "__init__.py").write_text(code)
     use = USE.format(str(tmp_path / "tools"))

@@ -1,4 +1,4 @@
-"""The backend of docs/adding-a-backend.md, as it stands there: found, drawn, and held to the contract."""
+"""The backend of docs/developing/adding-a-backend.md: found, drawn, and held to the contract."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ sys.exit(pytest.main(sys.argv[2:]))
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that the page names, holding its blocks of code."""
     folder = tmp_path_factory.mktemp("documented")
-    page = (ROOT / "docs" / "adding-a-backend.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "developing" / "adding-a-backend.md").read_text(encoding="utf-8")
     files = re.findall(r"`((?:viewer|shaders)/[\w/]+\.\w+)`:?\n\n```\w+\n(.*?)```", page, re.DOTALL)
     assert [name for name, _ in files] == ["viewer/backends/dots.py", "shaders/dots/cells.glsl"]
     for name, text in files:

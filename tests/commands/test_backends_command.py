@@ -12,8 +12,10 @@ from viewer.backends import backends
 
 
 def documented() -> set[str]:
-    """The names in the JSON list as docs/command-line.md has them."""
-    page = (Path(__file__).resolve().parents[2] / "docs" / "command-line.md").read_text(encoding="utf-8")
+    """The names in the JSON list as docs/reference/command-line.md has them."""
+    page = (Path(__file__).resolve().parents[2] / "docs/reference/command-line.md").read_text(
+        encoding="utf-8"
+    )
     section = page.partition("## `scan4d backends`")[2].partition("\n## ")[0]
     return set(re.findall(r"`(\w+)`", section))
 

@@ -376,7 +376,7 @@ def test_help(command: str, run: Run) -> None:
 
 
 def test_the_docs_name_every_flag_and_no_other(run: Run) -> None:
-    page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
     sections = dict(re.findall(r"^## `scan4d (\w+).*?`\n(.*?)(?=^## |\Z)", page, re.M | re.S))
     common = {"--device", "--unit", "--fps", "--up", "--quiet", "--debug"}
     assert sorted(sections) == list(command_names())

@@ -118,7 +118,7 @@ def repack(data: bytes, rng: Random) -> bytes:
 
 
 def reseal(data: bytes, rng: Random) -> bytes:
-    """Damage the header of an octree, and give it a check sum that holds; see docs/octree-files.md."""
+    """Damage the header of an octree and give it a valid check sum (docs/reference/octree-files.md)."""
     fixed = struct.calcsize("<4s6BI5d2Q")
     if not data.startswith(b"\x8dSVO") or len(data) < fixed:
         return rebinary(data, rng)

@@ -68,7 +68,7 @@ def test_times_csv(tmp_path: Path, text: str) -> None:
 
 
 def test_the_times_csv_in_the_documentation(tmp_path: Path) -> None:
-    page = Path(__file__).resolve().parents[2] / "docs" / "scans.md"
+    page = Path(__file__).resolve().parents[2] / "docs" / "reference" / "scans.md"
     rows = [line.strip() for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("    ")]
     times = read_times_csv(table(tmp_path, "\n".join(rows)), ["00001.ply", "00002.ply"])
     assert times.tolist() == [0, 0.033]

@@ -72,7 +72,7 @@ class Truth:
         return cls(pixels, np.where(np.isfinite(depth), depth, np.inf), footprint)
 
     def error(self, surface: Surface) -> float:
-        """How far off what a surface shows is, pixels: see docs/automatic.md."""
+        """How far off what a surface shows is, pixels: see docs/guide/automatic.md."""
         few, many = np.array(surface.size), np.array(surface.shown)
         places = (2 * self.pixels + 1) * few // (2 * many)
         aside = np.linalg.norm((places + 0.5) * many / few - (self.pixels + 0.5), axis=1)

@@ -92,7 +92,7 @@ class Judge:
         )
 
     def errors(self, surface: Surface) -> Errors:
-        """Coverage, depth, normals, colour and visibility of points, by the names of docs/benchmark.md.
+        """Coverage, depth, normals, colour, visibility of points, as docs/developing/benchmark.md names them.
 
         The surface has the judge's camera and size; it is shaded in the judge's look.
         """

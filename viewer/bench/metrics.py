@@ -1,4 +1,4 @@
-"""Error of a picture against the truth: numbers by the names of docs/benchmark.md.
+"""Error of a picture against the truth: numbers by the names of docs/developing/benchmark.md.
 
 Functions over arrays; nothing here draws. What is undefined, as the mean of no pixels, is NaN.
 """
@@ -162,7 +162,7 @@ def flicker(
 
 
 def aggregate(by_view: Mapping[str, Sequence[float]]) -> Errors:
-    """The errors of several views as one, by the section "Aggregate" of docs/benchmark.md.
+    """The errors of several views as one, by the section "Aggregate" of docs/developing/benchmark.md.
 
     by_view: for each error its value in every view, NaN where it is undefined there.
     """

@@ -1,7 +1,7 @@
 """Seams between views that see colours differently: how visible they are, and what fine detail they cost.
 
 Where one view takes over from another, a picture has to pass from the gain of the one to that of the other.
-What a gain does that changes slowly is no seam. docs/laplacian.md has the formulas.
+What a gain does that changes slowly is no seam. docs/how-it-works/laplacian.md has the formulas.
 """
 
 from __future__ import annotations

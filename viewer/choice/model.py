@@ -60,7 +60,7 @@ class Law:
 
 @dataclass(frozen=True)
 class Expected:
-    """Time that a picture is expected to take, ms, and how far off it is, pixels (see docs/automatic.md):
+    """Time that a picture is expected to take, ms, and its error, pixels (see docs/guide/automatic.md):
     coarse: as its pixels are larger; off: otherwise."""
 
     ms: float

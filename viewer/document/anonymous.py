@@ -1,4 +1,4 @@
-"""Anonymous pictures: a scan drawn without what tells whose it is, where and when; see docs/privacy.md.
+"""Anonymous pictures: a scan drawn without what tells whose it is, where and when; see docs/guide/privacy.md.
 
 The scan itself is changed before it is drawn, not what comes of it: whatever is made of such a picture
 (its text, its channels, the marks on it) has nothing to tell.

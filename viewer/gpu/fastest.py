@@ -1,7 +1,7 @@
 """Which of several ways is the fastest on this device: measured once, then remembered for this user.
 
 As long as the file that remembers it stays, a frame has the same bits each time: ways may round differently
-(docs/decisions/007-instancing.md).
+(docs/developing/decisions/007-instancing.md).
 """
 
 from __future__ import annotations

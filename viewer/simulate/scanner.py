@@ -1,7 +1,7 @@
 """A virtual scanner: pods around a subject, each seeing a range image, with the faults that real ones have.
 
-It is seeded: a frame of a pod is the same whatever else is captured, and in whatever order. docs/simulate.md
-has the formulas.
+It is seeded: a frame of a pod is the same whatever else is captured, and in whatever order.
+docs/how-it-works/simulate.md has the formulas.
 """
 
 from __future__ import annotations

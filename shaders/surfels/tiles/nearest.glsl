@@ -23,7 +23,7 @@ layout(std430, binding = STORAGE_DEPTHS) buffer Depths { uint depths[]; };
 layout(std430, binding = STORAGE_ROWS) buffer Rows { uint rows[]; };
 
 // FILL: the best of pixels that stay as they are: nothing is better. No array of bool says which they are, as
-// Mesa's Zink cannot read one (docs/surfels.md).
+// Mesa's Zink cannot read one (docs/how-it-works/surfels.md).
 #define CLOSED uintBitsToFloat(NO_DEPTH)
 
 const int PIXELS = PART_WIDTH * PART_HEIGHT;

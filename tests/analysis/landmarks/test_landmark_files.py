@@ -59,7 +59,7 @@ def test_every_format_that_is_written_is_tried() -> None:
 
 
 def test_the_docs_name_every_format() -> None:
-    page = Path(__file__).parents[3] / "docs" / "formats.md"
+    page = Path(__file__).parents[3] / "docs" / "reference" / "formats.md"
     section = page.read_text("utf-8").split("\n## Landmarks\n")[1].split("\n## ")[0]
     rows = [line.split("|") for line in section.splitlines() if line.startswith("| ")][1:]
     read = {suffix: row for row in rows for suffix in re.findall(r"`(\.[\w.]+)`", row[2])}

@@ -109,7 +109,7 @@ def test_some_attributes_come_back() -> None:
 
 
 def test_the_layout_is_the_stated_one() -> None:
-    """Read with nothing but struct, as docs/octree-files.md has it."""
+    """Read with nothing but struct, as docs/reference/octree-files.md has it."""
     octree = TREES["delta"]
     data = to_bytes(bare(octree), time=0.25, unit="mm", packed=False)
     magic, version, flags, before, depth, unit_size, zero = struct.unpack_from("<4s6B", data)

@@ -60,7 +60,7 @@ LIMITS = {
 
 KEPT = {
     "cull_back": "open scans, and eyes inside a scan: 2.2 % of the pixels of the bunny, which has no base, "
-    "show what is behind; no test for closed scans was both safe and faster (docs/surfels.md)"
+    "show what is behind; no test for closed scans was both safe and faster (docs/how-it-works/surfels.md)"
 }
 
 _WAYS = ("tiles", *FEEDS)

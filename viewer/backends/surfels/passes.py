@@ -1,7 +1,8 @@
 """Passes: splats that overlap are blended, over what a single pass found (Slomp 2014, V-B).
 
 Colours and normals of each pixel go to `Surface.own`; depth and row stay those of the nearest splat. Sums
-are of whole numbers, so that they do not depend on the order: docs/decisions/006-blending-whole-numbers.md.
+are of whole numbers, so that they do not depend on the order
+(docs/developing/decisions/006-blending-whole-numbers.md).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Splats of about a pixel: sent to their pixels one by one, and averaged there.
 
 Many of them share a pixel, so that lists and quads cost more than they give, and the nearest alone, another
-one with each small motion, would flicker (docs/decisions/005-splats-under-a-pixel.md).
+one with each small motion, would flicker (docs/developing/decisions/005-splats-under-a-pixel.md).
 """
 
 from __future__ import annotations

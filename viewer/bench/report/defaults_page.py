@@ -1,4 +1,4 @@
-"""Which defaults another value beats, and why they stay: the tables of docs/defaults.md."""
+"""Which defaults another value beats, and why they stay: the tables of docs/developing/defaults.md."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ machine's goes to docs/data/ under a name of its own, with what its numbers do n
 
     NAME                              of its files: docs/data/NAME-*.json
     read_measurement(path)            one of them
-    page(measurements) -> text        all of docs/NAME.md; or, of a page that is mostly written by hand,
+    page(measurements) -> text        all of the page NAME.md; or, of a page that is mostly written by hand,
     PAGE, tables(measurements)        its name, and what stands between <!-- KEY --> and <!-- /KEY --> in it
 """
 

@@ -148,7 +148,7 @@ METRICS = {metric.name: metric for metric in [*COSTS, *_ERRORS]}
 
 
 def error_metrics(rows: Iterable[Row]) -> list[Metric]:
-    """The errors that any of the rows has, known ones first, in the order of docs/benchmark.md."""
+    """The errors that any of the rows has, known ones first, in the order of docs/developing/benchmark.md."""
     found = {name for row in rows for name in row["errors"]}
     return [metric for metric in _ERRORS if metric.name in found] + [
         Metric(name, "", "") for name in sorted(found - METRICS.keys())

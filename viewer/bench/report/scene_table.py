@@ -1,4 +1,4 @@
-"""All renderers on a few scenes, beside floor and ceiling: the table at the end of docs/benchmark.md."""
+"""All renderers on a few scenes, beside floor and ceiling: the last table of docs/developing/benchmark.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""SVO: octrees of all poses in one file, one after another; docs/octree-files.md has the layout.
+"""SVO: octrees of all poses in one file, one after another; docs/reference/octree-files.md has the layout.
 
 Each pose is its leaves: a point in the middle of each, with its colour and normal; and the few points far
 outside, as they are. Written are geometry, colours, normals, times and unit. A pose may be told by the one

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..points import strided
 
 MIDDLE = 1 << 15  # an offset: the middle of a cell
-_RADIUS_PER_SPACING = 1.25  # closes the surface of a scan: docs/voxels.md
+_RADIUS_PER_SPACING = 1.25  # closes the surface of a scan: docs/how-it-works/voxels.md
 _LARGEST = 4.0  # times the usual radius: leaves seem to lie apart where a cell has but a strip of them
 
 

@@ -1,6 +1,6 @@
 """Octrees as bytes: a header that says what follows, points outside, then the levels, the coarsest first.
 
-Whatever ends behind a level is the coarser tree. docs/octree-files.md has the layout.
+Whatever ends behind a level is the coarser tree. docs/reference/octree-files.md has the layout.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Views merged band by band, against blends and the truth: the tables of docs/laplacian.md."""
+"""Views merged band by band, against blends and the truth: the tables of docs/how-it-works/laplacian.md."""
 
 from __future__ import annotations
 

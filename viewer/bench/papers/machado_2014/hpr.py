@@ -1,4 +1,4 @@
-"""Which points are visible, then and now: the tables of docs/hpr.md."""
+"""Which points are visible, then and now: the tables of docs/how-it-works/hpr.md."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Code words, then and now: the tables of docs/codeword.md."""
+"""Code words, then and now: the tables of docs/how-it-works/codeword.md."""
 
 from __future__ import annotations
 
