@@ -15,7 +15,10 @@ from small_scans import ROOT, SMALL, cloud_at
 
 from viewer.codewords.stream import read_stream
 from viewer.codewords.words import decode_words
+from viewer.commands._scans import first_readable
+from viewer.errors import InputError
 from viewer.scan import formats
+from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 
 
@@ -68,6 +71,53 @@ def test_info_reads_the_first_readable_pose_alone(
     assert json.loads(done.out)["pose"] == 1
     assert "f0.npz" in done.err
     assert read == ["f1.npz"]
+
+
+FRAMES = 1000
+
+
+@pytest.mark.parametrize("kind", ["files", "pods", "tum", "open3d"])
+def test_info_tries_few_of_many_broken_poses(kind: str, run: Run, tmp_path: Path) -> None:
+    numbers = range(FRAMES)
+    match kind:
+        case "files":
+            for n in numbers:
+                (tmp_path / f"f{n}.npz").touch()
+        case "pods":
+            for n in numbers:
+                (tmp_path / f"left_{n}.tif").touch()
+            pod = {"name": "left", "range": "left_*.tif", "fx": 9, "fy": 9, "cx": 2, "cy": 2}
+            (tmp_path / "pods.json").write_text(json.dumps({"pods": [pod]}))
+        case "tum":
+            (tmp_path / "depth.txt").write_text("".join(f"{n} {n}.png\n" for n in numbers))
+            (tmp_path / "groundtruth.txt").write_text("".join(f"{n} 0 0 0 0 0 0 1\n" for n in numbers))
+        case "open3d":
+            (tmp_path / "depth").mkdir()
+            (tmp_path / "rgbd.match").write_text("".join(f"depth/{n}.png {n}.png\n" for n in numbers))
+    with open_scan(tmp_path) as timeline:
+        assert len(timeline) == FRAMES
+        with pytest.raises(
+            InputError, match=f"^{tmp_path.name}: 100 of {FRAMES} frames were tried, and none"
+        ):
+            first_readable(timeline, range(FRAMES))
+        assert len(timeline.broken) == 100
+    done = run("info", tmp_path)
+    assert done.code == 2
+    assert f"100 of {FRAMES} frames were tried, and none can be read. The first: " in done.err
+
+
+@pytest.mark.parametrize(("readable", "broken"), [((0, 7), 0), ((7, 40), 7), ((49, 50), 49), ((999,), 99)])
+def test_info_says_how_many_poses_it_tried(
+    readable: tuple[int, ...], broken: int, run: Run, tmp_path: Path
+) -> None:
+    for n in range(FRAMES):
+        (tmp_path / f"f{n}.npz").touch()
+    for n in readable:
+        formats.write(tmp_path / f"f{n}.npz", cloud_at(0))
+    facts = json.loads(run("info", tmp_path, "--json").out)
+    assert (facts["pose"], facts["unreadable"]) == (readable[0], broken)
+    told = f"unreadable  {broken} of {broken + 1} poses that were tried\n"
+    assert (told in run("info", tmp_path).out) == (broken > 0)
 
 
 def test_info_copes_with_values_that_are_not_finite(run: Run, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import numpy as np
+
 from ..bounds import Bounds
 from ..csv_text import save_rows, text_of_cell
 from ..errors import InputError
@@ -26,6 +28,7 @@ from ..scan.upright import UNTOLD, Upright
 from ._console import warn
 
 _FRAMED = 5  # poses that a camera is fitted to
+_TRIED = 100  # poses that are tried where one that can be read is looked for
 SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'frame*.ply', or demo"
 
 
@@ -88,9 +91,9 @@ def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
         except InputError:
             if len(indices) == 1:
                 raise
-            said = _report(timeline, said)
+            said = report(timeline, said)
             continue
-        said, found = _report(timeline, said), True
+        said, found = report(timeline, said), True
         if place + 1 < len(indices):
             timeline.request(indices[place + 1])
         yield pose
@@ -110,7 +113,7 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
         with suppress(InputError):
             boxes.append(timeline.pose(index).bounds)
     if not boxes:  # there may be a readable one between
-        return next(read_poses(timeline, indices)).bounds
+        return first_readable(timeline, indices).bounds
     return Bounds.of_frames(boxes[0], boxes)
 
 
@@ -119,9 +122,8 @@ def told_upright(args: Namespace, timeline: Timeline, indices: Sequence[int]) ->
     be read."""
     if args.up:
         return Upright(args.up, "as told", 1.0)
-    for index in indices:
-        with suppress(InputError):
-            return timeline.pose(index).upright
+    with suppress(InputError):
+        return first_readable(timeline, indices).upright
     return UNTOLD
 
 
@@ -130,17 +132,26 @@ def frame_title(timeline: Timeline, index: int) -> str:
     return f"{frame_in_words(index)} ({timeline.label(index)})"
 
 
-def first_readable(timeline: Timeline) -> Pose:
-    """The first pose that is not broken, and no other is read. Raises InputError where all are."""
-    pose = next(iter(timeline), None)
-    if pose is None:
-        raise timeline.broken[0]
-    _report(timeline, 0)
-    return pose
+def first_readable(timeline: Timeline, indices: Sequence[int]) -> Pose:
+    """The first of these poses that is not broken; no later one is read.
+
+    Of many poses, `_TRIED` are tried: half of them in order, half spread over the rest. Raises InputError
+    where none of them can be read.
+    """
+    rest = np.linspace(min(_TRIED // 2, len(indices)), len(indices) - 1, _TRIED // 2).astype(int)
+    tried = indices if len(indices) <= _TRIED else [indices[i] for i in (*range(_TRIED // 2), *rest.tolist())]
+    for index in tried:
+        with suppress(InputError):
+            return timeline.pose(index)
+    error = timeline.broken[tried[0]]
+    if len(indices) == 1:
+        raise error
+    of_all = f"{len(tried)} of {len(indices)} frames were tried, and none can be read"
+    raise InputError(of_all, timeline.name, f"The first: {error}")
 
 
-def _report(timeline: Timeline, said: int) -> int:
-    """Say the timeline's messages from number `said` on; how many are said now."""
+def report(timeline: Timeline, said: int) -> int:
+    """Print the timeline's messages from number `said` on; how many are printed now."""
     messages = timeline.messages[said:]
     for notice in messages:
         known = notice.text.startswith(timeline.name)  # a single file is named after itself

@@ -1,4 +1,4 @@
-"""Tell what a scan holds, of which its first readable pose alone is read; or a file of code words."""
+"""Report what a scan holds, from its first readable pose alone; or what a file of code words holds."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..scan.pose import Pose
 from ..scan.range_view import RangeView
 from ..scan.timeline import Timeline
 from ._console import escaped
-from ._scans import SCAN_HELP, first_readable, open_timeline
+from ._scans import SCAN_HELP, first_readable, open_timeline, report
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -35,7 +35,9 @@ def run(args: Namespace) -> int:
         print(json.dumps(words, indent=2, allow_nan=False) if args.json else _stream_as_text(words))
         return 0
     with open_timeline(args, args.scan) as timeline:
-        facts = scan_facts(timeline, first_readable(timeline))
+        pose = first_readable(timeline, range(len(timeline)))
+        report(timeline, 0)
+        facts = scan_facts(timeline, pose)
     print(json.dumps(facts, indent=2, allow_nan=False) if args.json else _as_text(facts))
     return 0
 
@@ -60,6 +62,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         },
         "pose": pose.index,
         "label": pose.label,
+        "unreadable": len(timeline.broken),
         "points": found.count,
         "dropped": pose.dropped + found.dropped,
         "bytes": pose.nbytes,
@@ -150,7 +153,7 @@ def _range(values: NDArray) -> list[float] | None:
 
 
 def _as_text(facts: dict[str, Any]) -> str:
-    times, unit = facts["times"], facts["unit"]
+    times, unit, broken = facts["times"], facts["unit"], facts["unreadable"]
     low, high = facts["bounds"]["low"], facts["bounds"]["high"]
     poses = f"{facts['poses']}"
     if times["median_step"]:
@@ -162,6 +165,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         ("scan", facts["name"]),
         ("poses", poses),
         ("pose", f"{facts['pose']}, {facts['label']}"),
+        *([("unreadable", f"{broken} of {broken + 1} poses that were tried")] if broken else []),
         ("points", points),
         *(("view", _told(view)) for view in facts["views"]),
         *(("beside", text) for text in facts["beside"]),

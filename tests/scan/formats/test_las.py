@@ -71,6 +71,9 @@ def test_damaged_files_are_refused_in_one_message(suffix: str, tmp_path: Path) -
     path.write_bytes(whole[:100] + b"\xff\xff\xff\x7f" + whole[104:])
     with pytest.raises(InputError, match="promises 2,147,483,647 records"):
         read(path)
+    path.write_bytes(whole[:96] + b"\xf0\xff\xff\xff" + whole[100:])
+    with pytest.raises(InputError, match="points begin at byte 4,294,967,280"):
+        read(path)
     for at in RNG.integers(0, len(whole), 20):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 0xFF]) + whole[at + 1 :])
         try:

@@ -40,7 +40,8 @@ _COLORS = ("red", "green", "blue")
 _WHOLE = {"X", "Y", "Z"}  # coordinates before scale and offset
 _COPIES, _OTHERS = 2, 36  # of a point's bytes; bytes of its coordinates and of what becomes of them
 _HEADER = 247  # bytes, of the first versions fewer
-_OF_RECORDS, _OF_LATER_RECORDS = struct.Struct("<100xI"), struct.Struct("<243xI")  # numbers of them
+_FIRST = struct.Struct("<96xII")  # where points begin, and the number of records before them
+_OF_LATER_RECORDS = struct.Struct("<243xI")  # the number of records behind the points
 _SMALLEST_RECORD = 54  # bytes
 _FORMAT, _PACKED = 104, 0x80  # where the header has the format of points, and the bit that tells LAZ
 _LOOK = 0.1  # seconds between looks at whether reading is cancelled
@@ -54,7 +55,7 @@ def read(path: Path, frame: int = 0) -> PointCloud:
     logging.getLogger("laspy").setLevel(logging.CRITICAL)  # what is wrong is told by what is raised
     with opened(path) as stream:
         head, held = stream.read(_HEADER), size_of(stream)
-        _check_records(head, held)
+        _check_header(head, held)
         if not head[_FORMAT] & _PACKED:
             stream.seek(0)
             with laspy.open(stream, closefd=False) as reader:
@@ -111,15 +112,17 @@ def _unpack_beside(packed: Path, plain: Path) -> None:
         )
 
 
-def _check_records(head: bytes, held: int) -> None:
-    """Raise InputError where a file of `held` bytes promises more records beside its points than fit into it:
-    laspy would go through all of them."""
-    if not head.startswith(b"LASF") or len(head) < _OF_RECORDS.size:
+def _check_header(head: bytes, held: int) -> None:
+    """Raise InputError where a file of `held` bytes promises more than fits into it: laspy would go through
+    all records, and make room for all that stands before the points."""
+    if not head.startswith(b"LASF") or len(head) < _FIRST.size:
         raise InputError("is no LAS file")
-    (records,) = _OF_RECORDS.unpack_from(head)
+    (begin, records) = _FIRST.unpack_from(head)
     later = _OF_LATER_RECORDS.unpack_from(head)[0] if len(head) == _HEADER and head[25] >= 4 else 0
     if _SMALLEST_RECORD * (records + later) > held:
         raise InputError(f"promises {records + later:,} records beside its points, more than fit into it")
+    if begin > held:
+        raise InputError(f"says that its points begin at byte {begin:,}, and has {held:,} bytes")
 
 
 def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:
