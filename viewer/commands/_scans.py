@@ -138,8 +138,9 @@ def first_readable(timeline: Timeline, indices: Sequence[int]) -> Pose:
     Of many poses, `_TRIED` are tried: half of them in order, half spread over the rest. Raises InputError
     where none of them can be read.
     """
-    rest = np.linspace(min(_TRIED // 2, len(indices)), len(indices) - 1, _TRIED // 2).astype(int)
-    tried = indices if len(indices) <= _TRIED else [indices[i] for i in (*range(_TRIED // 2), *rest.tolist())]
+    tried, half = list(indices), _TRIED // 2
+    if len(tried) > _TRIED:
+        tried[half:] = [tried[i] for i in np.linspace(half, len(tried) - 1, half).astype(int)]
     for index in tried:
         with suppress(InputError):
             return timeline.pose(index)
