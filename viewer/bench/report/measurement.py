@@ -27,7 +27,7 @@ Measurement = dict[str, Any]
 
 _ONCE = ("device", "driver", "processors", "timer", "version", "date", "size", "repeat", "seed")
 _SPACE = "\N{NARROW NO-BREAK SPACE}"
-_TIMERS = {"query": "timer queries", "finish": "wall time between finishes"}
+_TIMERS = {"query": "timer queries", "finish": "wall time between two `glFinish` calls"}
 
 
 def circumstances(rows: Sequence[Row]) -> Measurement:
