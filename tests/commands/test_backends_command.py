@@ -41,3 +41,12 @@ def test_backends_as_text(run: Run) -> None:
         assert f"{backend.name}: {backend.help}" in out
         for parameter in backend.parameters:
             assert re.search(rf"^  {parameter.name} .*{re.escape(parameter.help)}$", out, re.M)
+
+
+def test_backends_separate_what_everybody_sets_from_research(run: Run) -> None:
+    """Parameters that the panel shows at once stand before the headings for research, the others below."""
+    for backend, text in zip(backends().values(), run("backends").out.split("\n\n"), strict=True):
+        everybody, _, research = text.partition("\n  For research: ")
+        for parameter in backend.parameters:
+            section = everybody if parameter.basic else research
+            assert re.search(rf"^  {parameter.name} ", section, re.M), (backend.name, parameter.name)

@@ -375,6 +375,15 @@ def test_help(command: str, run: Run) -> None:
         assert flag in done.out
 
 
+def test_the_summary_of_each_command_is_one_sentence_on_one_line(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = re.findall(r"^    (\w+) +(.*)\n(?=    \w|\n)", run("--help").out, re.M)
+    assert [name for name, _ in rows] == list(command_names())
+    assert [text for _, text in rows if not re.fullmatch(r"[A-Z][^.]+\.", text)] == []
+
+
 def test_the_docs_name_every_flag_and_no_other(run: Run) -> None:
     page = (ROOT / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
     sections = dict(re.findall(r"^## `scan4d (\w+).*?`\n(.*?)(?=^## |\Z)", page, re.M | re.S))

@@ -1,4 +1,8 @@
-"""List the renderer backends and their parameters."""
+"""List the renderers and their parameters.
+
+The parameters that the window's panel shows at once come first. Parameters for research follow, by group.
+--json lists all facts of each parameter.
+"""
 
 from __future__ import annotations
 
@@ -69,18 +73,19 @@ def _obstacle(device: int | None) -> str | None:
 
 
 def _as_text(backend: Backend) -> str:
-    rows = [(p.name, _value(p.default), _domain(p), p.help) for p in backend.parameters]
-    widths = [max(len(row[column]) for row in rows) for column in range(3)] if rows else []
-    lines, group = [f"{backend.name}: {backend.help}"], ""
-    for parameter, row in zip(backend.parameters, rows, strict=True):
-        if parameter.group != group:
-            group = parameter.group
-            lines.append(f"  {group}:")
-        columns = (f"{cell:{width}}" for cell, width in zip(row, widths, strict=False))
-        lines.append("  " + "  ".join([*columns, row[3]]))
+    """The help of a backend: parameters for everybody, then those for research by group, then its numbers."""
+    rows = {p.name: (p.name, _value(p.default), _domain(p), p.help) for p in backend.parameters}
+    widths = [max(map(len, column)) for column in list(zip(*rows.values(), strict=True))[:-1]]
+    lines, heading = [f"{backend.name}: {backend.help}"], ""
+    for parameter in sorted(backend.parameters, key=lambda p: not p.basic):
+        group = "" if parameter.basic else f"  For research: {parameter.group or 'other'}"
+        if group != heading:
+            lines.append(heading := group)
+        *cells, text = rows[parameter.name]
+        lines.append("  ".join(["", *(f"{c:{w}}" for c, w in zip(cells, widths, strict=True)), text]))
     if backend.values:
         width = max(map(len, backend.values))
-        lines.append("  Numbers to colour by (--look color_by=...):")
+        lines.append("  Numbers to colour by (--look color_by=...)")
         lines += [f"  {name:{width}}  {kind.help}" for name, kind in backend.values.items()]
     return "\n".join(lines)
 

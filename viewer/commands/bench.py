@@ -1,8 +1,8 @@
-"""Measure run time against error: every renderer, on scenes whose truth is known.
+"""Measure the run time and the error of every renderer.
 
-Writes into DIR: report.html, one page that holds all of it; results.jsonl, a row for each scene,
-backend and setting; numerics.jsonl, the stability suite; plots and pictures.
-Ctrl-C stops it and keeps what was measured.
+The scenes have a known truth. DIR receives report.html, one page with all results; results.jsonl, a row for
+each scene, renderer and setting; numerics.jsonl, the results of the stability suite; plots and pictures.
+Ctrl-C stops the run and keeps the results so far.
 """
 
 from __future__ import annotations

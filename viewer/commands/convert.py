@@ -1,9 +1,9 @@
-"""Write poses as PLY, PCD or NPZ, range views also as EXR, and all poses as octrees in one SVO.
+"""Write frames of a scan in another file format.
 
-OUT is a file for one pose, or for a sequence a numbered pattern such as out%04d.ply, with
-the times beside it in times.csv; a .svo holds all poses and their times. What the scan lacks of
-normals and radii can be estimated and stored, so that nobody waits for it when the scan is shown. The points
-that an eye sees may be written alone.
+OUT is a .ply, .pcd, .npz, .exr or .svo file. A sequence needs a numbered pattern such as out%04d.ply; Scan4D
+writes the times into times.csv beside it. One .svo file holds all frames with their times.
+--normals and --radii estimate and store what the scan lacks, so that it opens faster. --visible-from writes
+only the points that are visible from one position.
 """
 
 from __future__ import annotations

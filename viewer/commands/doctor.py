@@ -1,4 +1,4 @@
-"""Tell whether Scan4D can draw on this machine, with what, and what to install."""
+"""Report whether Scan4D can draw here, and what is missing."""
 
 from __future__ import annotations
 

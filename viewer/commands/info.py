@@ -1,4 +1,7 @@
-"""Report what a scan holds, from its first readable pose alone; or what a file of code words holds."""
+"""Report what a scan or a file of code words contains.
+
+Scan4D reads the first readable pose only, and the header of a file of code words.
+"""
 
 from __future__ import annotations
 

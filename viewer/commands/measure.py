@@ -1,10 +1,10 @@
-"""Follow landmarks through a scan and measure, in all frames, without a window.
+"""Track landmarks and measure them in all frames.
 
-The landmarks of FILE are put onto the surface, followed where the file does not have them, and written with
-the values of the measures as one long table: a row a landmark and frame, then a row a measure and frame.
-With speeds or accelerations, a row a landmark's trajectory and frame comes last.
-The numbers of the measures' movements, such as amplitude, onset and peak, are a table beside it, OUT_numbers;
-with --repeats the repeats over one another are a third. Plots are as the window saves them.
+Scan4D moves the landmarks of FILE onto the surface and tracks them where FILE has no position. OUT is one
+table: a row for each landmark and frame, then a row for each measure and frame, then a row for each
+trajectory and frame if --order asks for speed or acceleration.
+OUT_numbers, beside OUT, has amplitude, onset and peak of each measure. --repeats writes a third table with
+the repeats of a movement. --plot saves the same plots as the window.
 """
 
 from __future__ import annotations

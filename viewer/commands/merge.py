@@ -1,7 +1,8 @@
-"""Make one surface of the range views of each pose: where several show a patch, the best one keeps it.
+"""Merge the range views of each pose into one surface.
 
-OUT is a .exr file of the range views, or the points that are kept as PLY, PCD or NPZ; for a sequence
-a numbered pattern such as out%04d.exr, with the times beside it in times.csv.
+Where several views show a patch, the view that sees it best keeps it. OUT is a .exr file of range views, or
+the remaining points as .ply, .pcd or .npz. A sequence needs a numbered pattern such as out%04d.exr; Scan4D
+writes the times into times.csv beside it.
 """
 
 from __future__ import annotations

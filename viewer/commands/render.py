@@ -1,10 +1,9 @@
-"""Draw pictures of a scan without a window.
+"""Draw pictures and films of a scan without a window.
 
-OUT is a .png, .exr or .npz file, a .mp4 film, or for several pictures a numbered pattern
-such as out%04d.png. PNG and MP4 show the look; EXR and NPZ hold what each pixel sees.
-The camera is fitted to the first pose drawn and stays where it is. --replay draws again what
-a recording or a picture tells. --no-gl draws without OpenGL, from code words, and may write
-these as .cw files; such a file is drawn again where SCAN names it.
+OUT is a .png, .exr or .npz file, a .mp4 film, or for several pictures a numbered pattern such as out%04d.png.
+PNG and MP4 show the look. EXR and NPZ store depth, normals and ids of each pixel. Scan4D fits the camera to
+the first pose and leaves it there. --replay draws a recording or a saved picture again. --no-gl draws without
+OpenGL, from code words, and can write them to a .cw file; SCAN can be such a file.
 """
 
 from __future__ import annotations

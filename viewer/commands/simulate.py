@@ -1,7 +1,7 @@
-"""Scan a mesh, or a sequence of meshes, with a virtual scanner.
+"""Scan a mesh or a sequence of meshes with a virtual scanner.
 
-OUT is a .exr file of range views, or points merged from them as PLY, PCD or NPZ; for a sequence
-a numbered pattern such as out%04d.exr, with the times beside it in times.csv.
+OUT is a .exr file of range views, or their merged points as .ply, .pcd or .npz. A sequence needs a numbered
+pattern such as out%04d.exr; Scan4D writes the times into times.csv beside it.
 """
 
 from __future__ import annotations

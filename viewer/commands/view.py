@@ -1,8 +1,7 @@
-"""Open scans in a window; the demo scan where none is named. A recording, a picture or a
-session is shown again.
+"""Open scans in a window.
 
-Where no window can be opened, --fallback plays them without one: into numbered PNGs, a
-contact sheet and a film.
+Without SCAN, the window shows the demo scan. SCAN can also be a recording, a saved picture or a session.
+Where no window can open, --fallback DIR plays the scan into DIR: numbered PNGs, a contact sheet and a film.
 """
 
 from __future__ import annotations
