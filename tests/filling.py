@@ -5,22 +5,17 @@ Where no point is seen, up to three pixels away, a pixel takes the mean of the n
 
 from __future__ import annotations
 
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.backends import Backend, FrameView
+from viewer.backends import FrameView, Suited
 from viewer.backends import points as plain
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.params import param
 from viewer.scan.pose import Pose
 
-TITLE = "Filling"
-GOOD_FOR = "Tests"
-FILLS = True
 SHADER = str(Path(__file__).with_suffix(".comp").resolve())
-BACKEND = Backend("filling", sys.modules[__name__])
 CHANNELS = ("color", "normal", "value")
 
 
@@ -32,31 +27,46 @@ class Params(plain.Params):
     blends: bool = param(True, "Fill with what is around; off: with a depth alone")
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Nothing but positions."""
-    return ()
+class Filling(plain.PointSquares):
+    """Points, and what fills the pixels around them."""
 
+    title = "Filling"
+    good_for = "Tests"
+    params_class = Params
+    accumulates = False
+    fills = True
 
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Scatter the points, then fill."""
-    params: Params = frame.params
-    refinable = plain.draw(pose, frame, surface)
-    gpu, blends = surface.gpu, params.blends
-    gathered = [n for n in CHANNELS if blends and _is_there(n, pose, surface)]
-    for name in gathered:
-        surface.resolve(name)
-    fill = gpu.compute(
-        SHADER, {f"FILL_{name.upper()}": int(name in gathered) for name in CHANNELS}, params=params
-    )
-    surface.bind_textures()
-    surface.bind_storage()
-    surface.bind_own("level", *gathered)
-    with gpu.timers.measure("fill"):
-        gpu.dispatch(fill, surface.size[0] * surface.size[1])
-    return refinable
+    def suits(self, pose: Pose) -> Suited | None:
+        """No scan."""
+        return None
+
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Nothing."""
+        return ()
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Scatter the points, then fill."""
+        params: Params = frame.params
+        refinable = super().draw(pose, frame, surface)
+        gpu, blends = surface.gpu, params.blends
+        gathered = [n for n in CHANNELS if blends and _is_there(n, pose, surface)]
+        for name in gathered:
+            surface.resolve(name)
+        fill = gpu.compute(
+            SHADER, {f"FILL_{name.upper()}": int(name in gathered) for name in CHANNELS}, params=params
+        )
+        surface.bind_textures()
+        surface.bind_storage()
+        surface.bind_own("level", *gathered)
+        with gpu.timers.measure("fill"):
+            gpu.dispatch(fill, surface.size[0] * surface.size[1])
+        return refinable
 
 
 def _is_there(name: str, pose: GpuPose, surface: Surface) -> bool:
     if name == "value":
         return surface.row_values is not None
     return pose.find(f"{name}s") is not None
+
+
+BACKEND = Filling("filling")

@@ -5,13 +5,12 @@ Rows that no pixel has get numbers that would be noticed.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.backends import Backend, FrameView
+from viewer.backends import FrameView, Suited
 from viewer.backends import points as plain
 from viewer.gpu import gl
 from viewer.gpu.context import Gpu
@@ -21,22 +20,12 @@ from viewer.look import ValueKind
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
-TITLE = "Finding"
-GOOD_FOR = "Tests"
-FINDS_NORMALS = True
 VALUES = {
     "gap": ValueKind("Distance to the point before, scan units", is_length=True, is_log=True),
     "slope": ValueKind("How steep the line to the origin is, unknown on the left"),
     "odd": ValueKind("1 where the row is odd, 0 elsewhere", range=(0.0, 1.0)),
 }
 UNSEEN = np.float32(1e20)
-BACKEND = Backend("finding", sys.modules[__name__])
-Params = plain.Params
-
-
-def needs(pose: Pose, params: plain.Params) -> tuple[str, ...]:
-    """Nothing but positions."""
-    return ()
 
 
 def normals(cloud: PointCloud) -> NDArray[np.float32]:
@@ -76,16 +65,36 @@ class _Found:
             self.texels = None
 
 
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Scatter the points, and give the normals, and the number that is wanted, of those that are seen."""
-    refinable = plain.draw(pose, frame, surface)
-    rows = surface.row
-    is_seen = rows != NOTHING
-    own = np.zeros((*rows.shape, 3), np.float32)
-    own[is_seen] = normals(pose.cloud)[rows[is_seen]]
-    surface.own("normal").buffer.write(own)
-    if (name := surface.wanted) is not None:
-        values = np.full(len(pose.cloud), UNSEEN)
-        values[rows[is_seen]] = numbers(pose.cloud)[name][rows[is_seen]]
-        surface.give(surface.keep(_Found).write(values))
-    return refinable
+class Finding(plain.PointSquares):
+    """Points that find numbers and normals."""
+
+    title = "Finding"
+    good_for = "Tests"
+    accumulates = False
+    finds_normals = True
+    values = VALUES
+
+    def suits(self, pose: Pose) -> Suited | None:
+        """No scan."""
+        return None
+
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Nothing."""
+        return ()
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Scatter the points, and give the normals, and the number that is wanted, of those that are seen."""
+        refinable = super().draw(pose, frame, surface)
+        rows = surface.row
+        is_seen = rows != NOTHING
+        own = np.zeros((*rows.shape, 3), np.float32)
+        own[is_seen] = normals(pose.cloud)[rows[is_seen]]
+        surface.own("normal").buffer.write(own)
+        if (name := surface.wanted) is not None:
+            values = np.full(len(pose.cloud), UNSEEN)
+            values[rows[is_seen]] = numbers(pose.cloud)[name][rows[is_seen]]
+            surface.give(surface.keep(_Found).write(values))
+        return refinable
+
+
+BACKEND = Finding("finding")

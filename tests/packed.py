@@ -17,7 +17,6 @@ from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
-from viewer.scan.pose import Pose
 from viewer.srgb import roots_from_bytes
 from viewer.view import View
 
@@ -152,21 +151,19 @@ class NoParams:
     """Parameters: none."""
 
 
-class _Splats:
+class _Splats(Backend):
     """Draws packed splats with a function of points and surface."""
 
-    TITLE = "Packed splats"
-    GOOD_FOR = "Tests"
-    BLENDS = True
-    Params = NoParams
+    title = "Packed splats"
+    good_for = "Tests"
+    blends = True
+    params_class = NoParams
 
     def __init__(
         self, packed: Packed, drawing: Callable[[Points, Surface], object], elliptical: bool
     ) -> None:
+        super().__init__("packed")
         self._packed, self._drawing, self._elliptical = packed, drawing, elliptical
-
-    def needs(self, pose: Pose, params: NoParams) -> tuple[str, ...]:
-        return ()
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         gpu, packed = pose.gpu, self._packed
@@ -192,7 +189,7 @@ def backend(
     packed: Packed, drawing: Callable[[Points, Surface], object], elliptical: bool = False
 ) -> Backend:
     """A backend that draws these splats, and does so with a function of points and surface."""
-    return Backend("packed", _Splats(packed, drawing, elliptical))
+    return _Splats(packed, drawing, elliptical)
 
 
 def _texels(gpu: Gpu, words: NDArray[np.uint32], texel_format: int) -> gl.BufferTexture:

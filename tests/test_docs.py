@@ -65,7 +65,7 @@ def backends_page() -> str:
         "This page is made from the declarations in the code: `python -m pytest tests/test_docs.py --bless`.",
     ]
     for backend in backends().values():
-        about = " ".join((backend.module.__doc__ or "").split())
+        about = " ".join(backend.about.split())
         parts += [f"## {backend.title} (`--backend {backend.name}`)", about, table(backend.parameters)]
         if backend.values:
             parts += ["Numbers that it finds, for `--look color_by=`:", values_table(backend.values)]

@@ -3,18 +3,18 @@ from __future__ import annotations
 import os
 import time
 from dataclasses import dataclass, replace
-from types import ModuleType
 
 import numpy as np
 import pytest
 from scenes import NOTHING, sphere
 
 import viewer
-from viewer.backends import CHANGES, Backend, FrameView
+from viewer.backends import CHANGES, Backend, Derives, FrameView
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, backend_for, bring, fallback, is_prepared, render_frame
+from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.look import Look
@@ -124,18 +124,27 @@ def _view(azimuth: float = 0.0, size: tuple[int, int] = SIZE) -> View:
 VIEW = _view()
 
 
+class Deriving(Backend):
+    """Derives every n-th position, and draws nothing."""
+
+    title = "Deriving"
+    params_class = _Params
+    derives = Derives.IN_PROCESS
+
+    def derive(self, pose: Pose, params: _Params, view: View | None) -> tuple[np.ndarray, int]:
+        return every_nth(pose, params)
+
+    def upload(self, gpu: Gpu, arrays: tuple[np.ndarray, int]) -> _Uploaded:
+        return _Uploaded(arrays)
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        raise NotImplementedError
+
+
 @pytest.fixture
 def deriving() -> Backend:
     """A backend that derives every n-th position."""
-    module = ModuleType("deriving")
-    vars(module).update(
-        TITLE="Deriving",
-        Params=_Params,
-        needs=lambda pose, params: (),
-        derive=every_nth,
-        upload=lambda gpu, arrays: _Uploaded(arrays),
-    )
-    return Backend("deriving", module)
+    return Deriving("deriving")
 
 
 def test_a_pose_at_another_time_keeps_what_was_made_of_it(renderer: Renderer, deriving: Backend) -> None:
@@ -176,7 +185,8 @@ def nearer_half(pose: Pose, params: _Params, view: View) -> tuple[np.ndarray, in
 
 
 def test_what_is_derived_by_camera_is_kept_for_the_last_views(renderer: Renderer, deriving: Backend) -> None:
-    vars(deriving.module).update(DERIVED_BY_CAMERA=True, derive=nearer_half)
+    deriving.derived_by_camera = True
+    deriving.derive = nearer_half  # type: ignore[method-assign]
     own, pose = Renderer(renderer.gpu), _of(sphere(1000))
     resident, views = own.resident(pose), [_view(azimuth) for azimuth in range(0, 60, 10)]
 
@@ -201,11 +211,14 @@ def test_what_is_derived_by_camera_is_kept_for_the_last_views(renderer: Renderer
     assert first[0].released
 
 
-@dataclass(frozen=True)
-class _Told:
-    """What a backend was told, and draws nothing."""
+class _Told(Backend):
+    """Keeps what each call was told, and draws nothing."""
 
-    frames: list[FrameView]
+    params_class = _Params
+
+    def __init__(self) -> None:
+        super().__init__("told")
+        self.frames: list[FrameView] = []
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         self.frames.append(frame)
@@ -214,7 +227,8 @@ class _Told:
 
 
 def test_jobs_of_views_that_were_passed_are_dropped(renderer: Renderer, deriving: Backend) -> None:
-    vars(deriving.module).update(DERIVED_BY_CAMERA=True, derive=nearer_half)
+    deriving.derived_by_camera = True
+    deriving.derive = nearer_half  # type: ignore[method-assign]
     own, pose = Renderer(renderer.gpu), _of(sphere(1000))
     resident = own.resident(pose)
     entry = own._entry(resident)
@@ -239,7 +253,9 @@ def test_a_job_of_a_view_that_was_passed_is_cancelled(renderer: Renderer, derivi
             time.sleep(0.001)
         return nearer_half(pose, params, view)
 
-    vars(deriving.module).update(DERIVED_BY_CAMERA=True, DERIVES_ON_THREAD=True, derive=derive)
+    deriving.derived_by_camera = True
+    deriving.derives = Derives.ON_THREAD
+    deriving.derive = derive  # type: ignore[method-assign]
     own, pose = Renderer(renderer.gpu), _of(sphere(1000))
     resident = own.resident(pose)
     assert own.prepare(resident, deriving, _Params(), Look(), False, _view(0)) is None
@@ -252,10 +268,8 @@ def test_a_job_of_a_view_that_was_passed_is_cancelled(renderer: Renderer, derivi
 
 
 def test_a_backend_is_told_what_changed_and_whether_more_will_follow(renderer: Renderer) -> None:
-    module, told = ModuleType("told"), _Told([])
-    vars(module).update(Params=_Params, needs=lambda pose, params: (), draw=told.draw)
-    listening, surface = Backend("told", module), Surface(renderer.gpu, SIZE)
-    first = Request(_of(BARE), Camera.orbit(BARE.bounds()), listening, _Params())
+    told, surface = _Told(), Surface(renderer.gpu, SIZE)
+    first = Request(_of(BARE), Camera.orbit(BARE.bounds()), told, _Params())
     turned = replace(first, camera=Camera.orbit(BARE.bounds(), 10))
     changed = replace(turned, params=_Params(shade=3))
     another = replace(changed, pose=_of(BARE))
@@ -270,16 +284,14 @@ def test_a_backend_is_told_what_changed_and_whether_more_will_follow(renderer: R
 
 
 def test_a_backend_is_told_of_other_numbers_and_after_a_failure_of_everything(renderer: Renderer) -> None:
-    told = _Told([])
+    class Failing(_Told):
+        def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+            if frame.params.shade == 13:
+                raise InputError("thirteen")
+            return super().draw(pose, frame, surface)
 
-    def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-        if frame.params.shade == 13:
-            raise InputError("thirteen")
-        return told.draw(pose, frame, surface)
-
-    module = ModuleType("told")
-    vars(module).update(Params=_Params, needs=lambda pose, params: (), draw=draw)
-    first = Request(_of(BARE), Camera.orbit(BARE.bounds()), Backend("told", module), _Params())
+    told = Failing()
+    first = Request(_of(BARE), Camera.orbit(BARE.bounds()), told, _Params())
     surface = Surface(renderer.gpu, SIZE)
     numbers = [np.arange(len(BARE)), np.arange(len(BARE))]
     layered = [
@@ -300,9 +312,13 @@ def test_a_backend_is_told_of_other_numbers_and_after_a_failure_of_everything(re
 
 
 def test_a_backend_of_range_views_is_refused_for_points(renderer: Renderer) -> None:
-    module = ModuleType("ranging")
-    vars(module).update(TITLE="Ranging", Params=_Params, needs=lambda pose, params: ("views",))
-    request = Request(_of(BARE), Camera.orbit(BARE.bounds()), Backend("ranging", module))
+    class Ranging(_Told):
+        title = "Ranging"
+
+        def needs(self, pose: Pose, params: _Params) -> tuple[str, ...]:
+            return ("views",)
+
+    request = Request(_of(BARE), Camera.orbit(BARE.bounds()), Ranging())
     with pytest.raises(InputError, match="Ranging draws range views, and this scan has none"):
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))
 
@@ -333,7 +349,7 @@ def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancell
 def test_what_a_thread_does_is_prepared_there_and_may_be_done_in_time(
     renderer: Renderer, deriving: Backend
 ) -> None:
-    vars(deriving.module)["DERIVES_ON_THREAD"] = True
+    deriving.derives = Derives.ON_THREAD
     own = Renderer(renderer.gpu)
     resident = own.resident(pose := Pose(0, 0.0, "x", sphere(1000)))
     prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
@@ -345,11 +361,12 @@ def test_what_a_thread_does_is_prepared_there_and_may_be_done_in_time(
 
 
 def test_work_on_a_thread_can_be_cancelled(renderer: Renderer, deriving: Backend) -> None:
-    def until_told(pose: Pose, params: _Params) -> None:
+    def until_told(pose: Pose, params: _Params, view: View | None) -> None:
         while True:
             checkpoint(0.5)
 
-    vars(deriving.module).update(DERIVES_ON_THREAD=True, derive=until_told)
+    deriving.derives = Derives.ON_THREAD
+    deriving.derive = until_told  # type: ignore[method-assign]
     own = Renderer(renderer.gpu)
     resident = own.resident(Pose(0, 0.0, "x", sphere(1000)))
     assert own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW) is None
@@ -359,7 +376,7 @@ def test_work_on_a_thread_can_be_cancelled(renderer: Renderer, deriving: Backend
     own.release()  # waits for the thread
 
 
-def for_ever(pose: Pose, params: _Params) -> None:
+def for_ever(pose: Pose, params: _Params, view: View | None) -> None:
     """Says which process it is by its progress, and never ends."""
     checkpoint(float(os.getpid()))
     while True:
@@ -368,7 +385,7 @@ def for_ever(pose: Pose, params: _Params) -> None:
 
 def test_releasing_ends_what_is_being_prepared(renderer: Renderer, deriving: Backend) -> None:
     own = Renderer(renderer.gpu)
-    vars(deriving.module)["derive"] = for_ever
+    deriving.derive = for_ever  # type: ignore[method-assign]
     pose = Pose(0, 0.0, "x", sphere(1000))
     resident = own.resident(pose)
     own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)

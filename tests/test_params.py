@@ -60,7 +60,7 @@ def test_backends_keep_the_contract(name: str) -> None:
     chosen = backend(name)
     assert chosen.title
     assert chosen.help.endswith(".")
-    assert chosen.params() == chosen.module.Params()
+    assert chosen.params() == chosen.params_class()
     for p in chosen.parameters:
         assert p.help
         assert p.affects in AFFECTS
@@ -139,7 +139,7 @@ def test_a_declaration_is_told_in_full() -> None:
     assert json.loads(json.dumps(told)) == told
 
 
-_DECLARED = {"look": Look, "marks": Marks} | {one.name: one.module.Params for one in backends().values()}
+_DECLARED = {"look": Look, "marks": Marks} | {one.name: one.params_class for one in backends().values()}
 
 
 @pytest.mark.parametrize("name", list(_DECLARED))

@@ -6,21 +6,24 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from types import ModuleType
 
 import numpy as np
 import pytest
 from scenes import sphere
 
-from viewer.backends import Backend
+from viewer.backends import Backend, Derives, FrameView
 from viewer.backends import backend as find_backend
 from viewer.errors import InputError
+from viewer.gpu.context import Gpu
+from viewer.gpu.pose import GpuPose
+from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.params import param
 from viewer.renderer import Renderer, Want
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.task import checkpoint
+from viewer.view import View
 
 BYTES = 12_000  # of what is derived of a pose
 BARE = PointCloud.from_arrays(sphere(1500).positions)
@@ -40,12 +43,12 @@ class _Uploaded:
         pass
 
 
-def every_nth(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
+def every_nth(pose: Pose, params: _Params, view: View | None = None) -> tuple[np.ndarray, int]:
     """Every n-th position, and the process that looked for them."""
     return pose.cloud.positions[:: params.step], os.getpid()
 
 
-def slowly(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
+def slowly(pose: Pose, params: _Params, view: View | None = None) -> tuple[np.ndarray, int]:
     """Tells its process and takes longer than a test waits, but for those of an odd frame."""
     checkpoint(float(os.getpid()))
     while pose.index % 2 == 0:
@@ -54,22 +57,29 @@ def slowly(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
     return every_nth(pose, params)
 
 
-def failing(pose: Pose, params: _Params) -> None:
+def failing(pose: Pose, params: _Params, view: View | None = None) -> None:
     """Fails."""
     raise InputError("is no good", pose.label)
 
 
+class Deriving(Backend):
+    """Derives what a test says, and draws nothing."""
+
+    title = "Deriving"
+    params_class = _Params
+
+    def upload(self, gpu: Gpu, arrays: tuple[np.ndarray, int]) -> _Uploaded:
+        return _Uploaded(arrays)
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        raise NotImplementedError
+
+
 def deriving(derive: Callable, on_thread: bool = True) -> Backend:
-    module = ModuleType("deriving")
-    vars(module).update(
-        TITLE="Deriving",
-        Params=_Params,
-        needs=lambda pose, params: (),
-        derive=derive,
-        upload=lambda gpu, arrays: _Uploaded(arrays),
-        DERIVES_ON_THREAD=on_thread,
-    )
-    return Backend("deriving", module)
+    backend = Deriving("deriving")
+    backend.derive = derive  # type: ignore[method-assign]
+    backend.derives = Derives.ON_THREAD if on_thread else Derives.IN_PROCESS
+    return backend
 
 
 def want(pose: Pose, backend: Backend, **params: int) -> Want:
@@ -149,7 +159,7 @@ def test_work_in_processes_is_ended_where_it_keeps_others_waiting(own: Renderer,
 def test_what_a_worker_is_at_is_let_finish_while_playing_goes_on(own: Renderer, poses: list[Pose]) -> None:
     began: list[int] = []
 
-    def derive(pose: Pose, params: _Params) -> tuple[np.ndarray, int]:
+    def derive(pose: Pose, params: _Params, view: View | None = None) -> tuple[np.ndarray, int]:
         began.append(pose.index)
         time.sleep(0.6)
         return every_nth(pose, params)
@@ -197,7 +207,7 @@ def test_an_upload_that_fails_is_tried_once_and_told_when_it_is_drawn(
         raise InputError("does not fit")
 
     backend = deriving(every_nth)
-    vars(backend.module)["upload"] = upload
+    backend.upload = upload  # type: ignore[method-assign,assignment]
     bad, good = want(poses[0], backend), want(poses[1], deriving(every_nth))
     prepare_all(own, [bad, good], lambda: own.is_prepared(bad) and own.is_prepared(good))
     own.prepare_ahead([bad])

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from scenes import looking_down_z, plane
 
-from viewer.backends import CHANGES, Backend, FrameView, points
+from viewer.backends import CHANGES, FrameView, points
 from viewer.frame import Request
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
@@ -15,25 +15,21 @@ if TYPE_CHECKING:
     from viewer.renderer import Renderer
 
 
-class Watched:
+class Watched(points.PointSquares):
     """The points, and what each call was told has changed."""
 
-    TITLE, Params = points.TITLE, points.Params
-
     def __init__(self) -> None:
+        super().__init__("watched")
         self.told: list[frozenset[str]] = []
-
-    def needs(self, pose: Pose, params: points.Params) -> tuple[str, ...]:
-        return points.needs(pose, params)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         self.told.append(frame.changed)
-        return points.draw(pose, frame, surface)
+        return super().draw(pose, frame, surface)
 
 
 def test_timed_pictures_are_drawn_as_if_they_were_the_first(renderer: Renderer) -> None:
     watched = Watched()
-    request = Request(Pose(0, 0.0, "plane", plane(20, 2.0)), looking_down_z(), Backend("watched", watched))
+    request = Request(Pose(0, 0.0, "plane", plane(20, 2.0)), looking_down_z(), watched)
     surface = Surface(renderer.gpu, (40, 30))
     for _ in range(2):
         draw(renderer, request, surface)

@@ -87,7 +87,7 @@ def render_frame(
     view = replace(view, shift=shift)
     goes_on = None
     asked = getattr(params, "share", None) or 1.0
-    if moving and backend.keeps and before is not None and asked == 1:
+    if moving and backend.accumulates and before is not None and asked == 1:
         drawn_as = before.drawn.get("pose"), before.drawn.get("parameters")
         goes_on = Before(before, before.stats.known) if drawn_as == (pose, (backend, params)) else None
     surface.start(pose, view, look, request.layers, backend.values, backend.needs(pose.pose, params))

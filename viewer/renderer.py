@@ -11,7 +11,7 @@ from concurrent import futures
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from .backends import Backend, Derived
+from .backends import Backend, Derived, Derives
 from .errors import InputError
 from .gpu.context import Gpu, headless
 from .gpu.pose import GpuPose
@@ -238,7 +238,7 @@ class Renderer:
         while (step := self._step(entry, want)) is not None:
             if not self._do(entry, step, wait):
                 return None
-        if backend.derive is None:
+        if backend.derives is Derives.NEVER:
             return Prepared(None)
         entry.derived.move_to_end(key)
         return entry.derived[key]
@@ -364,7 +364,7 @@ class Renderer:
             name = f"Estimating {' and '.join(missing)}"
             args = lambda: (_bare(entry.current), missing)  # noqa: E731
             return _Step(missing, name, estimate, args, gpu_pose.add_estimates)
-        if backend.derive is None or (backend.derived_by_camera and view is None):
+        if backend.derives is Derives.NEVER or (backend.derived_by_camera and view is None):
             return None
         key = _derived_key(backend, params, view)
         if key in entry.derived:
@@ -372,13 +372,13 @@ class Renderer:
 
         def derive_args() -> tuple[Any, ...]:
             pose = gpu_pose.pose if draws_samples else entry.current
-            return (pose, params, *([view] if backend.derived_by_camera else []))
+            return pose, params, view if backend.derived_by_camera else None
 
         def take(result: Any) -> None:
             with gpu_pose.preparing("upload"):
                 entry.keep(key, Prepared(backend.upload(self.gpu, result)))
 
-        name, on_thread = f"Preparing {backend.title}", backend.derives_on_thread
+        name, on_thread = f"Preparing {backend.title}", backend.derives is Derives.ON_THREAD
         return _Step(key, name, backend.derive, derive_args, take, on_thread)
 
     def _do(self, entry: _Resident, step: _Step, wait: bool) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import pytest
 
@@ -61,7 +60,13 @@ class Wrong:
 
 
 def of(kind: type) -> Backend:
-    return Backend(kind.__name__.lower(), SimpleNamespace(Params=kind))
+    class Switched(Backend):
+        params_class = kind
+
+        def draw(self, pose: object, frame: object, surface: object) -> bool:
+            raise NotImplementedError
+
+    return Switched(kind.__name__.lower())
 
 
 def test_a_backend_without_a_key_takes_none_from_another() -> None:

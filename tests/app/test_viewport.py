@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -136,15 +135,17 @@ class _NoParams:
 def test_a_backend_that_draws_more_simply_in_motion_is_called_again_at_rest(viewport: Viewport) -> None:
     told: list[bool] = []
 
-    def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-        told.append(frame.moving)
-        surface.clear()
-        surface.stats.simplified = frame.moving
-        return False
+    class Simple(Backend):
+        title = "Simple"
+        params_class = _NoParams
 
-    module = ModuleType("simple")
-    vars(module).update(TITLE="Simple", Params=_NoParams, needs=lambda pose, params: (), draw=draw)
-    request = replace(REQUEST, backend=Backend("simple", module))
+        def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+            told.append(frame.moving)
+            surface.clear()
+            surface.stats.simplified = frame.moving
+            return False
+
+    request = replace(REQUEST, backend=Simple("simple"))
     viewport.draw(request)
     assert (told, viewport.is_complete) == ([False], True)
     dragged = turned(request)

@@ -16,7 +16,7 @@ from test_instancing import assert_agree
 
 from viewer.analysis.pick import pick
 from viewer.backends import backend
-from viewer.backends.voxels import Params, derive
+from viewer.backends.voxels import Params
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
@@ -158,7 +158,7 @@ def test_what_is_seen_is_the_surface(draw: Draw, shape: str, count: int) -> None
     assert (surface.row != NOTHING)[both].all(), "a hole"
     _, along = rays(surface)
     facing = -np.einsum("ijk,ijk->ij", normal, along)[both] / np.linalg.norm(along, axis=-1)[both]
-    octree = derive(Pose(0, 0.0, "", cloud), Params())
+    octree = backend("voxels").derive(Pose(0, 0.0, "", cloud), Params(), None)
     edge = octree.size(octree.depth)
     size = surface.pose.cloud.radii[surface.row[both]].astype(float)  # type: ignore[union-attr, index]
     away = before_surface(surface, true_depth) * facing / edge
@@ -185,7 +185,7 @@ def test_an_octant_is_as_large_as_the_picture_asks(draw: Draw) -> None:
     for threshold in (1.0, 6.0):
         fixed = {"shape": "cubes", "least": 0.0, "pixel_threshold": threshold}
         surface = voxels(draw, CLOUD, CAMERAS["perspective"], **fixed)
-        cubes, octree = surface.pose.cloud, derive(Pose(0, 0.0, "", CLOUD), Params())
+        cubes, octree = surface.pose.cloud, backend("voxels").derive(Pose(0, 0.0, "", CLOUD), Params(), None)
         size = 2 * cubes.radii * surface.view.scale / surface.view.depths(cubes.positions)  # type: ignore[operator]
         inner = cubes.radii > 0.75 * octree.size(octree.depth)  # type: ignore[operator]
         assert inner.any() == (threshold > 1)
@@ -217,7 +217,7 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
         CLOUD.world(), normals=CLOUD.normals, colors=colors, scalars={"row": np.arange(len(CLOUD))}
     )
     surface = voxels(draw, cloud, CAMERAS["perspective"], max_depth=4, look=Look(color_by="row"))
-    octree = derive(Pose(0, 0.0, "", cloud), Params())
+    octree = backend("voxels").derive(Pose(0, 0.0, "", cloud), Params(), None)
     starts = np.cumsum(octree.counts) - octree.counts
     octants = surface.octant
     assert octants is not None

@@ -148,7 +148,7 @@ def test_a_backend_that_cannot_draw_a_scene_is_left_out_and_said(
     def refuses(*_: object) -> None:
         raise InputError("needs range views")
 
-    monkeypatch.setattr(backend("points").module, "needs", refuses)
+    monkeypatch.setattr(backend("points"), "needs", refuses)
     bench = Bench(renderer, SETTINGS)
     rows = bench.measure(replace(TORUS, contenders=only("gl-points", "points", "surfels")))
     assert "points" not in by_backend(rows)
@@ -212,7 +212,7 @@ def test_what_a_backend_cannot_draw_is_its_limit(renderer: Renderer, monkeypatch
     def refuses(*_: object) -> None:
         raise InputError("needs range views")
 
-    monkeypatch.setattr(backend("points").module, "needs", refuses)
+    monkeypatch.setattr(backend("points"), "needs", refuses)
     lines = list(Bench(renderer, SETTINGS).numerics(["points"]))
     assert len(lines) > 50
     assert all(line["limit"] == "needs range views" and not line["held"] for line in lines)

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from scenes import NOTHING, sphere
 
 from viewer.analysis.pick import pick
-from viewer.backends import backends
+from viewer.backends import FrameView, backends
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, fallback, render_frame
+from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.look import COLOR_BY, Look, ValueKind, color_table
 from viewer.output.export import write_picture
@@ -162,17 +163,13 @@ def test_what_is_asked_for_tells_the_backend(renderer: Renderer) -> None:
     """That it has to find numbers anew, or others."""
     changes: list[frozenset[str]] = []
 
-    class Noting:
-        TITLE, Params, VALUES = finding.TITLE, finding.Params, finding.VALUES
-        needs = staticmethod(finding.needs)
-
-        @staticmethod
-        def draw(pose: object, frame: object, surface: Surface) -> bool:
-            changes.append(frame.changed)  # type: ignore[attr-defined]
-            return finding.draw(pose, frame, surface)  # type: ignore[arg-type]
+    class Noting(finding.Finding):
+        def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+            changes.append(frame.changed)
+            return super().draw(pose, frame, surface)
 
     surface, pose = Surface(renderer.gpu, SIZE), Pose(0, 0.0, "x", CLOUD)
-    backend = replace(finding.BACKEND, module=Noting)
+    backend = Noting("finding")
     for name in ("slope", "slope", "gap", "auto"):
         look = replace(FLAT, color_by=name)
         render_frame(renderer, Request(pose, CAMERA, backend, look=look), surface)

@@ -56,7 +56,7 @@ def both(
     camera = Camera.orbit(layers.place.bounds(poses[0].bounds), 30, 20, aspect=SIZE[0] / SIZE[1])
     surfaces = []
     for pose, backend in zip(poses, (sampling.BACKEND, "points"), strict=True):
-        params = sampling.Params(point_size=point_size)
+        params = sampling.BACKEND.params_class(point_size=point_size)
         surface = Surface(renderer.gpu, SIZE)
         while render_frame(renderer, Request(pose, camera, backend, params, look, layers), surface):
             pass
@@ -243,7 +243,7 @@ def test_layers_are_those_of_the_points_which_they_are_by(renderer: Renderer) ->
     surfaces = []
     for backend in (sampling.BACKEND, "points", sampling.BACKEND):  # of one pose on the GPU
         surface = Surface(renderer.gpu, SIZE)
-        params = sampling.Params(point_size=2)
+        params = sampling.BACKEND.params_class(point_size=2)
         render_frame(renderer, Request(pose, camera, backend, params, look, layers), surface)
         surfaces.append(surface)
     samples, points, again = surfaces
@@ -316,6 +316,6 @@ def test_points_alone_have_no_samples(renderer: Renderer) -> None:
     pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", cloud))
     with pytest.raises(InputError, match="the scan has no range views"):
         _ = pose.range_points
-    request = Request(pose.pose, Camera.orbit(cloud.bounds()), Backend("sampling", sampling))
+    request = Request(pose.pose, Camera.orbit(cloud.bounds()), sampling.BACKEND)
     with pytest.raises(InputError, match="Sampling draws range views, and this scan has none"):
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from scenes import DRAWS_POINTS, of_variant, variants
 
 from viewer.backends import Backend, Limit, backends
 from viewer.backends import backend as find_backend
+from viewer.backends.points import PointSquares
 from viewer.bench.numerics import EXACT, distinct_limits, rows, ways_of
 from viewer.bench.rounding import Rounding
 from viewer.bench.shots import RgbdImage, picture
@@ -119,8 +119,10 @@ def test_an_outcome_is_held_or_within_its_limit_or_fails(renderer: Renderer) -> 
     )
 
     def limited(share: float) -> Backend:
-        declared = {**vars(backends()["points"].module), "LIMITS": {row.name: Limit(share, "")}}
-        return Backend("points", SimpleNamespace(**declared))
+        class Limited(PointSquares):
+            limits = {row.name: Limit(share, "")}  # noqa: RUF012
+
+        return Limited("points")
 
     assert not row.compare(renderer, backends()["points"]).allowed
     assert not row.compare(renderer, limited(0.01)).allowed

@@ -1,53 +1,21 @@
 """Renderer backends: one file or package each, found by scanning this folder.
 
-A backend answers one question: which surface does each pixel see? Its module has
-
-    a docstring          the first line appears in the panel and says what the backend draws
-    TITLE                its name in the panel
-    GOOD_FOR             a few words on when to choose it, such as "Range images; fills holes"
-    Params               a frozen dataclass of parameters (see viewer/params.py)
-    needs(pose, params) -> names of what the pose must have. "normals" and "radii": Scan4D estimates them if
-                         the scan lacks them. "views": the pose must have range views. ("views",) alone means
-                         that rows are samples of the views and that no point is read
-    draw(gpu_pose, frame, surface) -> bool
-                         runs on the GL thread; writes `surface.depths`, `surface.rows` and the channels of
-                         its own (`Surface.own`). True if a later call would refine the picture
-
-A backend that prepares data for a pose also has
-
-    derive(pose, params) -> arrays      CPU only, on any thread
-    upload(gpu, arrays) -> derived      GL thread; `derived.nbytes` and `derived.release()`
-
-`draw` gets the result as `frame.derived`. A window runs `derive` in a process of its own. With
-DERIVES_ON_THREAD = True it runs on a thread, which starts sooner; use it for code that releases the
-interpreter's lock. With DERIVED_BY_CAMERA = True the call is derive(pose, params, view), once for each view;
-the last few results are kept.
-
-Optional declarations:
-
-    ROWS                 what a row of its pictures stands for: one of `ROWS`, "points" by default
-    BLENDS               True: a pixel may show a blend of several points
-    KEEPS                True: in motion, a picture of a share of the points adds those of the last picture
-    FILLS                True: it may fill pixels that no point covers
-    FINDS_NORMALS        True: it writes normals of its own, so that a look needs no normals of the pose
-    VALUES               numbers that it computes for its rows, for looks to colour by:
-                         name -> `ValueKind`; see `Surface.wanted`
-    suits(pose) -> Suited   how well it works as the default for a scan; None if it does not
-    offers(pose) -> several   sets of parameter values that draw the scan without preparation. The automatic
-                         choice for a time or an error (viewer/choice) picks one of these sets
-    KEPT                 parameter -> why its default stays although a benchmark finds a better value
-    LIMITS               row of the stability suite (viewer/bench/numerics.py) -> `Limit`, or several
-
-A module whose name begins with an underscore is no backend. No list of backends exists anywhere else.
+A backend answers one question: which surface does each pixel see? Its module holds one subclass of
+`Backend`. The module's docstring says what the backend does; the panel shows its first line.
+Names that begin with an underscore are no backends. No other list of backends exists.
 """
 
 from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Collection, Mapping
+import sys
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import cache
+from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple, Protocol
 
 from ..errors import InputError, unknown_name
@@ -127,7 +95,9 @@ def with_levels(pose: Pose, *offered: dict[str, object]) -> tuple[dict[str, obje
 class Derived(Protocol):
     """Data on the GPU that a backend prepared for a pose."""
 
-    nbytes: int
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it holds."""
 
     def release(self) -> None:
         """Delete it."""
@@ -157,125 +127,112 @@ class FrameView:
     before: Before | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Backend:
-    """One backend module, or an object with the same names, by its declarations."""
+class Derives(Enum):
+    """Where a backend's `derive` runs for a window, which does not wait for it."""
 
-    name: str
-    module: Any
+    NEVER = "never"  # the backend prepares nothing
+    IN_PROCESS = "in a process"  # several poses at once
+    ON_THREAD = "on a thread"  # done sooner; for work that releases the interpreter's lock
+
+
+class Backend(ABC):
+    """Base class of backends.
+
+    A subclass gives `title`, `params_class` and `draw`. Everything else has a default.
+    name: how commands and files call it, the module's name.
+    """
+
+    title: str  # its name in the panel
+    good_for: str = ""  # what a user chooses it for, in a few words: "Range images; fills holes"
+    params_class: type[Any]  # frozen dataclass of parameters, see viewer/params.py
+    rows: str = "points"  # what a row of its pictures stands for: one of `ROWS`
+    blends: bool = False  # a pixel may show several points
+    fills: bool = False  # it may fill pixels that no point gave
+    finds_normals: bool = False  # it writes its own normals, so looks need none of the pose
+    accumulates: bool = False  # moving pictures of a share of the points continue the one before
+    derives: Derives = Derives.NEVER  # where `derive` runs
+    derived_by_camera: bool = False  # `derive` runs for each view; the last few results are kept
+    # Numbers that it finds for the rows that it draws, for looks to colour by; see `Surface.wanted`.
+    values: Mapping[str, ValueKind] = MappingProxyType({})
+    # Row of the stability suite (viewer/bench/numerics.py) -> what holds in place of the row's own bound.
+    limits: Mapping[str, Limit | tuple[Limit, ...]] = MappingProxyType({})
+    # Parameter -> why its default stays although a benchmark finds a value that beats it.
+    default_reasons: Mapping[str, str] = MappingProxyType({})
+
+    def __init__(self, name: str) -> None:
+        self.name = name
 
     def __str__(self) -> str:
         return self.name
 
-    @property
-    def title(self) -> str:
-        """The name in the panel."""
-        return self.module.TITLE
+    @abstractmethod
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Write `surface.depths` and `surface.rows`, and its own channels (`Surface.own`), on the GL thread.
+
+        Returns True if a later call would refine the picture.
+        """
+
+    def needs(self, pose: Pose, params: Any) -> tuple[str, ...]:
+        """Names of what the pose must have; by default nothing but positions.
+
+        "normals" and "radii" of points are estimated where the pose lacks them. "views": range views,
+        without which the backend cannot draw; where it names these alone, its rows are samples.
+        """
+        return ()
+
+    def suits(self, pose: Pose) -> Suited | None:
+        """How well it does as the default for a scan; None, the default: it is never chosen."""
+        return None
+
+    def offers(self, pose: Pose) -> tuple[Mapping[str, object], ...]:
+        """Parameter values, by name, with each of which it draws the scan with nothing prepared.
+
+        The automatic choice (viewer/choice) takes one of them; by default there are none.
+        """
+        return ()
+
+    def derive(self, pose: Pose, params: Any, view: View | None) -> Any:
+        """Arrays that it prepares for a pose, on the CPU, on any thread; see `derives`.
+
+        view: None unless `derived_by_camera`.
+        """
+        raise NotImplementedError
+
+    def upload(self, gpu: Gpu, arrays: Any) -> Derived:
+        """Put what `derive` gave on the GPU, for `draw` to find as `frame.derived`; on the GL thread."""
+        raise NotImplementedError
 
     @property
-    def good_for(self) -> str:
-        """A few words on when to choose it."""
-        return self.module.GOOD_FOR
+    def about(self) -> str:
+        """What it does, and from which paper: the docstring of its module."""
+        return sys.modules[type(self).__module__].__doc__ or ""
 
     @property
     def help(self) -> str:
-        """One line on what it draws."""
-        return (self.module.__doc__ or "").splitlines()[0]
+        """One line on what it does."""
+        return self.about.splitlines()[0]
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """The parameters as declared."""
-        return describe(self.module.Params)
-
-    @property
-    def rows(self) -> str:
-        """Meaning of a row of the backend's pictures: one of `ROWS`."""
-        return getattr(self.module, "ROWS", "points")
-
-    @property
-    def blends(self) -> bool:
-        """Whether a pixel may show a blend of several points."""
-        return getattr(self.module, "BLENDS", False)
-
-    @property
-    def keeps(self) -> bool:
-        """Whether a moving picture of a share of the points also draws those of the last picture."""
-        return getattr(self.module, "KEEPS", False)
-
-    @property
-    def fills(self) -> bool:
-        """Whether the backend may fill pixels that no point covers."""
-        return getattr(self.module, "FILLS", False)
-
-    @property
-    def finds_normals(self) -> bool:
-        """Whether its pictures have normals of their own, whatever the pose has."""
-        return getattr(self.module, "FINDS_NORMALS", False)
-
-    @property
-    def values(self) -> Mapping[str, ValueKind]:
-        """Numbers that the backend computes for its rows, by name."""
-        return getattr(self.module, "VALUES", {})
-
-    def suits(self, pose: Pose) -> Suited | None:
-        """How well it works as the default for a scan; None if it does not."""
-        return self.module.suits(pose) if hasattr(self.module, "suits") else None
-
-    def offers(self, pose: Pose) -> tuple[Mapping[str, object], ...]:
-        """Sets of parameter values that the automatic choice for a time or an error may take."""
-        return self.module.offers(pose) if hasattr(self.module, "offers") else ()
-
-    @property
-    def limits(self) -> Mapping[str, tuple[Limit, ...]]:
-        """Limits of the backend in the stability suite, by the suite's rows."""
-        declared = getattr(self.module, "LIMITS", {})
-        return {
-            row: (found,) if isinstance(found, Limit) else tuple(found) for row, found in declared.items()
-        }
-
-    @property
-    def kept(self) -> Mapping[str, str]:
-        """Why a default stays although another value beats it on some scene, by parameter."""
-        return getattr(self.module, "KEPT", {})
+        return describe(self.params_class)
 
     def params(self, values: Mapping[str, object] | None = None) -> Any:
         """Make its parameters, with these values in place of defaults; raises InputError."""
-        return parse(self.module.Params, values or {}, f"parameter of '{self.name}'")
+        return parse(self.params_class, values or {}, f"parameter of '{self.name}'")
 
-    def needs(self, pose: Pose, params: Any) -> tuple[str, ...]:
-        """Names of what it needs of this pose: "normals", "radii", "views"."""
-        return self.module.needs(pose, params)
+    def limits_of(self, row: str) -> tuple[Limit, ...]:
+        """Its limits in a row of the stability suite."""
+        found = self.limits.get(row, ())
+        return (found,) if isinstance(found, Limit) else found
 
     def draws(self, pose: Pose) -> bool:
-        """Whether it draws this pose, and does not need range views that are none of it."""
+        """Whether it can draw this pose: it does not need range views that the pose lacks."""
         return bool(pose.views) or "views" not in self.needs(pose, self.params())
 
     def draws_samples(self, pose: Pose, params: Any) -> bool:
-        """Whether it draws this pose from samples of its range views alone: nothing is read of its points."""
+        """Whether it draws this pose from samples of its range views alone, and reads no points."""
         return set(self.needs(pose, params)) == {"views"}
-
-    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-        """Draw; True if a later call would refine the picture."""
-        return self.module.draw(pose, frame, surface)
-
-    @property
-    def derive(self) -> Callable[..., Any] | None:
-        """The backend's derive function, None where it prepares nothing."""
-        return getattr(self.module, "derive", None)
-
-    @property
-    def derives_on_thread(self) -> bool:
-        """Whether a thread does for `derive`, or it needs a process of its own."""
-        return getattr(self.module, "DERIVES_ON_THREAD", False)
-
-    @property
-    def derived_by_camera(self) -> bool:
-        """Whether what it derives is of one view, which `derive` then gets too."""
-        return getattr(self.module, "DERIVED_BY_CAMERA", False)
-
-    def upload(self, gpu: Gpu, arrays: Any) -> Derived:
-        """Put what `derive` gave on the GPU."""
-        return self.module.upload(gpu, arrays)
 
     def derive_key(self, params: Any) -> tuple[Any, ...]:
         """The parameter values that what it derives depends on."""
@@ -286,7 +243,16 @@ class Backend:
 def backends() -> dict[str, Backend]:
     """All backends by name, in alphabetical order."""
     names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
-    return {name: Backend(name, importlib.import_module(f"{__name__}.{name}")) for name in names}
+    return {name: _class_of(importlib.import_module(f"{__name__}.{name}"))(name) for name in names}
+
+
+def _class_of(module: ModuleType) -> type[Backend]:
+    """The backend that a module holds."""
+    (found,) = (
+        one for one in vars(module).values()
+        if isinstance(one, type) and issubclass(one, Backend) and one.__module__ == module.__name__
+    )  # fmt: skip
+    return found
 
 
 def backend(name: str) -> Backend:

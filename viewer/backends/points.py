@@ -12,12 +12,8 @@ from ..gpu.squares import LARGEST_SQUARE, draw_squares
 from ..gpu.surface import Surface
 from ..params import param
 from ..scan.pose import Pose
-from . import FrameView, Suited, share_param, with_levels
+from . import Backend, FrameView, Suited, share_param, with_levels
 from .hpr import mark_visible
-
-TITLE = "Points"
-GOOD_FOR = "Fastest; exact positions"
-KEEPS = True
 
 
 @dataclass(frozen=True)
@@ -44,24 +40,29 @@ class Params:
     share: float = share_param()
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Nothing but positions."""
-    return ()
+class PointSquares(Backend):
+    """The backend `points`."""
 
+    title = "Points"
+    good_for = "Fastest; exact positions"
+    params_class = Params
+    accumulates = True
 
-def suits(pose: Pose) -> Suited:
-    """Any scan, with squares that touch: nothing has to be there, or estimated."""
-    return Suited(0, {"point_size": 0})
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """Nothing but positions."""
+        return ()
 
+    def suits(self, pose: Pose) -> Suited:
+        """Any scan, with squares that touch: nothing has to be there, or estimated."""
+        return Suited(0, {"point_size": 0})
 
-def offers(pose: Pose) -> tuple[dict[str, object], ...]:
-    """Squares that touch, and pixels; of range views, the points would have to be merged."""
-    return () if pose.views else with_levels(pose, {"point_size": 0}, {})
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Squares that touch, and pixels; of range views, the points would have to be merged."""
+        return () if pose.views else with_levels(pose, {"point_size": 0}, {})
 
-
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Scatter the points; complete where all shall be drawn."""
-    params: Params = frame.params
-    shown = mark_visible(pose, frame, surface) if params.hide_hidden and len(pose.cloud) else None
-    stays = "pose" not in frame.changed
-    return draw_squares(pose, surface, params.point_size, frame.share, shown, stays, frame.before)
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Scatter the points; complete where all shall be drawn."""
+        params: Params = frame.params
+        shown = mark_visible(pose, frame, surface) if params.hide_hidden and len(pose.cloud) else None
+        stays = "pose" not in frame.changed
+        return draw_squares(pose, surface, params.point_size, frame.share, shown, stays, frame.before)

@@ -2,7 +2,7 @@
 
 And what pictures of range views are held against: the mesh of neighbours in their grids; and pictures of
 splats that are found anew in each picture: those of planes through the neighbours in the whole scan. They
-have what a backend's module has, and draw to the same Surface, but no user chooses them.
+are backends that draw to the same Surface, but no user chooses them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends import Backend, FrameView
+from ..backends import Backend, Derives, FrameView
 from ..camera import Camera
 from ..gpu import gl
 from ..gpu.bindings import Texture
@@ -38,12 +38,12 @@ class NoParams:
 
 def gl_points() -> Backend:
     """Each point as one pixel, as the driver's GL_POINTS draws it."""
-    return Backend(FLOOR, _Points())
+    return _Points(FLOOR)
 
 
 def mesh(drawn: Mesh, name: str = CEILING) -> Backend:
     """The triangles of a mesh, rasterised; for a pose whose cloud are the vertices, with normals."""
-    return Backend(name, _Triangles(drawn.faces))
+    return _Triangles(name, drawn.faces)
 
 
 def with_planes(cloud: PointCloud, camera: Camera, k: int) -> PointCloud:
@@ -73,15 +73,11 @@ def with_planes(cloud: PointCloud, camera: Camera, k: int) -> PointCloud:
     )
 
 
-class _Points:
+class _Points(Backend):
     """Plain GL_POINTS."""
 
-    TITLE = "GL_POINTS"
-    Params = NoParams
-
-    def needs(self, pose: Pose, params: NoParams) -> tuple[str, ...]:
-        """Nothing but positions."""
-        return ()
+    title = "GL_POINTS"
+    params_class = NoParams
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw the points; always complete."""
@@ -89,20 +85,22 @@ class _Points:
         return False
 
 
-class _Triangles:
+class _Triangles(Backend):
     """A rasterised mesh. Rows and ids are faces; normals and colours are interpolated for each pixel."""
 
-    TITLE = "Mesh"
-    Params = NoParams
+    title = "Mesh"
+    params_class = NoParams
+    derives = Derives.ON_THREAD
 
-    def __init__(self, faces: Triangles) -> None:
+    def __init__(self, name: str, faces: Triangles) -> None:
+        super().__init__(name)
         self._faces = faces
 
     def needs(self, pose: Pose, params: NoParams) -> tuple[str, ...]:
         """The normals that it interpolates."""
         return ("normals",)
 
-    def derive(self, pose: Pose, params: NoParams) -> Triangles:
+    def derive(self, pose: Pose, params: NoParams, view: View | None) -> Triangles:
         """The faces as they are."""
         return self._faces
 

@@ -2,7 +2,7 @@
 
 A row draws a shot and its variant with one backend, and says how far they may be apart.
 Where a backend cannot hold a row in principle, its module says so and what it holds instead:
-`LIMITS = {name of the row: Limit(share of the pixels, reason)}`, or several where they go by parameters.
+`limits = {name of the row: Limit(share of the pixels, reason)}`, or several where they go by parameters.
 """
 
 from __future__ import annotations
@@ -34,14 +34,14 @@ _UNIT = 38  # pixels of the body's shot
 
 def distinct_limits(backends: Iterable[Backend]) -> list[str]:
     """The reasons of all limits, each once."""
-    declared = (limit for one in backends for limits in one.limits.values() for limit in limits)
+    declared = (limit for one in backends for row in one.limits for limit in one.limits_of(row))
     return list(dict.fromkeys(limit.reason for limit in declared))
 
 
 def ways_of(backend: Backend) -> list[dict[str, Any]]:
     """Parameters that make other pictures than the defaults, one at a time: the words and switches that the
     declaration sweeps, and those that its limits speak of."""
-    told = [limit.when for limits in backend.limits.values() for limit in limits]
+    told = [limit.when for row in backend.limits for limit in backend.limits_of(row)]
     ways = []
     for parameter in backend.parameters:
         if parameter.affects != "speed" and parameter.type in (bool, str):

@@ -138,7 +138,7 @@ class Row:
     def limit_of(self, backend: Backend, params: Any = None) -> Limit | None:
         """The bound of a backend that cannot hold the row, by its declaration; None: it must."""
         params = backend.params() if params is None else params
-        return next((limit for limit in backend.limits.get(self.name, ()) if limit.applies(params)), None)
+        return next((limit for limit in backend.limits_of(self.name) if limit.applies(params)), None)
 
     def compare(self, renderer: Renderer, backend: Backend, params: Any = None) -> Outcome:
         """Draw both and compare them; a picture of nothing is none that holds. params: of the backend, but

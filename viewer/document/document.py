@@ -51,7 +51,7 @@ class Bookmark:
 
 
 def _kinds_of_params() -> dict[str, type]:
-    return {name: one.module.Params for name, one in backends().items()}
+    return {name: one.params_class for name, one in backends().items()}
 
 
 def _read_params(data: Any) -> dict[str, Any]:

@@ -261,7 +261,7 @@ class Entry:
         if is_object(data.get("look")):  # before there were choices
             data = {**data, "look": {"range": "frame", "quality": "fast", **data["look"]}}
         entry = structured(cls, data, where)
-        params = structured(find_backend(entry.backend).module.Params, entry.params, f"{where}, params")
+        params = structured(find_backend(entry.backend).params_class, entry.params, f"{where}, params")
         return replace(entry, params=params)
 
     def without_names(self) -> Entry:

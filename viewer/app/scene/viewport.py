@@ -255,7 +255,7 @@ class Viewport:
     def _budget(self, request: Request) -> Budget:
         name = str(request.backend)
         if name not in self._budgets:
-            self._budgets[name] = Budget(name in backends() and backends()[name].keeps)
+            self._budgets[name] = Budget(name in backends() and backends()[name].accumulates)
         return self._budgets[name]
 
     def _surface_of(self, detail: Detail) -> Surface:

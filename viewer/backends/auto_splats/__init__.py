@@ -15,32 +15,13 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import NO_SPACING, FrameView, Limit, Suited
+from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from ..surfels.packed import WAYS, draw_depths, draw_splats
 from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
-from .values import VALUES as VALUES
-from .values import give_value
-
-TITLE = "Smooth surface"
-GOOD_FOR = "Best look for points without normals"
-BLENDS = True
-FINDS_NORMALS = True
+from .values import VALUES, give_value
 
 _HIDDEN_COPIES = "visible copies of a point count as one neighbour, hidden copies as several"
-KEPT = {
-    "adaptive": "it improves normals of other scans: 1.3° instead of 1.4° on the bunny, 2.6° instead of 3.1° "
-    "on the armadillo",
-    "hidden_neighbors": "it improves outlines of other scans: spill of 1.2 % instead of 1.8 % on the bunny, "
-    "2.2 % instead of 3.0 % on the armadillo",
-    "instancing": "on software drivers auto means tiles, so the difference is noise; on hardware auto means "
-    "the fastest way",
-}
-LIMITS = {
-    "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
-    "collinear points end on, perspective": Limit(0.001, NO_SPACING),
-    "collinear points end on, orthographic": Limit(0.001, NO_SPACING),
-}
 
 _FEW = 200  # points
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
@@ -136,50 +117,70 @@ class Params:
     )
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Nothing but positions."""
-    return ()
+class AutoSplats(Backend):
+    """The backend `auto_splats`."""
 
+    title = "Smooth surface"
+    good_for = "Best look for points without normals"
+    params_class = Params
+    blends = True
+    finds_normals = True
+    values = VALUES
+    limits = {
+        "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
+        "collinear points end on, perspective": Limit(0.001, NO_SPACING),
+        "collinear points end on, orthographic": Limit(0.001, NO_SPACING),
+    }
+    default_reasons = {
+        "adaptive": "it improves normals of other scans: 1.3° instead of 1.4° on the bunny, 2.6° instead "
+        "of 3.1° on the armadillo",
+        "hidden_neighbors": "it improves outlines of other scans: spill of 1.2 % instead of 1.8 % on the "
+        "bunny, 2.2 % instead of 3.0 % on the armadillo",
+        "instancing": "on software drivers auto means tiles, so the difference is noise; on hardware auto "
+        "means the fastest way",
+    }
 
-def suits(pose: Pose) -> Suited | None:
-    """Scans of positions alone, but for a few points: their surface is found while they are drawn."""
-    is_bare = pose.overview.normals is None and pose.count >= _FEW
-    return Suited(1) if is_bare else None
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """Nothing but positions."""
+        return ()
 
+    def suits(self, pose: Pose) -> Suited | None:
+        """Scans of positions alone, but for a few points: their surface is found while they are drawn."""
+        is_bare = pose.overview.normals is None and pose.count >= _FEW
+        return Suited(1) if is_bare else None
 
-def offers(pose: Pose) -> tuple[dict[str, object], ...]:
-    """Two passes, and one, of bare points; with normals, surfels draw about the same in less time."""
-    return () if pose.views or suits(pose) is None else ({}, {"passes": "one"})
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Two passes, and one, of bare points; with normals, surfels draw about the same in less time."""
+        return () if pose.views or self.suits(pose) is None else ({}, {"passes": "one"})
 
-
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
-    params: Params = frame.params
-    found = surface.keep(Neighborhoods)
-    search = search_of(params, pose)
-    anew = bool(frame.changed - {"parameters", "values"})
-    border = border_of(pose.cloud, frame.view, params.k)
-    found.find(pose, surface, frame.view, search, frame.share, anew, border)
-    surface.stats.counted["neighborhoods by searches"] = found.read_rounds
-    if not found.count:
-        surface.clear()
-        surface.own("normal")
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
+        params: Params = frame.params
+        found = surface.keep(Neighborhoods)
+        search = search_of(params, pose)
+        anew = bool(frame.changed - {"parameters", "values"})
+        border = border_of(pose.cloud, frame.view, params.k)
+        found.find(pose, surface, frame.view, search, frame.share, anew, border)
+        surface.stats.counted["neighborhoods by searches"] = found.read_rounds
+        if not found.count:
+            surface.clear()
+            surface.own("normal")
+            give_value(found, surface, params.radius_scale)
+            return surface.stats.share < 1
+        way, scale = params.instancing, params.radius_scale
+        if not found.is_whole:
+            draw_depths(_points(pose, found, params), surface, instancing=way, radius_scale=scale)
+            found.find_late(pose, surface, search)
+        draw_splats(
+            _points(pose, found, params),
+            surface,
+            instancing=way,
+            radius_scale=scale,
+            two=params.passes == "two",
+            refine=params.refine,
+        )
         give_value(found, surface, params.radius_scale)
         return surface.stats.share < 1
-    way, scale = params.instancing, params.radius_scale
-    if not found.is_whole:
-        draw_depths(_points(pose, found, params), surface, instancing=way, radius_scale=scale)
-        found.find_late(pose, surface, search)
-    draw_splats(
-        _points(pose, found, params),
-        surface,
-        instancing=way,
-        radius_scale=scale,
-        two=params.passes == "two",
-        refine=params.refine,
-    )
-    give_value(found, surface, params.radius_scale)
-    return surface.stats.share < 1
 
 
 def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:

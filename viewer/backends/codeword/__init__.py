@@ -26,29 +26,15 @@ from ...params import param
 from ...scan.layers import Layers
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
-from .. import FrameView, Limit, Suited
+from .. import Backend, FrameView, Limit, Suited
 from .encoder import encode_points
 from .engine import Sheet, WordBuffers, draw_bands
-
-TITLE = "Code words"
-GOOD_FOR = "Research: discs from compact tables"
 
 _HELD = (
     "words store places, shapes, depths and colours in steps: the last bit can move a value by a whole step, "
     "and other points move the steps"
 )
 _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
-LIMITS = {
-    "near plane inside the cloud": Limit(0.0, _HELD, _OF_PALETTE),
-    "zoomed in on 10^-3 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
-    "zoomed in on 10^-6 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
-    "an outlier at 10^6 times the size": Limit(0.0, _HELD, _OF_PALETTE),
-    "eye inside the cloud": Limit(1.0, _HELD, _OF_TABLE),
-    "zoomed out x10^6": Limit(0.07, _HELD, _OF_TABLE),
-    "zero radii": Limit(0.0, _HELD, _OF_TABLE),
-    "negative radii": Limit(0.0, _HELD, _OF_TABLE),
-    "NaN radii": Limit(0.0, _HELD, _OF_TABLE),
-}
 
 
 @dataclass(frozen=True)
@@ -65,32 +51,48 @@ class Params(settings.Params):
     )
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Normals, and radii where they shall be the points' own."""
-    return ("normals", "radii") if params.radius == "own" else ("normals",)
+class CodeWords(Backend):
+    """The backend `codeword`."""
 
+    title = "Code words"
+    good_for = "Research: discs from compact tables"
+    params_class = Params
+    limits = {
+        "near plane inside the cloud": Limit(0.0, _HELD, _OF_PALETTE),
+        "zoomed in on 10^-3 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
+        "zoomed in on 10^-6 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
+        "an outlier at 10^6 times the size": Limit(0.0, _HELD, _OF_PALETTE),
+        "eye inside the cloud": Limit(1.0, _HELD, _OF_TABLE),
+        "zoomed out x10^6": Limit(0.07, _HELD, _OF_TABLE),
+        "zero radii": Limit(0.0, _HELD, _OF_TABLE),
+        "negative radii": Limit(0.0, _HELD, _OF_TABLE),
+        "NaN radii": Limit(0.0, _HELD, _OF_TABLE),
+    }
 
-def suits(pose: Pose) -> Suited | None:
-    """None: `surfels` draws the same points better."""
-    return None
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """Normals, and radii where they shall be the points' own."""
+        return ("normals", "radii") if params.radius == "own" else ("normals",)
 
+    def suits(self, pose: Pose) -> Suited | None:
+        """None: `surfels` draws the same points better."""
+        return None
 
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Encode and draw; complete where all points shall be drawn."""
-    params: Params = frame.params
-    surface.stats.faces_away = params.cull_back
-    if not len(pose.cloud):
-        surface.clear()
-        return False
-    is_lit = params.lighting == "own"
-    # Colours of words that nobody sees need not be found.
-    look = surface.look if is_lit else replace(surface.look, color_by="plain")
-    words = surface.keep(WordBuffers)
-    made = _encoded_here if params.quality == "table" else _encoded_on_cpu
-    sheet, materials = made(pose, frame, surface, look, words)
-    lit = (surface.own("color", is_lit=True).buffer, materials) if is_lit else None
-    draw_bands(words, sheet, params.window, surface.depths.buffer, surface.rows.buffer, lit)
-    return surface.stats.share < 1
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Encode and draw; complete where all points shall be drawn."""
+        params: Params = frame.params
+        surface.stats.faces_away = params.cull_back
+        if not len(pose.cloud):
+            surface.clear()
+            return False
+        is_lit = params.lighting == "own"
+        # Colours of words that nobody sees need not be found.
+        look = surface.look if is_lit else replace(surface.look, color_by="plain")
+        words = surface.keep(WordBuffers)
+        made = _encoded_here if params.quality == "table" else _encoded_on_cpu
+        sheet, materials = made(pose, frame, surface, look, words)
+        lit = (surface.own("color", is_lit=True).buffer, materials) if is_lit else None
+        draw_bands(words, sheet, params.window, surface.depths.buffer, surface.rows.buffer, lit)
+        return surface.stats.share < 1
 
 
 def _encoded_here(

@@ -28,7 +28,7 @@ from ...params import param
 from ...scan.points import PointCloud, checked_viewpoint
 from ...scan.pose import Pose
 from ...view import View
-from .. import AROUND_ALL, NO_DETAIL, FrameView, Limit
+from .. import AROUND_ALL, NO_DETAIL, Backend, FrameView, Limit
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
 from .candidates import UNLIMITED, Candidates
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
@@ -39,22 +39,7 @@ from .outputs import OUTPUTS, show_visible
 from .sectors import Sectors
 from .spacing import Spacings, copies_in, steady_points
 
-TITLE = "Visible points"
-GOOD_FOR = "Points without those on the far side"
-BLENDS = True
-FILLS = True
-FINDS_NORMALS = True
 # Rows of the stability suite that sectors cannot hold in principle.
-LIMITS = {
-    "rotated by 37 degrees": Limit(0.01, AROUND_ALL),
-    "near plane inside the cloud": Limit(0.01, AROUND_ALL),
-    "zoomed in on 10^-3 of the scan": Limit(0.05, NO_DETAIL),
-    "zoomed in on 10^-6 of the scan": Limit(0.05, NO_DETAIL),
-    "zoomed out x10^6": Limit(0.02, AROUND_ALL),
-    "zoomed out x10^9": Limit(0.02, AROUND_ALL),
-    "collinear points": Limit(0.02, AROUND_ALL),
-    "normals parallel to y": Limit(0.02, AROUND_ALL, {"output": ("splats",)}),
-}
 HULL = "hull"
 MODES = ("combined", HULL)
 _DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, igea and dragon each
@@ -169,20 +154,39 @@ class Params:
     )
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Nothing but positions."""
-    return ()
+class VisiblePoints(Backend):
+    """The backend `hpr`."""
 
+    title = "Visible points"
+    good_for = "Points without those on the far side"
+    params_class = Params
+    blends = True
+    fills = True
+    finds_normals = True
+    limits = {
+        "rotated by 37 degrees": Limit(0.01, AROUND_ALL),
+        "near plane inside the cloud": Limit(0.01, AROUND_ALL),
+        "zoomed in on 10^-3 of the scan": Limit(0.05, NO_DETAIL),
+        "zoomed in on 10^-6 of the scan": Limit(0.05, NO_DETAIL),
+        "zoomed out x10^6": Limit(0.02, AROUND_ALL),
+        "zoomed out x10^9": Limit(0.02, AROUND_ALL),
+        "collinear points": Limit(0.02, AROUND_ALL),
+        "normals parallel to y": Limit(0.02, AROUND_ALL, {"output": ("splats",)}),
+    }
 
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Find what the eye sees, unless that is known, and show it."""
-    if not len(pose.cloud):
-        surface.clear()
-        return False
-    seen = surface.keep(_Seen)
-    candidates = seen.look(pose, frame, surface)
-    assert seen.calibration is not None
-    return show_visible(pose, frame, surface, candidates, seen.calibration)
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """Nothing but positions."""
+        return ()
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Find what the eye sees, unless that is known, and show it."""
+        if not len(pose.cloud):
+            surface.clear()
+            return False
+        seen = surface.keep(_Seen)
+        candidates = seen.look(pose, frame, surface)
+        assert seen.calibration is not None
+        return show_visible(pose, frame, surface, candidates, seen.calibration)
 
 
 def mark_visible(pose: GpuPose, frame: FrameView, surface: Surface) -> gl.BufferTexture:

@@ -15,15 +15,9 @@ from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
-from .. import FrameView, pyramidal
+from .. import Backend, FrameView, pyramidal
 from ..pyramidal.views import ViewSource
 from .spline import FILTERS, Bands, spline_views
-
-TITLE = "Merged views"
-GOOD_FOR = "Several range views, without seams"
-ROWS = "samples"
-FILLS = True
-BLENDS = True
 
 _CAPTURES = {"5x5": "binomial", "3x3": "gaussian"}  # filters of range images that make the levels of pictures
 _BANDS, _LEVELS, _VIEWS = "Bands", "Levels", "Range images"
@@ -111,22 +105,31 @@ class Params:
         )
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """The samples of range views."""
-    return ("views",)
+class Laplacian(Backend):
+    """The backend `laplacian`."""
 
+    title = "Merged views"
+    good_for = "Several range views, without seams"
+    params_class = Params
+    rows = "samples"
+    blends = True
+    fills = True
 
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Draw the nearest surface, merge what views see of it, fill; a preview is not merged."""
-    params: Params = frame.params
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """The samples of range views."""
+        return ("views",)
 
-    def merge(source: ViewSource, channels: Sequence[str]) -> None:
-        spline_views(surface, source, channels, _bands(params))
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Draw the nearest surface, merge what views see of it, fill; a preview is not merged."""
+        params: Params = frame.params
 
-    preview = frame.share < 1
-    if preview:
-        surface.stats.skipped["bands"] = "a preview shows the nearest view"
-    return pyramidal.draw_filled(pose, params.surface, frame.share, surface, None if preview else merge)
+        def merge(source: ViewSource, channels: Sequence[str]) -> None:
+            spline_views(surface, source, channels, _bands(params))
+
+        preview = frame.share < 1
+        if preview:
+            surface.stats.skipped["bands"] = "a preview shows the nearest view"
+        return pyramidal.draw_filled(pose, params.surface, frame.share, surface, None if preview else merge)
 
 
 def _bands(params: Params) -> Bands:

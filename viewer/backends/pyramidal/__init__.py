@@ -22,30 +22,15 @@ from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import sparse_spacing
 from ...view import View
-from .. import NO_SPACING, FrameView, Limit, Suited
+from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .sources import PointSource, SampleSource
 from .spreading import FUNCTIONS, KERNELS, add_spread, spread_macros
 from .targets import LEVELS, Targets
 from .views import MODES, ViewSource
 
-TITLE = "Filled surface"
-GOOD_FOR = "Range images; fills holes"
-FILLS = True
-BLENDS = True
-
 _BY_CELLS = (
     "whole cells fill a pixel; at their edges the last bit decides which cells, and what encloses the pixel"
 )
-KEPT = {"fill": "point clouds have holes to fill; the polygons of dense range views leave few"}
-LIMITS = {
-    "eye inside the cloud": Limit(0.01, _BY_CELLS),
-    "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
-    "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
-    "coplanar points": Limit(0.008, _BY_CELLS),
-    "collinear points": Limit(0.035, _BY_CELLS),
-    "collinear points end on, perspective": Limit(0.08, NO_SPACING),
-    "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
-}
 
 _FILTERS = {"box": BOX, "gaussian": GAUSSIAN, "binomial": BINOMIAL, "nearest": NEAREST}
 _FILLING = {"fill": (True,)}
@@ -244,24 +229,40 @@ _MOST_PARTS = 128
 _CROWD, _CROWDED = 1 << 13, 64  # point spread functions a pixel, at least; times what is to be expected
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """The samples of range views where there are such, else nothing but positions."""
-    return ("views",) if pose.views else ()
+class Pyramidal(Backend):
+    """The backend `pyramidal`."""
 
+    title = "Filled surface"
+    good_for = "Range images; fills holes"
+    params_class = Params
+    blends = True
+    fills = True
+    limits = {
+        "eye inside the cloud": Limit(0.01, _BY_CELLS),
+        "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
+        "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
+        "coplanar points": Limit(0.008, _BY_CELLS),
+        "collinear points": Limit(0.035, _BY_CELLS),
+        "collinear points end on, perspective": Limit(0.08, NO_SPACING),
+        "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
+    }
+    default_reasons = {"fill": "point clouds have holes to fill; the polygons of dense range views leave few"}
 
-def suits(pose: Pose) -> Suited | None:
-    """Range views: nothing has to be estimated or merged, and nothing lies nearer to what was measured."""
-    return Suited(2) if pose.views else None
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """The samples of range views where there are such, else nothing but positions."""
+        return ("views",) if pose.views else ()
 
+    def suits(self, pose: Pose) -> Suited | None:
+        """Range views: nothing is estimated or merged, and nothing lies nearer to what was measured."""
+        return Suited(2) if pose.views else None
 
-def offers(pose: Pose) -> tuple[dict[str, object], ...]:
-    """Polygons, and points, of range views; clouds are drawn by splats faster and better."""
-    return ({}, {"primitive": "points"}) if pose.views else ()
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Polygons, and points, of range views; clouds are drawn by splats faster and better."""
+        return ({}, {"primitive": "points"}) if pose.views else ()
 
-
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Scatter, show, hide, fill; complete where all samples shall be drawn."""
-    return draw_filled(pose, frame.params, frame.share, surface)
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Scatter, show, hide, fill; complete where all samples shall be drawn."""
+        return draw_filled(pose, frame.params, frame.share, surface)
 
 
 def draw_filled(

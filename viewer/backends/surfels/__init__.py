@@ -26,42 +26,19 @@ from ...params import param
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
-from .. import FrameView, Limit, Suited, share_param, with_levels
+from .. import Backend, FrameView, Limit, Suited, share_param, with_levels
 from . import passes
 from .gaps import GapRadii
 from .splats import FRAGMENT, SURFEL, Splats
 from .subpixel import average, splat_subpixel, subpixel_share
 from .tiles import FALLBACK, most_listed, splat
 
-TITLE = "Discs"
-GOOD_FOR = "Best look for points with normals"
-BLENDS = FILLS = True
-
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
     "splats drawn over each other are partly transparent; their radii, the number of copies and, at equal "
     "depths, the last bit decide how much shows through"
 )
-LIMITS = {
-    "zoomed in on 10^-6 of the scan": Limit(0.0, _SEEN_THROUGH, _SORTED),
-    "zoomed in on 10^-3 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
-    "zoomed in on 10^-6 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
-    "points x1000, one after the other": Limit(0.5, _SEEN_THROUGH, _SORTED),
-    "points x1000, all over again": Limit(0.5, _SEEN_THROUGH, _SORTED),
-    "points of a body x1000": Limit(0.21, _SEEN_THROUGH, _SORTED),
-    "points x1000 without radii": Limit(0.35, _SEEN_THROUGH, _SORTED),
-    "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
-    "collinear points end on, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
-    "collinear points end on, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
-    "zero radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
-    "negative radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
-    "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
-}
 
-KEPT = {
-    "cull_back": "open scans, and eyes inside a scan: 2.2 % of the pixels of the bunny, which has no base, "
-    "show what is behind; no test for closed scans was both safe and faster (docs/how-it-works/surfels.md)"
-}
 
 _WAYS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
@@ -148,61 +125,87 @@ class Params:
     )
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Normals, and radii where they shall be the points' own."""
-    return ("normals", "radii") if params.radius == "own" else ("normals",)
+class Surfels(Backend):
+    """The backend `surfels`."""
 
+    title = "Discs"
+    good_for = "Best look for points with normals"
+    params_class = Params
+    blends = True
+    fills = True
+    limits = {
+        "zoomed in on 10^-6 of the scan": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "zoomed in on 10^-3 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "zoomed in on 10^-6 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "points x1000, one after the other": Limit(0.5, _SEEN_THROUGH, _SORTED),
+        "points x1000, all over again": Limit(0.5, _SEEN_THROUGH, _SORTED),
+        "points of a body x1000": Limit(0.21, _SEEN_THROUGH, _SORTED),
+        "points x1000 without radii": Limit(0.35, _SEEN_THROUGH, _SORTED),
+        "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
+        "collinear points end on, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
+        "collinear points end on, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
+        "zero radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
+        "negative radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
+        "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
+    }
+    default_reasons = {
+        "cull_back": "open scans, and eyes inside a scan: 2.2 % of the pixels of the bunny, which has no "
+        "base, show what is behind; no test for closed scans was both safe and faster "
+        "(docs/how-it-works/surfels.md)"
+    }
 
-def suits(pose: Pose) -> Suited | None:
-    """Scans that store normals."""
-    return None if pose.overview.normals is None else Suited(1)
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """Normals, and radii where they shall be the points' own."""
+        return ("normals", "radii") if params.radius == "own" else ("normals",)
 
+    def suits(self, pose: Pose) -> Suited | None:
+        """Scans that store normals."""
+        return None if pose.overview.normals is None else Suited(1)
 
-def offers(pose: Pose) -> tuple[dict[str, object], ...]:
-    """Two passes, and one, where normals are stored."""
-    return () if pose.views or pose.overview.normals is None else with_levels(pose, {}, {"passes": "one"})
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Two passes, and one, where normals are stored."""
+        return () if pose.views or pose.overview.normals is None else with_levels(pose, {}, {"passes": "one"})
 
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Splat in as many passes as are asked for; complete where all points are drawn in their size."""
+        params: Params = frame.params
+        if not len(pose.cloud):
+            surface.clear()
+            return False
+        params = _with_passes(params, frame, surface)
+        if frame.moving and frame.share < 1:
+            params = replace(params, radius_scale=_UNEVEN * params.radius_scale)
+        instancing = _instancing(params, surface)
+        surface.stats.faces_away = params.cull_back
+        sizes, known = _sizes(pose, frame, surface)
 
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Splat in as many passes as are asked for; complete where all points shall be drawn in their size."""
-    params: Params = frame.params
-    if not len(pose.cloud):
-        surface.clear()
-        return False
-    params = _with_passes(params, frame, surface)
-    if frame.moving and frame.share < 1:
-        params = replace(params, radius_scale=_UNEVEN * params.radius_scale)
-    instancing = _instancing(params, surface)
-    surface.stats.faces_away = params.cull_back
-    sizes, known = _sizes(pose, frame, surface)
+        def draw_points(points: Points) -> bool:
+            _splat(points, surface, params, instancing, sizes.uniform)
+            return "tiles" in surface.stats.skipped  # as there are many large ones among these
 
-    def draw_points(points: Points) -> bool:
-        _splat(points, surface, params, instancing, sizes.uniform)
-        return "tiles" in surface.stats.skipped  # as there are many large ones among these
-
-    reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
-    larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
-    may_thin = params.share is None and instancing == "tiles" and surface.gpu.software
-    most = most_listed(surface.gpu) if may_thin else len(pose.cloud)
-    stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
-    if stays and params.passes in _HIDING and may_cull(pose):
-        points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)
-        limits = SplatLimits(
-            radius_scale=larger * params.radius_scale,
-            uniform_radius=sizes.uniform,
-            least_radius=larger * margin,
-            largest=sizes.largest,
-            epsilon=params.epsilon,
-            cull_back=params.cull_back,
-        )
-        draw_unhidden(points, surface, limits, draw_points)
-    else:
-        points = Points.of(pose, surface, frame.share, sizes.own, larger * margin, larger * reach)
-        splats = _splats(params, sizes.uniform)
-        if points.count > most and _mean_share(points, surface, params, splats) < 1:
-            points = _as_many(most, points, pose, frame, surface, (larger * margin, larger * reach))
-        draw_points(replace(points, buffers=sizes.buffers))
-    return surface.stats.is_sample or not known
+        reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
+        larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
+        may_thin = params.share is None and instancing == "tiles" and surface.gpu.software
+        most = most_listed(surface.gpu) if may_thin else len(pose.cloud)
+        stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
+        if stays and params.passes in _HIDING and may_cull(pose):
+            points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)
+            limits = SplatLimits(
+                radius_scale=larger * params.radius_scale,
+                uniform_radius=sizes.uniform,
+                least_radius=larger * margin,
+                largest=sizes.largest,
+                epsilon=params.epsilon,
+                cull_back=params.cull_back,
+            )
+            draw_unhidden(points, surface, limits, draw_points)
+        else:
+            points = Points.of(pose, surface, frame.share, sizes.own, larger * margin, larger * reach)
+            splats = _splats(params, sizes.uniform)
+            if points.count > most and _mean_share(points, surface, params, splats) < 1:
+                points = _as_many(most, points, pose, frame, surface, (larger * margin, larger * reach))
+            draw_points(replace(points, buffers=sizes.buffers))
+        return surface.stats.is_sample or not known
 
 
 def _as_many(

@@ -26,16 +26,10 @@ from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...view import View
-from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, FrameView, Limit
+from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, Backend, Derives, FrameView, Limit
 from ..surfels.passes import blends
 from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
-
-TITLE = "Voxels"
-GOOD_FOR = "Large scans; coarser where far away"
-ROWS = "octants"
-BLENDS = True
-DERIVES_ON_THREAD = True
 
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
@@ -45,24 +39,6 @@ _NOT_ENLARGED = tuple(
     Limit(0.0, NO_SPACING, when)
     for when in ({"instancing": ("gs", "ubo", "tbo", "pull", "tiles")}, {"passes": ("one",)})
 )
-LIMITS = {
-    "rotated by 37 degrees": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
-    "near plane inside the cloud": (Limit(0.01, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
-    "eye inside the cloud": (Limit(0.04, AROUND_ALL, _IN_CUBES), Limit(0.01, AROUND_ALL)),
-    "zoomed in on 10^-3 of the scan": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
-    "zoomed in on 10^-6 of the scan": (Limit(0.99, NO_DETAIL, _IN_CUBES), Limit(0.65, NO_DETAIL)),
-    "collinear points": Limit(0.015, AROUND_ALL),
-    "collinear points end on, perspective": Limit(0.01, NO_SPACING),
-    "collinear points end on, orthographic": Limit(0.01, NO_SPACING),
-    **dict.fromkeys(
-        ("one point x1000", "zoomed in on 10^-3 of a splat", "zoomed in on 10^-6 of a splat"), _NOT_ENLARGED
-    ),
-}
-KEPT = {
-    "cull_back": "open scans, and eyes inside a scan: 1.5 % of the pixels of the bunny, which has no base, "
-    "show what is behind",
-    "radius_scale": "0.8 leaves holes: 0.1 % of the armadillo and 1 % of a dancing body stay open",
-}
 
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
 _ANYWHERE = Sight(np.zeros(3), np.eye(3), 1.0, (1, 1), 1.0, math.inf, perspective=True)
@@ -178,52 +154,82 @@ class Params:
     )
 
 
-def needs(pose: Pose, params: Params) -> tuple[str, ...]:
-    """Normals, but for faces, which have their own."""
-    return () if params.shape == "flat_cubes" else ("normals",)
+class Voxels(Backend):
+    """The backend `voxels`."""
 
+    title = "Voxels"
+    good_for = "Large scans; coarser where far away"
+    params_class = Params
+    rows = "octants"
+    blends = True
+    derives = Derives.ON_THREAD
+    limits = {
+        "rotated by 37 degrees": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
+        "near plane inside the cloud": (Limit(0.01, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
+        "eye inside the cloud": (Limit(0.04, AROUND_ALL, _IN_CUBES), Limit(0.01, AROUND_ALL)),
+        "zoomed in on 10^-3 of the scan": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
+        "zoomed in on 10^-6 of the scan": (Limit(0.99, NO_DETAIL, _IN_CUBES), Limit(0.65, NO_DETAIL)),
+        "collinear points": Limit(0.015, AROUND_ALL),
+        "collinear points end on, perspective": Limit(0.01, NO_SPACING),
+        "collinear points end on, orthographic": Limit(0.01, NO_SPACING),
+        **dict.fromkeys(
+            ("one point x1000", "zoomed in on 10^-3 of a splat", "zoomed in on 10^-6 of a splat"),
+            _NOT_ENLARGED,
+        ),
+    }
+    default_reasons = {
+        "cull_back": "open scans, and eyes inside a scan: 1.5 % of the pixels of the bunny, which has no "
+        "base, show what is behind",
+        "radius_scale": "0.8 leaves holes: 0.1 % of the armadillo and 1 % of a dancing body stay open",
+    }
 
-def derive(pose: Pose, params: Params) -> Octree:
-    """The octree of a pose."""
-    stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
-    octree = build(pose.cloud, stop)
-    # The first cut of a process imports what it needs, of a machine compiles it: not while a window draws.
-    traversal = Traversal(octree.prefix(1), _ANYWHERE)
-    traversal.advance()
-    traversal.cut(octree.low)
-    return octree
+    def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
+        """Normals, but for faces, which have their own."""
+        return () if params.shape == "flat_cubes" else ("normals",)
 
+    def derive(self, pose: Pose, params: Params, view: View | None) -> Octree:
+        """The octree of a pose."""
+        stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
+        octree = build(pose.cloud, stop)
+        # A process's first cut imports, a machine's first compiles: not while a window draws.
+        traversal = Traversal(octree.prefix(1), _ANYWHERE)
+        traversal.advance()
+        traversal.cut(octree.low)
+        return octree
 
-def upload(gpu: Gpu, octree: Octree) -> Voxels:
-    """Nothing is uploaded until a view is known."""
-    return Voxels(gpu, octree)
+    def upload(self, gpu: Gpu, octree: Octree) -> OctreeCuts:
+        """Nothing is uploaded until a view is known."""
+        return OctreeCuts(gpu, octree)
 
-
-def draw(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
-    """Draw the nodes that the view tells apart; complete where all were found, and all shall be drawn."""
-    params: Params = frame.params
-    voxels: Voxels = frame.derived
-    if not len(pose.cloud):
-        surface.clear()
-        return False
-    shown = voxels.show(pose, frame)
-    surface.show(shown.pose, shown.rows, shown.octants)
-    coarse = frame.share < 1 and bool((shown.cut.level < min(params.max_depth, voxels.octree.depth)).any())
-    _report(shown.cut, voxels.octree, params, surface.stats)
-    if coarse:
-        surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
-    points = Points(shown.pose, use_radii=True, count=len(shown.rows))
-    if not points.count:
-        surface.clear()
-        return not shown.cut.complete
-    if params.shape == "discs":
-        two = blends(frame, surface) if params.passes == "auto" else params.passes == "two"
-        draw_discs(points, surface, instancing=params.instancing, radius_scale=params.radius_scale, two=two)
-    else:
-        draw_cubes(points, surface, params.instancing)
-    if params.shape == "flat_cubes":
-        shade_flat(points, surface)
-    return coarse or not shown.cut.complete
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Draw the nodes that the view tells apart; complete where all were found, and all shall be drawn."""
+        params: Params = frame.params
+        voxels: OctreeCuts = frame.derived
+        if not len(pose.cloud):
+            surface.clear()
+            return False
+        shown = voxels.show(pose, frame)
+        surface.show(shown.pose, shown.rows, shown.octants)
+        coarse = frame.share < 1 and bool(
+            (shown.cut.level < min(params.max_depth, voxels.octree.depth)).any()
+        )
+        _report(shown.cut, voxels.octree, params, surface.stats)
+        if coarse:
+            surface.stats.left_out = math.ceil(len(pose.cloud) * (1 - frame.share))  # as good as
+        points = Points(shown.pose, use_radii=True, count=len(shown.rows))
+        if not points.count:
+            surface.clear()
+            return not shown.cut.complete
+        if params.shape == "discs":
+            two = blends(frame, surface) if params.passes == "auto" else params.passes == "two"
+            draw_discs(
+                points, surface, instancing=params.instancing, radius_scale=params.radius_scale, two=two
+            )
+        else:
+            draw_cubes(points, surface, params.instancing)
+        if params.shape == "flat_cubes":
+            shade_flat(points, surface)
+        return coarse or not shown.cut.complete
 
 
 def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
@@ -246,7 +252,7 @@ class _Shown:
     octants: NDArray[np.uint32]
 
 
-class Voxels:
+class OctreeCuts:
     """An octree, and the nodes of it that the last view showed."""
 
     def __init__(self, gpu: Gpu, octree: Octree) -> None:

@@ -141,7 +141,7 @@ def _line(row: dict[str, Any]) -> Iterator[list[str]]:
     if not (found := beats(row)):
         return
     gains = (f"{name} {three_digits(was)} → {three_digits(now)}" for name, (was, now) in found.items())
-    reason = backend(row["backend"]).kept.get(row["parameter"], "")
+    reason = backend(row["backend"]).default_reasons.get(row["parameter"], "")
     values = [f"{row[name]}".lower() for name in ("default", "value")]
     named = [f"`{row['scene']}`", f"`{row['backend']}`", f"`{row['parameter']}`"]
     yield [*named, *values, "; ".join(gains), f"{row['time']:.2f}", reason]

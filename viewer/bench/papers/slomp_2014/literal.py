@@ -42,7 +42,7 @@ class PaperParams:
 
 def paper_splats() -> Backend:
     """The paper's splats, for benchmarks alone: pixels show no point."""
-    return Backend(NAME, _Literal())
+    return _Literal(NAME)
 
 
 def colored(cloud: PointCloud) -> PointCloud:
@@ -57,11 +57,11 @@ def _by_normals(cloud: PointCloud) -> PointCloud:
     return replace(cloud, colors=colors)
 
 
-class _Literal:
+class _Literal(Backend):
     """The paper's splats."""
 
-    TITLE = "Slomp 2014"
-    Params = PaperParams
+    title = "Slomp 2014"
+    params_class = PaperParams
 
     def needs(self, pose: Pose, params: PaperParams) -> tuple[str, ...]:
         """The normals and colours that are fed."""
