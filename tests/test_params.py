@@ -10,7 +10,7 @@ import pytest
 from viewer.backends import backend, backends
 from viewer.errors import InputError
 from viewer.look import COLOR_MAPS, Look, color_table
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 from viewer.params import AFFECTS, describe, param, parse, renamed
 
 

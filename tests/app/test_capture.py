@@ -28,7 +28,7 @@ from viewer.errors import InputError
 from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import read_description
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 from viewer.rigid import STILL
 from viewer.scan.layers import Layers
 from viewer.scan.open import open_scan

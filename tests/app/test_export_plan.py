@@ -14,7 +14,7 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.recording import Entry
 from viewer.look import Look
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 from viewer.output.overlays import DrawnLandmark, DrawnMarks
 from viewer.rigid import STILL, Rigid
 

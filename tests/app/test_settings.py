@@ -24,7 +24,7 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.choice.goal import Goal
 from viewer.look import Look
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 
 CAMERA = Camera(eye=(1, 2, 3), target=(0.5, 0, 0), fov_y=25)
 FULL = Settings(

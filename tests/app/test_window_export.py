@@ -20,7 +20,8 @@ from written import film
 
 from viewer.document.recording import Recording
 from viewer.look import color_table
-from viewer.output.marks import INK, MARKS, marks_of
+from viewer.output.legend import MARKS, marks_of
+from viewer.output.marks import INK
 from viewer.scan import formats
 from viewer.scan.formats.exr import write_views
 

@@ -28,7 +28,7 @@ from viewer.geometry import vector
 from viewer.gpu.surface import Surface
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 from viewer.output.overlays import LINE_COLOR, DrawnCurve, DrawnLandmark, DrawnPath, DrawnPlot
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid

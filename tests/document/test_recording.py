@@ -20,7 +20,7 @@ from viewer.errors import InputError
 from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import write_png
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 from viewer.output.overlays import DrawnLandmark, DrawnMarks, DrawnPath
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers

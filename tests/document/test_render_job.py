@@ -21,7 +21,7 @@ from viewer.document.render_job import make
 from viewer.errors import InputError, Scan4DError
 from viewer.look import Look
 from viewer.output.export import numbered
-from viewer.output.marks import Marks
+from viewer.output.legend import Marks
 from viewer.scan import formats
 from viewer.task import Cancelled, Task
 

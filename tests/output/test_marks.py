@@ -14,13 +14,10 @@ from PIL import Image
 
 from viewer.camera import Camera
 from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
-from viewer.output.marks import (
-    INK,
-    PLATE,
+from viewer.output.legend import (
     Legend,
     Marks,
     MeasuredLine,
-    marked,
     number,
     quantity,
     range_note,
@@ -28,9 +25,10 @@ from viewer.output.marks import (
     scale_bar,
     stamp,
     swatches,
-    text_height,
     ticks,
 )
+from viewer.output.marked import marked
+from viewer.output.marks import INK, PLATE, text_height
 from viewer.output.overlays import LABEL_EDGE, LINE_COLOR, DrawnCurve, DrawnPlot
 from viewer.scan.points import PointCloud
 

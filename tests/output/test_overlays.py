@@ -13,7 +13,9 @@ from viewer.analysis.track import Known
 from viewer.camera import Camera
 from viewer.geometry import Vector
 from viewer.look import Look
-from viewer.output.marks import Legend, Marks, marked, text_height
+from viewer.output.legend import Legend, Marks
+from viewer.output.marked import marked
+from viewer.output.marks import text_height
 from viewer.output.overlays import (
     MARK_RADIUS,
     STATE_MARKS,

@@ -31,7 +31,7 @@ from ..document.schema import (
 from ..errors import InputError
 from ..files import parsed_json, read_text, whole_file
 from ..look import Look
-from ..output.marks import Marks
+from ..output.legend import Marks
 from ..params import describe
 from . import drawer, theme
 from .files.scans import MOST_RECENT

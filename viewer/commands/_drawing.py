@@ -21,7 +21,7 @@ from ..gpu.context import headless
 from ..gpu.surface import Surface
 from ..look import COLOR_BY, Look, drawable, is_open_range, with_range
 from ..output.export import numbered
-from ..output.marks import Legend
+from ..output.legend import Legend
 from ..renderer import Renderer
 from ..scan.pods import first_camera
 from ..scan.pose import Pose

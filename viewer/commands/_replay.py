@@ -22,7 +22,7 @@ from ..document.recording import (
 from ..errors import InputError
 from ..frame import Request
 from ..output.export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
-from ..output.marks import Legend, marks_of
+from ..output.legend import Legend, marks_of
 from ..scan.inputs import scan_inputs
 from ..scan.open import is_demo, open_scan
 from ..scan.timeline import Timeline

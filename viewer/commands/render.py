@@ -28,7 +28,7 @@ from ..files import whole_file
 from ..frame import Request, backend_for, supersample
 from ..look import SAMPLES, Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
-from ..output.marks import MARKS, Legend, marks_of
+from ..output.legend import MARKS, Legend, marks_of
 from ..params import parse
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO

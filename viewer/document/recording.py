@@ -43,7 +43,7 @@ from ..frame import Request
 from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
-from ..output.marks import Legend, Marks, MeasuredLine
+from ..output.legend import Legend, Marks, MeasuredLine
 from ..output.overlays import (
     LINE_SLACK,
     NOTHING_DRAWN,

@@ -29,7 +29,8 @@ from ..files import open_plain, whole_file
 from ..look import Look, rgba
 from ..native import OPENEXR, unsaid
 from .labels import LabelPlaces, covered_cells
-from .marks import Legend, marked
+from .legend import Legend
+from .marked import marked
 
 if TYPE_CHECKING:
     from ..gpu.surface import Surface

@@ -24,7 +24,8 @@ from ...frame import Request
 from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.labels import LabelPlaces
-from ...output.marks import Legend, Marks, marked
+from ...output.legend import Legend, Marks
+from ...output.marked import marked
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...task import Task, in_background
 from ..failures import failure_in_words

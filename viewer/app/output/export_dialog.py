@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from ...look import QUALITY_WORDS
 from ...output.export import numbered
-from ...output.marks import Marks
+from ...output.legend import Marks
 from ...params import describe
 from .. import widgets
 from .export_plan import AS_SHOWN, EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices

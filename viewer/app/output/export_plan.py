@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...geometry import Vector
 from ...look import SAMPLES
 from ...output.export import FRAME_RATES, numbered
-from ...output.marks import Marks
+from ...output.legend import Marks
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...params import describe, param
 from ...rigid import Rigid

@@ -15,7 +15,7 @@ from ...document.recording import Entry, Recording
 from ...document.render_job import Made, make
 from ...errors import InputError
 from ...files import working_folder
-from ...output.marks import Marks
+from ...output.legend import Marks
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...scan.inputs import found_among, scan_inputs
 from ...scan.times import DEFAULT_FPS

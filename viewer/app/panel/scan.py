@@ -11,7 +11,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from ...backends import backend
 from ...files import printable
 from ...geometry import AXES
-from ...output.marks import number
+from ...output.legend import number
 from ...scan.guessed_unit import guess_unit
 from ...scan.points import UNKNOWN_UNIT
 from ...scan.times import FPS_LIMITS, TIMES_FILE

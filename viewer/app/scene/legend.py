@@ -9,7 +9,8 @@ from imgui_bundle import ImVec2, imgui
 from numpy.typing import NDArray
 
 from ...output import marks
-from ...output.marks import Box, Color, Legend, Marks
+from ...output.labels import Box
+from ...output.legend import Color, Legend, Marks
 from ..playing.playback import Playback
 from ..playing.ranging import Ranging
 from ..session import Session
@@ -62,7 +63,7 @@ class ViewMarks:
         self.in_files = not self.in_files
 
     def toggle(self, name: str) -> None:
-        """Show one of `marks.MARKS` or hide it."""
+        """Show one of `legend.MARKS` or hide it."""
         self.shown = replace(self.shown, **{name: not getattr(self.shown, name)})
 
     def draw(self, size: ImVec2) -> None:

@@ -1,0 +1,175 @@
+"""What the marks of a picture say: which there are, and the words and numbers that they show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..camera import Camera
+from ..geometry import Vector
+from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
+from ..params import describe, param
+from ..scan.times import frame_in_words
+from .labels import LabelPlaces
+from .overlays import DrawnPlot, Overlay
+
+Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
+
+_MEASURED: Color = (150, 150, 150, 255)
+_BAR_SHARE = 1 / 6  # of the picture's width that a scale bar takes at most
+_MOST_DIGITS = 15  # that a float64 holds
+
+
+@dataclass(frozen=True)
+class Marks:
+    """A choice of what is drawn over a picture."""
+
+    scale_bar: bool = param(
+        False, "A bar of a round length in scan units; in perspective at the depth of the camera's target"
+    )
+    color_bar: bool = param(
+        False,
+        "The colour map and its numbers, where the look colours by a number; colours of levels and holes",
+    )
+    stamp: bool = param(False, "Number of the frame, and its time")
+    measurements: bool = param(False, "Measured distances, as they stand in the frame")
+    notes: bool = param(False, "Notes that are pinned to places and to the frame")
+    landmarks: bool = param(False, "Landmarks, as they stand in the frame")
+    trajectories: bool = param(False, "Ways of landmarks through all frames, those that the view shows")
+    measure_lines: bool = param(False, "What measures measure in the frame, with their values")
+    plot: bool = param(False, "The plot of measures, where it is shown, with a line at the frame")
+
+    def __bool__(self) -> bool:
+        return any(getattr(self, field.name) for field in fields(self))
+
+
+MARKS = tuple(parameter.name for parameter in describe(Marks))
+
+
+def marks_of(names: Sequence[str] | None) -> Marks:
+    """The choice of these names of MARKS."""
+    return Marks(**dict.fromkeys(names or (), True))
+
+
+@dataclass(frozen=True)
+class MeasuredLine:
+    """A measured distance in a picture, or a note at a place, which is both ends.
+
+    ends: two places, scan units. slack: of each, how far before it the surface may be that is its own, scan
+    units. text: that stands beside it. hidden: whether something is before one of its ends.
+    """
+
+    ends: tuple[Vector, Vector]
+    slack: tuple[float, float]
+    text: str
+    hidden: bool = False
+
+
+@dataclass(frozen=True)
+class Legend:
+    """The words and numbers that the marks of a picture show.
+
+    unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
+    says of its numbers. lines: that were measured, and notes at places. notes: on the frame. factor: how many
+    of `unit` one unit of the scan is. overlay: landmarks and lines of them, None where none are drawn.
+    covered: the cells of the picture that show the subject (see `labels.covered_cells`), None where not
+    known. places: of labels in the pictures before, which change with
+    this one. plot: None where none is drawn.
+    """
+
+    marks: Marks
+    camera: Camera
+    look: Look
+    unit: str
+    pose: int
+    count: int
+    time: float
+    range_note: str = ""
+    lines: tuple[MeasuredLine, ...] = ()
+    notes: tuple[str, ...] = ()
+    factor: float = 1.0
+    overlay: Overlay | None = None
+    plot: DrawnPlot | None = None
+    covered: NDArray[np.bool_] | None = field(default=None, compare=False)
+    places: LabelPlaces = field(default_factory=LabelPlaces, compare=False)
+
+
+def round_length(most: float) -> float:
+    """The largest of 1, 2 and 5 times a power of ten that is no longer than `most`, which is positive."""
+    power = 10.0 ** math.floor(math.log10(most))
+    return max((factor * power for factor in (1, 2, 5) if factor * power <= most), default=power)
+
+
+def scale_bar(camera: Camera, size: tuple[float, float], factor: float = 1.0) -> tuple[float, float]:
+    """A round length, and how many pixels it takes at the depth of the camera's target.
+
+    It takes at most a sixth of the picture's width. size: (width, height), pixels. factor: from scan units to
+    those that the length is in.
+    """
+    width, height = size
+    view_height = factor * camera.view_height
+    length = round_length(_BAR_SHARE * width * view_height / height)
+    return length, length * height / view_height
+
+
+def quantity(look: Look, unit: str, kind: ValueKind | None = None) -> str:
+    """The number that the look colours by, with its unit where it is a length. kind: of what a backend
+    finds."""
+    if kind is not None or is_length(look, kind):
+        unit_words = f" ({unit})" if is_length(look, kind) else ""
+        return look.color_by.replace("_", " ").capitalize() + unit_words
+    return "Value" if look.color_by.startswith("#") else look.color_by
+
+
+def is_length(look: Look, kind: ValueKind | None) -> bool:
+    """Whether the number that the look colours by is one in the scan's unit. kind: as for `quantity`."""
+    return look.color_by in ("depth", "height") if kind is None else kind.is_length
+
+
+def number(value: float, span: float) -> str:
+    """A number with three digits of the span that it is one of, the shorter way."""
+    if not math.isfinite(value):
+        return str(value)
+    magnitude = math.floor(math.log10(span)) if span > 0 else math.floor(math.log10(abs(value) or 1))
+    decimals = max(2 - magnitude, 0)
+    plain = f"{round(value, decimals) + 0.0:,.{decimals}f}"  # + 0.0: no minus before zero
+    if not value:
+        return "0"
+    digits = min(max(math.floor(math.log10(abs(value))) + 2 - magnitude, 2), _MOST_DIGITS)
+    scientific = f"{value:.{digits}e}"
+    return plain if len(plain) <= len(scientific) + 1 else scientific
+
+
+def range_note(legend: Legend) -> str:
+    """Words on where the range of colours is from, where it is not that of all frames or given."""
+    look = legend.look
+    is_own = look.range == "frame" and None in (look.low, look.high) and look.color_by != "depth"
+    return legend.range_note or ("range of this frame" if is_own and legend.count > 1 else "")
+
+
+def swatches(look: Look) -> list[tuple[Color, str]]:
+    """Colours that the look shows something else by than numbers, and what each says."""
+    told = []
+    if look.color_by == "level":
+        levels = [f"Level {number}" for number in range(1, len(LEVEL_COLORS) + 1)]
+        levels[-1] += " and above"
+        told = [(_MEASURED, "Measured"), *zip(map(rgba, LEVEL_COLORS), levels, strict=True)]
+    return [*told, (rgba(HOLE_COLOR), "Hole")] if look.holes else told
+
+
+def stamp(legend: Legend) -> str:
+    """The frame, counted from 1, and its time."""
+    return f"{frame_in_words(legend.pose).capitalize()} of {legend.count}, {legend.time:.3f} s"
+
+
+def ticks(low: float, high: float, kind: ValueKind | None = None) -> list[tuple[float, str]]:
+    """Shares of the colour bar at which numbers stand, from its foot, and these. kind: as for `draw`."""
+    shares = (0.0, 0.5, 1.0) if high != low else (0.0,)
+    if kind is not None and kind.goes_by_log(low, high):
+        values = [math.exp((1 - share) * math.log(low) + share * math.log(high)) for share in shares]
+        return [(share, number(value, value)) for share, value in zip(shares, values, strict=True)]
+    return [(share, number(low + share * (high - low), abs(high - low))) for share in shares]
