@@ -206,7 +206,7 @@ def measured(pose: Pose, *ids: int) -> Measurement:
 def test_it_follows_its_points_where_the_scan_has_one_topology() -> None:
     made = measured(moved(0), 0, 2)
     reading = reading_of(made, moved(4), True)
-    assert (reading.fixed, reading.motion) == (None, "follows points")
+    assert (reading.fixed, reading.motion) == (None, "moves with the surface")
     assert reading.measurement == measured(moved(4), 0, 2)
     assert reading.measurement.distance == 5 * made.distance
     assert reading_of(reading.measurement, moved(0), True).measurement == made
@@ -292,7 +292,7 @@ def test_a_csv_holds_everything_with_all_digits(tmp_path: Path) -> None:
     assert (first["scan"], first["measurement"], first["unit"]) == ('the "left", ear', "1", "mm")
     assert float(first["distance"]) == made.distance
     assert float(first["uncertainty"]) == made.uncertainty
-    assert (first["motion"], second["motion"]) == ("follows points", "fixed in space")
+    assert (first["motion"], second["motion"]) == ("moves with the surface", "fixed in space")
     for number, e in enumerate(made.ends, 1):
         assert int(first[f"frame_{number}"]) == 3, "as the window counts them"
         assert float(first[f"time_{number}"]) == e.time

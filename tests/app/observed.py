@@ -179,6 +179,7 @@ def shown(app: App) -> dict[str, Any]:
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,
         "clicking": app.tools.clicking,
+        "labels": plain(app.tools.label_places.spots),
         "is_under_way": app.tools.is_under_way,
         "landmarks": landmarks(app),
         "followed": {name: track.is_whole for name, track in app.tools.followed.tracks.items()},

@@ -63,7 +63,7 @@ def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) 
     return measurement["distance"], measurement["uncertainty"]
 
 
-def expect_reading(app: RunningApp, *distances: float, motion: str = "follows points") -> None:
+def expect_reading(app: RunningApp, *distances: float, motion: str = "moves with the surface") -> None:
     """Wait until the measurements read so."""
     wanted = [(pytest.approx(distance, abs=2 * CLICK), motion) for distance in distances]
     app.see(lambda state: [(one["distance"], one["motion"]) for one in state.measurements] == wanted)
@@ -152,7 +152,7 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
             saved = list(csv.DictReader(stream))
         assert saved[:2] == copied
         for row, frame in zip(saved, (0, 1, 2), strict=True):
-            assert (row["scan"], row["unit"], row["motion"]) == ("scan.npz", "cm", "follows points")
+            assert (row["scan"], row["unit"], row["motion"]) == ("scan.npz", "cm", "moves with the surface")
             assert abs(float(row["distance"]) - distances[frame]) < 2 * CLICK
             assert (row["frame_1"], row["id_1"], row["id_2"]) == (str(frame + 1), "34", "128")
             place = [float(row[f"{axis}_2"]) for axis in "xyz"]

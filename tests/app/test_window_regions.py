@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from virtual_screen import PANEL, RunningApp, Screen, State, running_app
 
 from viewer.app.tools.plotting.lasso import FEWEST, MOST, corners_of, without_overlap
+from viewer.document.recording import Recording
+from viewer.document.schema import plain
 from viewer.output.plots import PLOT_COLORS
 
 SIDE, HEIGHT, STEP = 41, 30.0, 2.0  # points along a side, between two sheets, between points; scan units
@@ -83,6 +85,12 @@ def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
         front = areas(app.see(lambda state: np.isfinite(areas(state)).all()))
         np.testing.assert_allclose(front, area * (1 + GROWS * np.arange(FRAMES)) ** 2, rtol=1e-3)
         app.settle()
+        keys = {label["key"] for label in app.state.labels}
+        assert keys == {"Region 1, area", "Region 1, perimeter"}, "its corners have no names"
+        screen.do("key", "p")
+        saved = app.told("Saved (.+png)")[1]
+        entry = Recording.load(Path(saved)).entries[0]
+        assert plain(entry.labels) == app.state.labels, "the picture has them where the view has them"
         picture = screen.picture()[view]
         assert pixels_of(picture, PLOT_COLORS[0]) + pixels_of(picture, PLOT_COLORS[1]) > 4 * height / 8
 

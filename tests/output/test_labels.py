@@ -16,6 +16,7 @@ from viewer.output.labels import (
     covered_cells,
     forms_of,
     free_names,
+    said_once,
 )
 
 SIZE, EM, WIDE = (960.0, 640.0), 16.0, (150.0, 24.0)
@@ -134,17 +135,39 @@ def test_they_do_not_jump_while_a_scan_plays_and_follow_the_camera_when_it_rests
     assert [place.box for place in now] == [place.box for place in alone]
 
 
-def test_a_saved_picture_has_them_where_the_window_has_them() -> None:
-    """Its text is of another size."""
-    places, labels = LabelPlaces(), callouts(6)
-    places.place(labels, ground(labels, cells((460, 330), (170, 230))))
-    shown = places.place(labels, ground(labels))
-    smaller = [replace(label, sizes=tuple((0.8 * w, 0.8 * h) for w, h in label.sizes)) for label in labels]
-    saved = places.copy().place(smaller, replace(ground(labels), em=0.8 * EM))
-    for there, here in zip(shown, saved, strict=True):
-        assert here.leader is not None
-        assert there.leader is not None
-        assert np.array(here.leader) == pytest.approx(np.array(there.leader), abs=6)
+@pytest.mark.parametrize("seed", [0, 3])
+@pytest.mark.parametrize("size", [0.5, 1, 3])
+@pytest.mark.parametrize("text", [0.6, 0.8, 1.0, 1.15])
+def test_other_pictures_of_a_view_have_them_where_the_window_has_them(
+    text: float, size: float, seed: int
+) -> None:
+    """Of any size, with other text, and other cells of the subject, as those of a preview are; and though the
+    window came to its places by what it showed before. text, size: of the picture, in those of the window."""
+    places, labels = LabelPlaces(), callouts(8, seed)
+    places.place(labels[:3], ground(labels[:3], cells((420, 330), (210, 230))))
+    shown = places.place(labels, ground(labels, cells((460, 330), (170, 230))))
+    larger = [
+        Callout(one.key, tuple((text * size * w, text * size * h) for w, h in one.sizes), size * one.line)
+        for one in labels
+    ]
+    of_picture = ground(labels, cells((490, 330), (160, 220)))
+    of_picture = replace(
+        of_picture, size=(size * SIZE[0], size * SIZE[1]), em=text * size * EM, marks=size * of_picture.marks
+    )
+    picture = LabelPlaces()
+    picture.take_up(places.spots)
+    for _ in range(2):  # as a film has it, too
+        saved = picture.place(larger, of_picture)
+        assert overlaps(saved) == 0
+        for label, there, here in zip(labels, shown, saved, strict=True):
+            middle = label.line[:, 0].mean()
+            is_right = [
+                sum(box[::2]) / 2 > at for box, at in ((there.box, middle), (here.box, size * middle))
+            ]
+            assert is_right[0] == is_right[1], "on the same side"
+            assert here.form == there.form
+            rows = np.array(there.box)[1::2].mean(), np.array(here.box)[1::2].mean() / size
+            assert rows[1] == pytest.approx(rows[0], abs=1e-6 if text <= 1 else 2 * EM)
 
 
 def test_other_things_over_the_picture_are_left_free_and_labels_become_narrow_for_it() -> None:
@@ -189,10 +212,17 @@ def test_many_labels_and_landmarks_all_have_a_place() -> None:
 
 def test_names_cover_no_name_before_them() -> None:
     corners = np.array([(10.0, 10.0), (14.0, 12.0), (80.0, 10.0), (-20.0, 200.0)])
-    assert free_names(["first", "second", "", "beside"], corners, 16.0, lambda text: 8.0 * len(text)) == [
-        0,
-        3,
-    ]
+    texts, none = ["first", "second", "", "beside"], np.empty((0, 2))
+    assert free_names(texts, corners, 16.0, lambda text: 8.0 * len(text), none) == [0, 3]
+    marks = corners + np.array((-5, 8))  # each beside its own name
+    assert free_names(texts, corners, 16.0, lambda text: 8.0 * len(text), marks) == [0, 3]
+    other = np.array([(20.0, 18.0)])
+    assert free_names(texts, corners, 16.0, lambda text: 8.0 * len(text), other) == [3]
+
+
+def test_the_name_of_a_region_is_said_once() -> None:
+    texts = ["Region 1", "Region 1, area: 939 mm2", "Region 2", "Region 3, left", "Region 3"]
+    assert said_once(texts, str) == [texts[1], "Region 2", "Region 3, left", "Region 3"]
 
 
 def test_the_subject_is_where_the_surface_shows_something() -> None:

@@ -14,6 +14,7 @@ from PIL import Image
 
 from viewer.camera import Camera
 from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
+from viewer.output.image_painter import ImagePainter
 from viewer.output.legend import (
     Legend,
     Marks,
@@ -30,6 +31,7 @@ from viewer.output.legend import (
 from viewer.output.marked import marked
 from viewer.output.marks import INK, PLATE, text_height
 from viewer.output.overlays import LABEL_EDGE, LINE_COLOR, DrawnCurve, DrawnPlot
+from viewer.output.plot_below import PLOT_HEIGHT, draw_plot, round_values
 from viewer.scan.points import PointCloud
 
 if TYPE_CHECKING:
@@ -242,27 +244,101 @@ def test_measured_lines_go_from_end_to_end_and_their_texts_keep_off_each_other()
     assert (bare == with_marks(scale_bar=True)).all(), "lines are a mark of their own"
 
 
-@pytest.mark.parametrize("pose", [0, 5, 9])
-def test_a_plot_has_its_curves_and_a_line_at_the_frame(pose: int) -> None:
+VALUES_OF_RISE = (0.0, 1.0, 2.0, None, None, 5.0, 6.0, 7.0, 8.0, 9.0)
+RISE = DrawnCurve("rise", "mm", 0xFF8000, VALUES_OF_RISE, (1.5,) * 10)
+PLOT = DrawnPlot("time [s]", tuple(float(n) for n in range(10)), (RISE,))
+
+
+def plotted(plot: DrawnPlot, pose: int = 0, size: tuple[int, int] = SIZE) -> NDArray[np.int64]:
+    """The lower part of a picture with a plot."""
+    legend = replace(LEGEND, plot=plot, pose=pose, marks=Marks(plot=True))
+    return marked(gray(size), legend, None)[round((1 - PLOT_HEIGHT) * size[1]) :, :, :3].astype(int)
+
+
+def pixels_near(image: NDArray[np.int64], color: tuple[int, int, int]) -> NDArray[np.bool_]:
+    return np.asarray(np.abs(image - color).max(axis=2) < 40)
+
+
+def test_a_plot_has_its_curves_and_a_line_at_the_frame() -> None:
     """A rise with a gap, and one that is nowhere known; the picture with its marks stands above, smaller."""
-    values = (0.0, 1.0, 2.0, None, None, 5.0, 6.0, 7.0, 8.0, 9.0)
-    curves = DrawnCurve("rise", "mm", 0xFF8000, values), DrawnCurve("none", "mm", 0x00FF00, (None,) * 10)
-    plot = DrawnPlot("time [s]", tuple(float(n) for n in range(10)), curves)
-    legend = replace(LEGEND, plot=plot, pose=pose, marks=Marks(plot=True, color_bar=True))
+    unknown = DrawnCurve("none", "mm", 0x00FF00, (None,) * 10)
+    plot = replace(PLOT, curves=(RISE, unknown))
+    places = []
+    for pose in (0, 5, 9):
+        image = plotted(plot, pose)
+        assert not pixels_near(image, (0, 255, 0)).any()
+        white = (image.min(axis=2) > 200)[: -3 * text_height(SIZE)].sum(axis=0)
+        places.append(np.flatnonzero(white > 0.8 * white.max()).mean())
+    assert (places[1] - places[0]) / (places[2] - places[0]) == pytest.approx(5 / 9, abs=0.01)
+    legend_row = 2 * text_height(SIZE)
+    rows, columns = pixels_near(image, (255, 128, 0))[legend_row:].nonzero()
+    assert np.polyfit(columns, rows, 1)[0] < -0.03, "it rises to the right"
+    assert [columns.min(), columns.max()] == pytest.approx([places[0], places[2]], abs=2)
+    legend = replace(LEGEND, plot=plot, marks=Marks(plot=True, color_bar=True))
     image = marked(gray(), legend, (0.0, 1.0)).astype(int)
-    inside = image[round(0.76 * SIZE[1]) + 25 : -25, :, :3]
-    ours = (np.abs(inside - (255, 128, 0)).max(axis=2) < 40).nonzero()
-    assert np.polyfit(ours[1], ours[0], 1)[0] < -0.05, "it rises to the right"
-    assert not (np.abs(image[..., :3] - (0, 255, 0)).max(axis=2) < 40).any()
-    columns = np.flatnonzero((inside.min(axis=2) > 200).mean(axis=0) > 0.7)
-    left_free = 1.3 * text_height(SIZE)  # at both sides
-    at = (columns.mean() + 0.5 - left_free) / (SIZE[0] - 2 * left_free)
-    assert at == pytest.approx(pose / 9, abs=0.01)
     alone = Image.fromarray(marked(gray(), replace(legend, plot=None), (0.0, 1.0)))
-    high, wide = round(0.76 * SIZE[1]), round(0.76 * SIZE[0])
+    high, wide = (round((1 - PLOT_HEIGHT) * extent) for extent in SIZE[::-1])
     above = np.asarray(alone.resize((wide, high))).astype(int)
     left = (SIZE[0] - wide) // 2
     assert (image[: high - 2, left : left + wide] == above[: high - 2]).all()
+
+
+def test_a_plot_has_values_at_its_axes_with_their_units_and_a_band() -> None:
+    """Each is where the plot without it has nothing; the values are those at their places."""
+
+    class Written(ImagePainter):
+        texts: list[tuple[float, float, str]]
+
+        def text(self, left: float, top: float, text: str) -> None:
+            self.texts = [*getattr(self, "texts", []), (left, top, text)]
+
+    area = DrawnCurve("area", "mm²", 0x3D9BE0, tuple(100.0 + 50 * n for n in range(10)))
+    painter = Written((1280, 720))
+    assert draw_plot(painter, painter.image.size, replace(PLOT, curves=(RISE, area)), 9)
+    texts = {text: (left, top) for left, top, text in painter.texts}
+    assert {"time [s]", "mm", "mm²", "rise: 9 mm", "area: 550 mm²"} <= set(texts)
+    numbers = [(left, top, float(text)) for left, top, text in painter.texts if text[-1].isdecimal()]
+    foot = texts["time [s]"][1] - 30
+    left_axis = [(top, value) for left, top, value in numbers if left < 100 and top < foot]
+    right_axis = [(top, value) for left, top, value in numbers if left > 1180 and value > 9]
+    for axis, low, high in ((left_axis, -1.5, 10.5), (right_axis, 100, 550)):
+        assert len(axis) >= 2
+        tops, values = np.array(axis).T
+        assert ((values >= low) & (values <= high)).all()
+        assert np.ptp(np.diff(values)) < 1e-9
+        assert np.diff(tops) / np.diff(values) == pytest.approx(np.diff(tops)[0] / np.diff(values)[0])
+        assert tops[0] > tops[-1], "up is more"
+    below = [value for left, top, value in numbers if top > foot]
+    assert below[:2] == [0, 1]
+    assert below[-1] == 9
+    band = np.abs(plotted(PLOT) - plotted(replace(PLOT, curves=(replace(RISE, band=()),)))).max(axis=2) > 20
+    assert band.mean() > 0.02
+    anonymous = replace(PLOT, curves=(RISE, area)).without_names()
+    assert (anonymous.x_label, {curve.name for curve in anonymous.curves}) == ("[s]", {""})
+
+
+@pytest.mark.parametrize("size", [(96, 64), (300, 900), (20, 20), (1, 1)])
+def test_a_plot_of_many_curves_keeps_to_its_place(size: tuple[int, int]) -> None:
+    curves = tuple(replace(RISE, name=f"a measure {n}", unit="mm" * (n % 3)) for n in range(30))
+    painter = ImagePainter(size)
+    draw_plot(painter, size, replace(PLOT, curves=curves), 3)
+    top = round((1 - PLOT_HEIGHT) * size[1])
+    assert not np.asarray(painter.image)[: max(top - 1, 0), :, 3].any()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_values_at_axes_are_round_and_as_many_as_fit(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    low = rng.normal() * 10 ** rng.uniform(-6, 6)
+    high = low + 10 ** rng.uniform(-5, 5)
+    for most in (2, 3, 5, 10):
+        values = round_values(low, high, most)
+        assert len(values) <= most
+        assert len(values) >= (most - 1) // 2 - 1
+        slack = 1e-6 * (high - low)
+        assert all(low - slack <= value <= high + slack for value in values)
+        for step in np.diff(values):
+            assert f"{step:.3e}"[:5] in ("1.000", "2.000", "5.000", "10.00")
 
 
 def test_what_is_behind_the_eye_is_no_line() -> None:

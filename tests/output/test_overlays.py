@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +14,13 @@ from viewer.analysis.track import Known
 from viewer.camera import Camera
 from viewer.geometry import Vector
 from viewer.look import Look
+from viewer.output.labels import LabelSpot
 from viewer.output.legend import Legend, Marks
 from viewer.output.marked import marked
-from viewer.output.marks import text_height
+from viewer.output.marks import PLATE, text_height
 from viewer.output.overlays import (
     MARK_RADIUS,
+    MOST_NAMED,
     STATE_MARKS,
     DrawnLandmark,
     DrawnPath,
@@ -37,13 +40,13 @@ EM = text_height(SIZE)
 
 
 def picture(
-    *landmarks: DrawnLandmark, paths: tuple[DrawnPath, ...] = (), seen: bool = True
+    *landmarks: DrawnLandmark, paths: tuple[DrawnPath, ...] = (), seen: bool = True, **of_legend: Any
 ) -> NDArray[np.int64]:
     told = [(one, one.place, 0.0) for one in landmarks]
     overlay = Overlay.of(told, [(path, np.array(path.places)) for path in paths], 0.0)
     overlay = overlay.with_seen(lambda places, _: np.full(len(places), seen))
     blank = np.full((SIZE[1], SIZE[0], 4), (90, 90, 90, 255), np.uint8)
-    return marked(blank, replace(LEGEND, overlay=overlay), None)[..., :3].astype(int)
+    return marked(blank, replace(LEGEND, overlay=overlay, **of_legend), None)[..., :3].astype(int)
 
 
 def bytes_of(color: int) -> list[int]:
@@ -150,11 +153,56 @@ def test_the_colours_of_a_path_are_those_of_its_places_and_dots_need_room() -> N
     assert np.flatnonzero(dotted(near, 5.0)).tolist() == [11], "what no line joins has a dot"
 
 
-def test_names_keep_off_each_other_and_values_stand_beside_lines() -> None:
-    two = [DrawnLandmark((0.0, 0.02 * y, 0.0), "pronasale", True) for y in range(2)]
-    assert (picture(*two) == picture(two[0], replace(two[1], name=""))).all()
-    far = replace(two[1], place=(0.0, 2.0, 0.0))
-    assert (picture(two[0], far) != picture(two[0], replace(far, name=""))).any()
+def dark(image: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Where the plates of labels are."""
+    return np.asarray((image == round(90 * (1 - PLATE[3] / 255))).all(axis=2))
+
+
+def test_names_of_few_landmarks_stand_beside_the_subject() -> None:
+    """Those of many are written beside their marks, where they cover no other name or mark."""
+    rows, columns = np.mgrid[:48, :85]
+    head = (np.abs(columns - 42) < 20) & (np.abs(rows - 24) < 20)
+    grid = [(0.9 * x, 1.2 * y, 0.0) for x in (-2, -1, 1, 2) for y in (-1.5, -0.5, 0.5, 1.5)]
+
+    def names(count: int) -> NDArray[np.int64]:
+        some = [DrawnLandmark(place, "pronasale", True) for place in grid[:count]]
+        return picture(*some, covered=head)
+
+    on_head = np.kron(head, np.ones((SIZE[1] // 48, 30), bool))
+    on_head = np.pad(on_head, ((0, SIZE[1] - on_head.shape[0]), (0, SIZE[0] - on_head.shape[1])))
+    few = dark(names(MOST_NAMED))
+    assert few.sum() > MOST_NAMED * 3 * EM * EM
+    assert few[on_head].sum() < EM * EM, "leaders alone"
+    many = [DrawnLandmark((0.2 * n - 2, 0.0, 0.0), "sn", True) for n in range(MOST_NAMED + 1)]
+    assert dark(picture(*many)).sum() < EM * EM
+    bare = [replace(one, name="") for one in many]
+    written = changed(picture(*many)) & ~changed(picture(*bare))
+    assert written.any()
+    near = [replace(one, name="pronasale") for one in many]  # would cover the next mark
+    assert not (changed(picture(*near[:-1], near[-1])) & ~changed(picture(*bare)))[:, : at(1.1, 0)[1]].any()
+
+
+def test_the_corners_of_a_region_are_smaller_and_its_name_stands_once() -> None:
+    place = (0.0, 0.0, 0.0)
+    area = [changed(picture(DrawnLandmark(place, "", True, is_corner=one))).sum() for one in (True, False)]
+    assert area[0] < 0.6 * area[1]
+    corner = DrawnLandmark(place, "Region 1", True, is_corner=True)
+    line = DrawnPath(((-3.0, 0.0, 0.0), (3.0, 0.0, 0.0)), (0xFF0000,), name="Region 1, area", value="6 mm2")
+    alone = picture(replace(corner, name=""), paths=(line,))
+    assert (picture(corner, paths=(line,)) == alone).all()
+    assert dark(picture(corner, paths=(replace(line, name="width"),))).sum() > dark(alone).sum()
+
+
+def test_labels_stand_where_they_stand_in_the_view() -> None:
+    """At the left of the picture, where they would not be otherwise."""
+    one = DrawnLandmark((2.0, 1.0, 0.0), "pronasale", True)
+    left = dark(picture(one, labels=(LabelSpot("pronasale", 0, (-0.5, 0.1), True),)))
+    assert left[:, : SIZE[0] // 2].any()
+    assert not left[:, SIZE[0] // 2 :].any()
+    assert dark(picture(one))[:, SIZE[0] // 2 :].any()
+
+
+def test_values_stand_beside_lines() -> None:
     line = DrawnPath(((-3.0, 0.0, 0.0), (3.0, 0.0, 0.0)), (0xFF0000,))
     plated = changed(picture(paths=(replace(line, name="width", value="6 mm"),)))
     assert plated.sum() > changed(picture(paths=(line,))).sum() + 5 * EM

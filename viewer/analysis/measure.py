@@ -74,7 +74,7 @@ class Reading:
     @property
     def motion(self) -> str:
         """Movement and growth in time, in words."""
-        return "fixed in space" if self.fixed else "follows points"
+        return "fixed in space" if self.fixed else "moves with the surface"
 
 
 def reading_of(

@@ -43,6 +43,7 @@ from ..frame import Request
 from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
+from ..output.labels import LabelSpot
 from ..output.legend import Legend, Marks, MeasuredLine
 from ..output.overlays import (
     LINE_SLACK,
@@ -106,9 +107,10 @@ class Entry:
     own. measurements: to draw over it, as they were made. shown_unit: that marks tell lengths in, None for
     `unit`. place: the matrix that the scan is moved by, None where it is not. anonymous: whether camera,
     time, look, measurements and place are those of the scan as `anonymous_request` has it. notes: of the
-    scan, where the marks show them. scale: of width and height, at which it was drawn. automatic: what the
-    renderer was chosen for and expected to take, None where a user or the scan says which it is. at: seconds
-    since the recording began; entries that differ in it alone are equal.
+    scan, where the marks show them. labels: where those over the view stand. scale: of width and height, at
+    which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
+    the scan says which it is. at: seconds since the recording began; entries that differ in it alone
+    are equal.
     """
 
     scan: ScanName | None
@@ -132,6 +134,7 @@ class Entry:
     held: Matrix | None = None
     measure_lines: tuple[DrawnPath, ...] = ()
     plot: DrawnPlot | None = None
+    labels: tuple[LabelSpot, ...] = ()
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
     at: Stamp = field(default=0.0, compare=False)
@@ -210,7 +213,7 @@ class Entry:
         return Legend(
             self.marks, self.camera, self.look, scale.unit, self.pose, len(timeline), self.time,
             lines=(*lines, *pinned), notes=on_frame, factor=scale.factor, overlay=self._overlay(pose),
-            plot=self.plot if self.marks.plot else None,
+            plot=self.plot if self.marks.plot else None, labels=self.labels,
         )  # fmt: skip
 
     def _overlay(self, pose: Pose) -> Overlay | None:
@@ -274,7 +277,7 @@ class Entry:
             self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(), automatic=None,
             landmarks=tuple(replace(one, name="") for one in self.landmarks),
             measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
-            plot=self.plot and self.plot.without_names(),
+            plot=self.plot and self.plot.without_names(), labels=(),
         )  # fmt: skip
 
     def description(self) -> str:

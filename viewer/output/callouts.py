@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..look import rgba
 from .image_painter import ImagePainter
-from .labels import Box, Callout, LabelGround, LabelPlaces, forms_of
+from .labels import Box, Callout, LabelGround, LabelPlaces, forms_of, said_once
 from .legend import Legend, MeasuredLine
 from .marks import MARGIN, PAD, PLATE, MarkPainter, shortened
 from .overlays import (
@@ -49,7 +49,8 @@ def draw_lines(
     inside = [one for one in told if _is_inside(one.places, size)]
     marks = np.concatenate([marks, *(one.places for one in inside)])
     ground = LabelGround(size, painter.em, legend.covered, marks, taken, legend.camera)
-    _draw_labels(painter, legend.places, inside, ground)
+    legend.places.take_up(legend.labels)
+    _draw_labels(painter, legend.places, said_once(inside, lambda one: one.text), ground)
 
 
 def _draw_labels(

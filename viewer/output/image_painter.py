@@ -63,6 +63,20 @@ class ImagePainter:
             _stroke_on(pixels, places[first] - (left, top), places[last] - (left, top), thick, color)
         self._lay(pixels, (left, top))
 
+    def band(self, edges: NDArray[np.float64], color: int, opacity: float) -> None:
+        """Fill between two lines. edges: (N, 3), across, and the heights of both lines there; NaN: a gap."""
+        from PIL import Image, ImageDraw
+
+        cover = Image.new("L", self.image.size)
+        fill = ImageDraw.Draw(cover)
+        there = np.isfinite(edges).all(axis=1)
+        for at in np.flatnonzero(there[:-1] & there[1:]).tolist():
+            (x, low, high), (next_x, next_low, next_high) = edges[at : at + 2].tolist()
+            fill.polygon([(x, low), (next_x, next_low), (next_x, next_high), (x, high)], round(255 * opacity))
+        pixels = np.zeros((*cover.size[::-1], 4), np.uint8)
+        pixels[..., :3], pixels[..., 3] = rgba(f"#{color:06x}")[:3], np.asarray(cover)
+        self._lay(pixels, (0, 0))
+
     def mark(self, place: Spot, radius: float, sides: int, color: int, opacity: float) -> None:
         (left, right), (top, bottom) = (
             _pixels(at, at, radius + 1, extent) for at, extent in zip(place, self.image.size, strict=True)

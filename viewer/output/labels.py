@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 Spot = tuple[float, float]  # to the right, down
+T = TypeVar("T")
 
 _ROWS = 48  # of the cells that tell where the subject is
 _LEAST_COVERED = 0.1  # of a cell, so that a few stray points are no subject
@@ -28,6 +29,7 @@ _SAMPLED = 4  # rows of the surface that tell of a cell
 _MOST_ROWS = 64  # of places that are tried
 _JUDGED = 48  # places whose leaders are looked at, those that cost least without
 _SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)  # places on a line that a leader may begin at
+_DIGITS = 5  # of a spot, in heights of the picture
 _AROUND = 6  # cells about marks that a label on the subject keeps off
 
 # In heights of the text:
@@ -76,14 +78,23 @@ class LabelPlace:
 
 
 @dataclass(frozen=True)
-class _Kept:
-    """A place that was chosen. form: as of `LabelPlace`. edge: the middle of the box's side that faces the
-    line, in shares of the picture. is_right: whether that is the right side. cost: of covering. length: of
-    the leader, in heights of the text."""
+class LabelSpot:
+    """The place of a label, as pictures of any size and text have it. key: as of `Callout`. form: as of
+    `LabelPlace`. edge: the middle of the box's side that faces the line, from the middle of the picture, in
+    heights of the picture. is_right: whether that is the right side."""
 
+    key: str
     form: int
     edge: Spot
     is_right: bool
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """A place that was chosen. cost: of covering. length: of the leader, in heights of the text. cuts: how
+    many labels its leader cuts."""
+
+    spot: LabelSpot
     cost: float
     length: float
     cuts: int
@@ -121,19 +132,36 @@ def covered_cells(surface: Surface) -> NDArray[np.bool_]:
     return (shown > _LEAST_COVERED * every).reshape(rows, columns)
 
 
+def said_once(labels: Sequence[T], text: Callable[[T], str]) -> list[T]:
+    """Leave out labels that only repeat how the one of a value begins: "Region 1" beside "Region 1, area:
+    939 mm2". text: of a label."""
+    heads = {head for head, _, rest in (text(one).partition(", ") for one in labels) if ": " in rest}
+    return [one for one in labels if text(one) not in heads]
+
+
 def free_names(
-    texts: Sequence[str], corners: NDArray[np.float64], height: float, width: Callable[[str], float]
+    texts: Sequence[str],
+    corners: NDArray[np.float64],
+    height: float,
+    width: Callable[[str], float],
+    marks: NDArray[np.float64],
 ) -> list[int]:
-    """Find which texts cover no text before them. corners: (N, 2), their upper left ones. height: of a line.
-    width: gives that of a text."""
+    """Find which texts cover no text before them, and no mark. corners: (N, 2), their upper left ones.
+    height: of a line. width: gives that of a text. marks: (M, 2), places."""
     free, taken = [], set[tuple[int, int]]()  # cells as high as a line, and half as wide
+    in_cells: dict[tuple[int, int], list[Spot]] = {}
+    for x, y in marks.tolist():
+        in_cells.setdefault((math.floor(y / height), math.floor(2 * x / height)), []).append((x, y))
     for number, (text, (left, top)) in enumerate(zip(texts, corners.tolist(), strict=True)):
         row, column = math.floor(top / height), math.floor(2 * left / height)
         if not text or (row, column) in taken or (row + 1, column) in taken:
             continue
         columns = range(column, math.floor(2 * (left + width(text)) / height) + 1)
         cells = {(each, at) for at in columns for each in (row, row + 1)}
-        if taken.isdisjoint(cells):
+        near = (place for cell in cells for place in in_cells.get(cell, ()))
+        right, bottom = left + width(text), top + height
+        covers_mark = any(left <= x <= right and top <= y <= bottom for x, y in near)
+        if not covers_mark and taken.isdisjoint(cells):
             taken |= cells
             free.append(number)
     return free
@@ -148,14 +176,24 @@ class LabelPlaces:
 
     def __init__(self) -> None:
         self._kept: dict[str, _Kept] = {}
+        self._taken_up: tuple[LabelSpot, ...] = ()
+        self._wanted: dict[str, LabelSpot] = {}  # by key, of those taken up and not placed yet
         self._placed_in: object = None  # the view that they were placed in
         self._before: object = None  # the view of the picture before
 
-    def copy(self) -> LabelPlaces:
-        """A copy of the places, to go on from."""
-        made = LabelPlaces()
-        made._kept, made._placed_in, made._before = dict(self._kept), self._placed_in, self._before
-        return made
+    @property
+    def spots(self) -> tuple[LabelSpot, ...]:
+        """The places in the last picture, for other pictures to take up."""
+        return tuple(
+            replace(kept.spot, edge=(round(kept.spot.edge[0], _DIGITS), round(kept.spot.edge[1], _DIGITS)))
+            for kept in self._kept.values()
+        )
+
+    def take_up(self, spots: tuple[LabelSpot, ...]) -> None:
+        """Have labels stand where they stand in another picture of the same view, or as near as they can."""
+        if spots != self._taken_up:
+            self._taken_up, self._wanted = spots, {spot.key: spot for spot in spots}
+            self._kept.clear()
 
     def place(self, labels: Sequence[Callout], ground: LabelGround) -> list[LabelPlace]:
         """Find the places of labels in a picture, in their order."""
@@ -172,8 +210,12 @@ class LabelPlaces:
         for number, key in enumerate(keys):
             if key in self._kept:
                 layout.keep(number, self._kept[key])
+            elif key in self._wanted:
+                layout.place_near(number, self._wanted[key])
+                self._kept[key] = layout.kept(number, key)
+        self._wanted.clear()
         for number in layout.place_others():
-            self._kept[keys[number]] = layout.kept(number)
+            self._kept[keys[number]] = layout.kept(number, keys[number])
         return [layout.place_of(number) for number in range(len(labels))]
 
 
@@ -260,12 +302,7 @@ class _Layout:
 
     def keep(self, number: int, kept: _Kept) -> None:
         """Place a label where it was, if it fits there."""
-        sizes = self.labels[number].sizes
-        form = min(kept.form, len(sizes) - 1)
-        width, height = sizes[form]
-        x, y = np.multiply(kept.edge, self.ground.size)
-        left = x - width if kept.is_right else x
-        box = np.array([[left, y - height / 2, left + width, y + height / 2]])
+        form, box = self._box_at(number, kept.spot)
         inside = (box[0, :2] >= self.low - 1).all() and (box[0, 2:] <= self.high + 1).all()
         leader = self.leaders_to(number, box)
         if (
@@ -276,6 +313,26 @@ class _Layout:
             and self.cutting(number, leader, box)[0] <= kept.cuts
         ):
             self.boxes[number], self.leaders[number], self.forms[number] = box[0], leader[0], form
+
+    def place_near(self, number: int, spot: LabelSpot) -> None:
+        """Place a label as near to a spot as it covers no other label there."""
+        form, there = self._box_at(number, spot)
+        size = there[0, 2:] - there[0, :2]
+        corner = np.clip(there[:, :2], self.low, np.maximum(self.high - size, self.low))
+        boxes = np.concatenate([np.concatenate([corner, corner + size], axis=1), self._candidates(size)])
+        cost = np.hypot(*(boxes[:, :2] - there[:, :2]).T) / self.em
+        best = [int((cost + _OVERLAPS * self.overlapping(boxes)).argmin())]
+        self.boxes[number], self.leaders[number] = boxes[best[0]], self.leaders_to(number, boxes[best])[0]
+        self.forms[number] = form
+
+    def _box_at(self, number: int, spot: LabelSpot) -> tuple[int, NDArray[np.float64]]:
+        """The form and the box (1, 4) of a label at a spot."""
+        sizes = self.labels[number].sizes
+        form = min(spot.form, len(sizes) - 1)
+        width, height = sizes[form]
+        x, y = np.multiply(spot.edge, self.ground.size[1]) + 0.5 * np.array(self.ground.size)
+        left = x - width if spot.is_right else x
+        return form, np.array([[left, y - height / 2, left + width, y + height / 2]])
 
     def place_others(self) -> list[int]:
         """Place the labels that are not placed yet, from the top down; returns which these are."""
@@ -301,7 +358,7 @@ class _Layout:
         self.boxes[number], self.leaders[number] = boxes[best], leaders[best]
         self.forms[number] = int(forms[best])
 
-    def _candidates(self, size: tuple[float, float]) -> NDArray[np.float64]:
+    def _candidates(self, size: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float64]:
         """The boxes of a size that are tried, (N, 4), all in the area where they are no larger."""
         room = np.maximum(self.high - self.low - size, 0)
         step = max(0.5 * (size[1] + _APART * self.em), self.ground.size[1] / _MOST_ROWS)
@@ -328,15 +385,17 @@ class _Layout:
 
     # --- what comes of it -----------------------------------------------------------------
 
-    def kept(self, number: int) -> _Kept:
+    def kept(self, number: int, key: str) -> _Kept:
         """The part of a label's place that is kept."""
         left, top, right, bottom = self.boxes[number].tolist()
         is_right = self.leaders[number, 0, 0] > 0.5 * (left + right)
-        edge = np.divide((right if is_right else left, 0.5 * (top + bottom)), self.ground.size).tolist()
+        middle = (right if is_right else left, 0.5 * (top + bottom)) - 0.5 * np.array(self.ground.size)
+        x, y = (middle / self.ground.size[1]).tolist()
+        spot = LabelSpot(key, self.forms[number], (x, y), bool(is_right))
         length = float(_lengths(self.leaders[[number]])[0]) / self.em
         cost = float(self.covering(self.boxes[[number]])[0])
         cuts = int(self.cutting(number, self.leaders[[number]], self.boxes[[number]])[0])
-        return _Kept(self.forms[number], (edge[0], edge[1]), bool(is_right), cost, length, cuts)
+        return _Kept(spot, cost, length, cuts)
 
     def place_of(self, number: int) -> LabelPlace:
         """The place of a label."""

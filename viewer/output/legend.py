@@ -14,7 +14,7 @@ from ..geometry import Vector
 from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from ..params import describe, param
 from ..scan.times import frame_in_words
-from .labels import LabelPlaces
+from .labels import LabelPlaces, LabelSpot
 from .overlays import DrawnPlot, Overlay
 
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
@@ -78,7 +78,7 @@ class Legend:
     of `unit` one unit of the scan is. overlay: landmarks and lines of them, None where none are drawn.
     covered: the cells of the picture that show the subject (see `labels.covered_cells`), None where not
     known. places: of labels in the pictures before, which change with
-    this one. plot: None where none is drawn.
+    this one. labels: where they stand in the view that this is a picture of. plot: None where none is drawn.
     """
 
     marks: Marks
@@ -96,6 +96,7 @@ class Legend:
     plot: DrawnPlot | None = None
     covered: NDArray[np.bool_] | None = field(default=None, compare=False)
     places: LabelPlaces = field(default_factory=LabelPlaces, compare=False)
+    labels: tuple[LabelSpot, ...] = ()
 
 
 def round_length(most: float) -> float:

@@ -35,11 +35,13 @@ STATE_MARKS = {
 }
 LINE_SLACK = 0.01  # of the scan's radius: how far before a place a surface may be that a line lies on
 DIM_LINE, DIM_LANDMARK = 0.5, 0.35  # opacity where something is hidden
-HALO_OPACITY, LEADER_OPACITY = 0.75, 0.8
+HALO_OPACITY, LEADER_OPACITY, BAND_OPACITY = 0.75, 0.8, 0.3
 _DIGITS = 6  # of places, in the radius of the scan
 
 # In heights of the text:
 LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.15, 0.18, 0.25
+CORNER_SHARE = 0.55  # of a mark's radius, that of a region's corner has
+MOST_NAMED = 16  # landmarks in view whose names stand beside the subject; of more, beside their marks
 HALO, LEADER_THICK, LABEL_EDGE = 0.1, 0.08, 0.2  # dark beside lines; of a leader; of a label's coloured edge
 DOT_ROOM = 0.4  # how far apart dots are at least
 NAME_GAP = 0.15  # between a landmark and its name
@@ -53,13 +55,14 @@ _RING_THICK = 0.066
 class DrawnLandmark:
     """A landmark in a frame. place: scan units. name: "" where none is shown. is_placed: whether it was set
     there, not tracked. sure: how far off it is at most with 95 %, and spacing: of the points around it, scan
-    units; 0 where not known."""
+    units; 0 where not known. is_corner: whether it is a corner of a region, which the name is of then."""
 
     place: Vector
     name: str
     is_placed: bool
     sure: float = 0.0
     spacing: float = 0.0
+    is_corner: bool = False
 
 
 @dataclass(frozen=True)
@@ -77,12 +80,14 @@ class DrawnPath:
 
 @dataclass(frozen=True)
 class DrawnCurve:
-    """A curve of a plot. unit: of its values, one for each frame, None where not known. color: 0xRRGGBB."""
+    """A curve of a plot. unit: of its values, one for each frame, None where not known. color: 0xRRGGBB.
+    band: how far to either side the curve may be off, likewise; empty for no band."""
 
     name: str
     unit: str
     color: int
     values: tuple[float | None, ...]
+    band: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,10 @@ class DrawnPlot:
 
     def without_names(self) -> DrawnPlot:
         """Leave out the names of measures."""
-        return replace(self, x_label="", curves=tuple(replace(one, name="") for one in self.curves))
+        _, bracket, unit = self.x_label.rpartition("[")
+        return replace(
+            self, x_label=bracket + unit, curves=tuple(replace(one, name="") for one in self.curves)
+        )
 
 
 @dataclass(frozen=True)
@@ -209,9 +217,10 @@ class OverlayPainter(Protocol):
         """Draw a circle."""
 
 
-def mark_radius(sides: int) -> float:
-    """The radius of the corners of a mark, in heights of the text: marks of all shapes are about as large."""
-    return MARK_RADIUS * (1.0 if sides == 0 else 1.3)
+def mark_radius(sides: int, *, is_corner: bool = False) -> float:
+    """The radius of the corners of a mark, in heights of the text: marks of all shapes are about as large.
+    is_corner: whether it is a corner of a region."""
+    return MARK_RADIUS * (1.0 if sides == 0 else 1.3) * (CORNER_SHARE if is_corner else 1.0)
 
 
 def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
@@ -239,9 +248,8 @@ class ToldLine:
 def draw_overlay(
     painter: OverlayPainter, size: tuple[float, float], camera: Camera, overlay: Overlay
 ) -> tuple[list[ToldLine], NDArray[np.float64]]:
-    """Draw lines and landmarks; returns the lines that are to have labels, and all places that labels keep
-    off,
-    (N, 2).
+    """Draw lines and landmarks; returns the lines and landmarks that are to have labels, and all places that
+    labels keep off, (N, 2).
 
     size: (width, height), pixels.
     """
@@ -258,7 +266,13 @@ def draw_overlay(
             told.append(ToldLine(words, pixels[part], path.colors[0], 1.0 if seen.any() else DIM_LINE))
     count = len(overlay.landmarks)
     lengths = height / camera.heights_at(overlay.places[:count]) if count else np.empty(0)
-    _draw_landmarks(painter, overlay.landmarks, pixels[:count], lengths, overlay.seen[:count])
+    of_landmarks = overlay.landmarks, pixels[:count]
+    _draw_landmarks(painter, *of_landmarks, lengths, overlay.seen[:count])
+    named = named_in(size, [one.name for one in overlay.landmarks], pixels[:count])
+    if len(named) > MOST_NAMED:
+        _draw_names(painter, *of_landmarks, overlay.seen[:count], named)
+    else:
+        told += [_told_name(overlay, number, pixels[[number]]) for number in named]
     return told, pixels[np.isfinite(pixels).all(axis=1)]
 
 
@@ -297,22 +311,51 @@ def _draw_landmarks(
     lengths: NDArray[np.float64],
     seen: NDArray[np.bool_],
 ) -> None:
-    """Draw discs, each in a ring of its uncertainty where that is wider and it was tracked, and names that
-    cover no name before them. lengths: of a scan unit at each, pixels, (N,)."""
+    """Draw a mark for each, in a ring of its uncertainty where that is wider and it was tracked. lengths: of
+    a scan unit at each, pixels, (N,)."""
     em, at_all = painter.em, np.isfinite(pixels).all(axis=1)
     opacities = np.where(seen, 1.0, DIM_LANDMARK)
     for number in np.flatnonzero(at_all).tolist():
         one, place, opacity = landmarks[number], pixels[number], float(opacities[number])
-        color, sides = STATE_MARKS[Known.PLACED if one.is_placed else Known.TRACKED]
-        spot, radius = (float(place[0]), float(place[1])), mark_radius(sides) * em
+        color, sides = mark_of(one)
+        spot = float(place[0]), float(place[1])
+        radius = mark_radius(sides, is_corner=one.is_corner) * em
         painter.mark(spot, radius + 1.5, sides, 0, HALO_OPACITY * opacity)
         painter.mark(spot, radius, sides, color, opacity)
         reach = one.sure * lengths[number]
         if not one.is_placed and reach > MARK_RADIUS * em:
             painter.ring(spot, reach, max(_RING_THICK * em, 1.0), color, opacity)
-    named = np.flatnonzero(at_all)
+
+
+def mark_of(landmark: DrawnLandmark) -> StateMark:
+    """The mark of a landmark that is there."""
+    return STATE_MARKS[Known.PLACED if landmark.is_placed else Known.TRACKED]
+
+
+def named_in(size: tuple[float, float], names: Sequence[str], pixels: NDArray[np.float64]) -> list[int]:
+    """Find the landmarks with a name in a picture. pixels: (N, 2), NaN where one is not there."""
+    inside = np.logical_and.reduce((pixels >= 0) & (pixels <= size), axis=1)
+    return [number for number in np.flatnonzero(inside).tolist() if names[number]]
+
+
+def _told_name(overlay: Overlay, number: int, place: NDArray[np.float64]) -> ToldLine:
+    one = overlay.landmarks[number]
+    opacity = 1.0 if overlay.seen[number] else DIM_LANDMARK
+    return ToldLine(one.name, place, mark_of(one).color, opacity)
+
+
+def _draw_names(
+    painter: OverlayPainter,
+    landmarks: Sequence[DrawnLandmark],
+    pixels: NDArray[np.float64],
+    seen: NDArray[np.bool_],
+    named: Sequence[int],
+) -> None:
+    """Write the names of landmarks beside their marks, those that cover no other name or mark."""
+    em = painter.em
     corners = pixels[named] + np.array([MARK_RADIUS + NAME_GAP, -0.5]) * em
-    texts = [landmarks[number].name for number in named.tolist()]
-    for number in free_names(texts, corners, em, painter.width):
-        left, top = corners[number].tolist()
-        painter.shaded_text(left, top, texts[number], float(opacities[named[number]]))
+    texts = [landmarks[number].name for number in named]
+    for at in free_names(texts, corners, em, painter.width, pixels[np.isfinite(pixels).all(axis=1)]):
+        left, top = corners[at].tolist()
+        opacity = 1.0 if seen[named[at]] else DIM_LANDMARK
+        painter.shaded_text(left, top, texts[at], opacity)

@@ -17,7 +17,7 @@ from ..csv_text import save_rows
 from ..files import whole_file
 from ..imports import require
 from ..scan.units import Scale
-from .overlays import DrawnCurve, DrawnPlot
+from .overlays import BAND_OPACITY, DrawnCurve, DrawnPlot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,6 @@ PLOT_COLORS = (
     0x3D9BE0, 0xE69F00, 0x1FA783, 0xD55E00, 0xCC79A7, 0x8C7AE6, 0xB59F00, 0x56B4E9, 0xE06C75, 0x7F8C9A,
 )  # fmt: skip
 PLOT_SUFFIXES = (".csv", ".png", ".svg")
-BAND_ALPHA = 0.3
 _STYLE: Any = {
     "svg.fonttype": "none", "svg.hashsalt": "scan4d", "axes.spines.top": False, "axes.grid": True,
     "grid.alpha": 0.3, "text.parse_math": False,
@@ -97,7 +96,10 @@ class CurvePlot:
         if self.frames is None:
             return None
         curves = (
-            DrawnCurve(line.label, line.unit, line.color, _rounded(line.values))
+            DrawnCurve(
+                line.label, line.unit, line.color, _rounded(line.values),
+                () if line.edges is None else _rounded(line.band),
+            )
             for line in self.drawn if not line.is_thin
         )  # fmt: skip
         return DrawnPlot(f"{self.x_label} [{self.x_unit}]", _rounded(self.x), tuple(curves))
@@ -160,7 +162,7 @@ class CurvePlot:
         for line in self.drawn:
             own, color = of_unit[line.unit], f"#{line.color:06x}"
             if line.edges is not None:
-                own.fill_between(self.x, *line.edges, color=color, alpha=BAND_ALPHA, linewidth=0)
+                own.fill_between(self.x, *line.edges, color=color, alpha=BAND_OPACITY, linewidth=0)
             style: dict[str, Any] = {"linewidth": 0.7, "alpha": 0.5} if line.is_thin else {"linewidth": 1.6}
             handles += own.plot(self.x, line.values, color=color, label=line.label, **style)
             own.plot(self.x[line.lone], line.values[line.lone], ".", color=color)

@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from viewer.analysis.landmarks import Landmark
+from viewer.analysis.measures import Measure
 from viewer.analysis.spot import Spot
 from viewer.analysis.track import Known, Track
 from viewer.app.desk import Desk
 from viewer.app.session import Session
-from viewer.app.tools.landmarks import Tool
+from viewer.app.tools.landmarks import Settings, Tool
+from viewer.app.tools.landmarks.corners import regions_of
 from viewer.app.tools.landmarks.shown import ShownLandmarks
-from viewer.app.tools.landmarks.words import gap_spans, place_words
+from viewer.app.tools.landmarks.words import corners_words, gap_spans, place_words
 from viewer.document.landmarks import Landmarks
 from viewer.scan.units import Scale
 
@@ -70,19 +72,69 @@ def test_places_are_told_as_well_as_they_are_known() -> None:
 def test_gaps_are_marked_in_runs() -> None:
     other = Landmark("other", keys=(spot(0),))
     tracks = {**TRACKS, "other": track(Known.PLACED, Known.TRACKED, Known.TRACKED, Known.GAP)}
-    spans = gap_spans((PLACED, other), tracks)
+    spans = gap_spans((PLACED, other), tracks, {})
     assert [(span.frames, span.words) for span in spans] == [
         (range(2, 3), "No data for placed"),
         (range(3, 4), "No data for placed, other"),
     ]
-    assert [span.frames for span in gap_spans((PLACED,), TRACKS)] == [range(2, 4)]
+    assert [span.frames for span in gap_spans((PLACED,), TRACKS, {})] == [range(2, 4)]
+
+
+def tool_on(session: Session) -> Tool:
+    playback = SimpleNamespace(pose=None)
+    followed = SimpleNamespace(tracks={})
+    box = SimpleNamespace(
+        session=session, playback=playback, clicking="landmarks", redraw=lambda: None, followed=followed
+    )
+    desk = Desk(box, "landmarks")  # type: ignore[arg-type]
+    desk.settings = Settings()
+    return Tool(desk)
+
+
+def test_corners_of_regions_are_listed_below_them_and_bear_no_names_of_their_own() -> None:
+    corners = tuple(Landmark(f"Region 1.{number}", keys=(spot(0),)) for number in range(1, 5))
+    names = tuple(one.name for one in corners)
+    area, lip = Measure("Region 1, area", "area", names), Measure("lip", "area", ("a1", "a2", "a3"))
+    others = Measure("mouth", "perimeter", ("chR", "ls", "chL")), Measure("way", "path", ("b1", "b2", "b3"))
+    assert regions_of((area, lip, *others)) == {
+        **dict.fromkeys(names, "Region 1"), **dict.fromkeys(("a1", "a2", "a3"), "lip")
+    }  # fmt: skip
+    session = Session("scan")
+    tool = tool_on(session)
+    all_ = (Landmark("sn", keys=(spot(0),)), replace(corners[0], missing=(0,)), *corners[1:], Landmark("chR"))
+    session.change("Begin", Landmarks(all_, measures=(area, *others)))
+    assert tool.rows() == [0, "Region 1", 5]
+    tool.open_regions.add("Region 1")
+    assert tool.rows() == [0, "Region 1", 1, 2, 3, 4, 5]
+    drawn = tool.drawn(0).landmarks
+    assert [(one.name, one.is_corner) for one in drawn] == [
+        ("sn", False), ("Region 1", True), ("", True), ("", True),
+    ]  # fmt: skip
+    assert corners_words(["placed"] * 3) == "3 corners: placed"
+    assert corners_words(["tracked", "no data: hidden", "tracked"]) == "3 corners: 2 tracked, 1 no data"
+    tracks = {name: track(Known.PLACED, Known.GAP, Known.GAP, Known.GAP) for name in names}
+    (span,) = gap_spans(corners, tracks, tool.regions)
+    assert span.words == "No data for Region 1"
+
+
+def test_a_correction_can_be_removed_where_there_is_one() -> None:
+    session = Session("scan")
+    tool = tool_on(session)
+    session.change(
+        "Begin", Landmarks((Landmark("a", keys=(spot(0),)), Landmark("b", keys=(spot(0), spot(2)))))
+    )
+    assert "Select" in tool.why_no_correction()
+    tool.selected = "a"
+    assert "only" in tool.why_no_correction()
+    tool.selected = "b"
+    assert tool.why_no_correction() == ""
+    session.index = 1
+    assert "frame 2" in tool.why_no_correction()
 
 
 def test_clicks_set_what_is_next() -> None:
     session = Session("scan")
-    playback = SimpleNamespace(pose=None)
-    box = SimpleNamespace(session=session, playback=playback, clicking="landmarks", redraw=lambda: None)
-    tool = Tool(Desk(box, "landmarks"))  # type: ignore[arg-type]
+    tool = tool_on(session)
     session.change("Begin", Landmarks(ALL, template="own"))
     target = tool.target
     assert target is not None

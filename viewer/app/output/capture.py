@@ -81,12 +81,13 @@ class Capture:
         session, viewport, request = self._session, self._viewport, self._viewport.request
         if not viewport.is_there or request is None:
             return None
-        return Entry.of(
+        entry = Entry.of(
             request, session.scan, session.hash, viewport.size, self._playback.unit,
             self._marks() if marks is None else marks, session.document.part(Measurements).all,
             session.document.shown_unit, session.document.part(Landmarks).notes,
             self._drawn(request.pose.index), self._choice(request),
         )  # fmt: skip
+        return replace(entry, labels=self._places().spots if entry.marks else ())
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels; what is not drawn of it yet is drawn
@@ -105,7 +106,7 @@ class Capture:
         legend = None
         if entry is not None:
             told = entry.legend(self._playback.timeline, request.pose)
-            legend = replace(told, range_note=self._range_note(), places=self._places().copy())
+            legend = replace(told, range_note=self._range_note())
         save = partial(self._begin_saving, entry, legend, self._session.hash_found)
         if viewport.is_refined:
             save(viewport.surface)

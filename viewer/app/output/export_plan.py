@@ -153,7 +153,8 @@ def recording(
     base = replace(shown, size=choices.size, marks=marks, look=look)
     if choices.what == TURNTABLE:
         angles = [360 * number / choices.pictures for number in range(choices.pictures)]
-        entries = [replace(base, camera=_turned(base.camera, angle, pivot)) for angle in angles]
+        first, *others = [replace(base, camera=_turned(base.camera, angle, pivot)) for angle in angles]
+        entries = [first, *(replace(other, labels=()) for other in others)]  # those are of the first view
     elif choices.what == FRAMES:
         entries = [
             replace(base, pose=i, time=float(times[i]), place=matrix_of(place(i))).with_drawn(drawn(i))

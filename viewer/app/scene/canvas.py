@@ -107,9 +107,14 @@ class Label:
         self._forms = placing.forms_of(texts)
 
     @property
+    def text(self) -> str:
+        """Its first line."""
+        return self._forms[0][0]
+
+    @property
     def key(self) -> str:
         """The key that tells the label from others: what stands before the colon, such as its number."""
-        return self._forms[0][0].partition(":")[0]
+        return self.text.partition(":")[0]
 
     @property
     def sizes(self) -> tuple[tuple[float, float], ...]:
@@ -229,11 +234,14 @@ class Canvas:
         mark: StateMark,
         alphas: NDArray[np.float64],
         reaches: NDArray[np.float64],
+        *,
+        are_corners: bool = False,
     ) -> None:
         """Draw a mark at many places on the screen, (N, 2), of opacity (N,), each in a ring of a radius (N,)
-        where that is wider than the mark."""
+        where that is wider than the mark. are_corners: whether they are corners of regions, and smaller."""
         self._marks.append(places)
-        radius, thick = mark_radius(mark.sides) * self.em, _RING * self.em
+        radius = mark_radius(mark.sides, is_corner=are_corners) * self.em
+        thick = _RING * self.em
         colors = {alpha: theme.packed(mark.color, alpha) for alpha in set(alphas.tolist())}
         outlines = {alpha: theme.packed(_OUTLINE, HALO_OPACITY * alpha) for alpha in colors}
         with self._layer() as draw_list:
@@ -246,10 +254,11 @@ class Canvas:
 
     def names(self, texts: Sequence[str], places: NDArray[np.float64], alphas: NDArray[np.float64]) -> None:
         """Texts at the right of places on the screen, (N, 2), of opacity (N,): the first ones, and of the
-        others those that cover no text before them."""
+        others those that cover no text before them and no mark."""
         height = imgui.get_text_line_height()
         corners = places + np.array([(MARK_RADIUS + NAME_GAP) * self.em, -height / 2])
-        free = placing.free_names(texts, corners, height, lambda text: imgui.calc_text_size(text).x)
+        marks = np.concatenate([np.empty((0, 2)), *self._marks])
+        free = placing.free_names(texts, corners, height, lambda text: imgui.calc_text_size(text).x, marks)
         with self._layer() as draw_list:
             for number in free:
                 (left, top), alpha = corners[number].tolist(), float(alphas[number])
@@ -299,15 +308,16 @@ class Canvas:
         marks = marks[:: len(marks) // _MOST_MARKS + 1]
         size = view.size.x, view.size.y
         ground = placing.LabelGround(size, self.em, self._viewport.covered, marks, taken, view.camera)
-        asked = [placing.Callout(one.key, one.sizes, one.line - corner) for one in self._labels]
+        labels = placing.said_once(self._labels, lambda one: one.text)
+        asked = [placing.Callout(one.key, one.sizes, one.line - corner) for one in labels]
         placed = places.place(asked, ground)
         with self._layer() as draw_list:
-            for label, place in zip(self._labels, placed, strict=True):
+            for label, place in zip(labels, placed, strict=True):
                 if place.leader is not None:
                     alpha = 0.5 * LEADER_OPACITY if label.faint else LEADER_OPACITY
                     ends = [ImVec2(*(np.array(end) + corner).tolist()) for end in place.leader]
                     self._stroke(ends, [(label.color, alpha)] * 2, LEADER_THICK)
-            for label, place in zip(self._labels, placed, strict=True):
+            for label, place in zip(labels, placed, strict=True):
                 left, top, right, bottom = place.box
                 label.draw(
                     Box(view.corner + ImVec2(left, top), view.corner + ImVec2(right, bottom)), place.form

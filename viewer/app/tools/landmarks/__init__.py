@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from ...desk import Click, Desk, FrameSpan
 from ...scene.canvas import Canvas, ViewPlace
 from ...ui import Ui
 from . import overlay, panel
+from .corners import regions_of
 from .exchange import Exchange
 from .following import Following
 from .notebook import Notebook
@@ -51,17 +52,19 @@ class Tool:
 
     selected: the name of the one that was placed or chosen last, "" for none. corrects: whether clicks set
     that one, though it is placed or skipped. dragged: where the one that is dragged would be, in the
-    coordinates that the scan is shown in; None while none is.
+    coordinates that the scan is shown in; None while none is. open_regions: those whose corners are listed.
     """
 
     def __init__(self, desk: Desk) -> None:
         self.desk = desk
         self.selected, self.corrects = "", False
+        self.open_regions: set[str] = set()
         self.dragged: Vector | None = None
         self.follower = Following(desk)
         self.notebook = Notebook(desk)
         self.exchange = Exchange(desk, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on
+        self._regions: tuple[tuple[object, ...], Mapping[str, str]] | None = None
         self._shown: tuple[tuple[object, ...], ShownLandmarks] | None = None
         self._seen: tuple[tuple[object, ...], NDArray[np.bool_]] | None = None
         self._proposal: tuple[tuple[object, ...], Proposal | None] | None = None
@@ -88,6 +91,14 @@ class Tool:
         if self._shown is None or not _same(self._shown[0], of):
             self._shown = of, ShownLandmarks.of(*of)
         return self._shown[1]
+
+    @property
+    def regions(self) -> Mapping[str, str]:
+        """The landmarks that are corners of regions, and the names of these."""
+        of = (self.made.measures,)
+        if self._regions is None or not _same(self._regions[0], of):
+            self._regions = of, regions_of(*of)
+        return self._regions[1]
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -267,6 +278,19 @@ class Tool:
 
     # --- the list ---------------------------------------------------------------------
 
+    def rows(self) -> list[int | str]:
+        """The rows of the list: landmarks by number, and regions by name, before their corners where these
+        are shown."""
+        rows: dict[int | str, None] = {}
+        for number, landmark in enumerate(self.made.all):
+            region = self.regions.get(landmark.name)
+            if region is None:
+                rows[number] = None
+            elif region not in rows:
+                corners = [n for n, one in enumerate(self.made.all) if self.regions.get(one.name) == region]
+                rows |= dict.fromkeys([region, *(corners if region in self.open_regions else ())])
+        return list(rows)
+
     def choose(self, name: str) -> None:
         """Select one in the list: clicks set it, and the view goes where it is known."""
         landmark = self.made.named(name)
@@ -338,10 +362,16 @@ class Tool:
         if landmark := self.made.named(self.selected):
             self.change_selected("Remove correction", landmark.without_key(self.frame))
 
-    def has_key(self) -> bool:
-        """Whether the selected one was set in this frame."""
+    def why_no_correction(self) -> str:
+        """Say why the selected one has no correction in this frame that could be removed; "" where it has."""
         landmark = self.made.named(self.selected)
-        return landmark is not None and landmark.key_at(self.frame) is not None
+        if landmark is None:
+            return "Select a landmark first"
+        if landmark.key_at(self.frame) is None:
+            return f"You set no place of {landmark.name} in {frame_in_words(self.frame)}"
+        if len(landmark.keys) == 1:
+            return f"{landmark.name} is placed in this frame only: Delete removes the landmark"
+        return ""
 
     # --- in the window ----------------------------------------------------------------
 
@@ -365,13 +395,13 @@ class Tool:
         is_now = frame == self.frame
         shown = self.shown if is_now else ShownLandmarks.of(self.made.all, self.desk.followed.tracks, frame)
         has_names: bool = self.desk.settings.names
-        return DrawnMarks(drawn_landmarks(shown, has_names))
+        return DrawnMarks(drawn_landmarks(shown, has_names, self.regions))
 
     def spans(self) -> list[FrameSpan]:
         """The gaps, for the timeline."""
         of = self.made.all, self.desk.followed.tracks
         if not _same(self._spans[0], of):
-            self._spans = of, gap_spans(*of)
+            self._spans = of, gap_spans(*of, self.regions)
         return self._spans[1]
 
     def on_file(self, path: Path) -> bool:
@@ -426,7 +456,7 @@ COMMANDS = {
                 ),
                 Command(
                     "landmark_key", "Remove correction in this frame", Tool.take_key_away, "Shift+Delete",
-                    can=Tool.has_key,
+                    can=lambda tool: not tool.why_no_correction(),
                 ),
             ),
             (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 
 from ....analysis.track import Known
 from ....geometry import vector
-from ....output.overlays import DIM_LANDMARK, STATE_MARKS
+from ....output.overlays import DIM_LANDMARK, MOST_NAMED, STATE_MARKS
 from ...scene.canvas import Canvas, Label, ViewPlace
+from .shown import names_over
 
 if TYPE_CHECKING:
     from . import Tool
@@ -28,18 +30,51 @@ def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlac
     drawn = np.flatnonzero(shown.is_there & inside)
     alphas = np.where(tool.seen, 1.0, DIM_LANDMARK)
     reaches = shown.sure * view.lengths_on_screen(tool.positions)
-    for known in (Known.PLACED, Known.TRACKED):
-        at = drawn[shown.known[drawn] == known]
+    regions = tool.regions
+    are_corners = np.array([one.name in regions for one in shown.landmarks], bool)
+    for known, is_corner in product((Known.PLACED, Known.TRACKED), (False, True)):
+        at = drawn[(shown.known[drawn] == known) & (are_corners[drawn] == is_corner)]
         rings = np.nan_to_num(reaches[at]) if known is Known.TRACKED else np.zeros(len(at))
-        canvas.marks(places[at], STATE_MARKS[known], alphas[at], rings)
+        canvas.marks(places[at], STATE_MARKS[known], alphas[at], rings, are_corners=is_corner)
     selected = shown.number(tool.selected)
     if selected is not None and selected in drawn:
         canvas.ring(ImVec2(*places[selected].tolist()), _CHOSEN, float(alphas[selected]))
     if tool.desk.settings.names and len(drawn):
-        order = drawn[np.argsort(drawn != selected, kind="stable")]  # the selected one's before all others
-        canvas.names([shown.landmarks[n].name for n in order.tolist()], places[order], alphas[order])
+        _draw_names(tool, drawn, places, alphas, canvas, view)
     if tool.is_active:
         _draw_under_way(tool, canvas, view)
+
+
+def _draw_names(
+    tool: Tool,
+    drawn: NDArray[np.intp],
+    places: NDArray[np.float64],
+    alphas: NDArray[np.float64],
+    canvas: Canvas,
+    view: ViewPlace,
+) -> None:
+    """Names beside the subject, of many landmarks beside their marks; that of a corner of a region while it
+    is selected or under the mouse."""
+    shown, names = tool.shown, names_over(tool.shown, tool.regions)
+    named = [number for number in drawn.tolist() if number in names]
+    hovered = tool.under(imgui.get_mouse_pos()) if view.is_hovered else ""
+    pointed = {shown.number(name) for name in (tool.selected, hovered) if name in tool.regions}
+    beside = [number for number in drawn.tolist() if number in pointed]
+    texts = [shown.landmarks[number].name for number in beside]
+    if len(named) <= MOST_NAMED:
+        canvas.labels([_label(tool, number, names[number], places, alphas) for number in named])
+    else:
+        selected = shown.number(tool.selected)
+        beside += sorted(named, key=lambda number: number != selected)  # the selected one's before all others
+        texts += [names[number] for number in beside[len(texts) :]]
+    canvas.names(texts, places[beside], alphas[beside])
+
+
+def _label(
+    tool: Tool, number: int, name: str, places: NDArray[np.float64], alphas: NDArray[np.float64]
+) -> Label:
+    color = STATE_MARKS[Known(int(tool.shown.known[number]))].color
+    return Label([name], places[[number]], color, faint=alphas[number] < 1)
 
 
 def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
 
 from ....analysis.landmarks import Landmark
 from ....analysis.track import Known
@@ -12,7 +13,7 @@ from ....files import printable
 from ....output.overlays import STATE_MARKS
 from ... import widgets
 from ...ui import Ui
-from .words import place_words
+from .words import corners_words, place_words
 
 if TYPE_CHECKING:
     from . import Tool
@@ -85,20 +86,45 @@ def _draw_template(tool: Tool) -> None:
 
 
 def _draw_list(tool: Tool) -> None:
-    """Declare a row of two lines for each: name and state, place and uncertainty; only those in sight are
-    gone through."""
-    shown, height = tool.shown, 2 * imgui.get_text_line_height_with_spacing()
-    size = ImVec2(0, min(len(shown.landmarks), _ROWS) * height + 2 * imgui.get_style().window_padding.y)
+    """Declare a row of two lines for each: name and state, place and uncertainty; the corners of a region are
+    below a row of it that opens. Only rows in sight are gone through."""
+    rows, height = tool.rows(), 2 * imgui.get_text_line_height_with_spacing()
+    size = ImVec2(0, min(len(rows), _ROWS) * height + 2 * imgui.get_style().window_padding.y)
     flags = imgui.ChildFlags_.borders | imgui.ChildFlags_.nav_flattened
     if imgui.begin_child("landmarks", size, flags):
         clipper = imgui.ListClipper()
-        clipper.begin(len(shown.landmarks), height)
+        clipper.begin(len(rows), height)
         while clipper.step():
-            for number in range(clipper.display_start, clipper.display_end):
-                imgui.push_id(number)
-                _draw_row(tool, number, height)
-                imgui.pop_id()
+            for row in rows[clipper.display_start : clipper.display_end]:
+                if isinstance(row, str):
+                    _draw_region(tool, row, height)
+                else:
+                    imgui.push_id(row)
+                    _draw_row(tool, row, height)
+                    imgui.pop_id()
     imgui.end_child()
+
+
+def _draw_region(tool: Tool, region: str, height: float) -> None:
+    """Declare the row of a region, which shows its corners or hides them."""
+    em, gap, shown = imgui.get_font_size(), imgui.get_style().item_spacing, tool.shown
+    numbers = [n for n, one in enumerate(shown.landmarks) if tool.regions.get(one.name) == region]
+    corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    is_open = region in tool.open_regions
+    if imgui.selectable(widgets.labelled("", f"region {region}"), False, size=ImVec2(width, height - gap.y))[
+        0
+    ]:
+        tool.open_regions ^= {region}
+    widgets.tooltip("Hide its corners" if is_open else "Show its corners")
+    draw_list, faint = imgui.get_window_draw_list(), imgui.get_color_u32(imgui.Col_.text_disabled)
+    icon = icons.ICON_FA_ANGLE_DOWN if is_open else icons.ICON_FA_ANGLE_RIGHT
+    draw_list.add_text(corner, imgui.get_color_u32(imgui.Col_.text), icon)
+    left, room = corner.x + 1.2 * em, width - 1.2 * em - gap.x
+    name = widgets.fitted(printable(region), room)
+    draw_list.add_text(ImVec2(left, corner.y), imgui.get_color_u32(imgui.Col_.text), name)
+    words = widgets.fitted(corners_words([shown.state(number) for number in numbers]), room)
+    below = corner.y + imgui.get_text_line_height_with_spacing()
+    draw_list.add_text(ImVec2(left, below), faint, words)
 
 
 def _draw_row(tool: Tool, number: int, height: float) -> None:
@@ -112,8 +138,8 @@ def _draw_row(tool: Tool, number: int, height: float) -> None:
         widgets.tooltip(landmark.about)
     draw_list, faint = imgui.get_window_draw_list(), imgui.get_color_u32(imgui.Col_.text_disabled)
     mark = STATE_MARKS[Known(int(shown.known[number]))] if landmark.keys else None
-    widgets.state_mark(corner + ImVec2(0.5 * em, 0.5 * imgui.get_text_line_height()), mark)
-    left, state = corner.x + 1.2 * em, shown.state(number)
+    left, state = corner.x + 1.2 * em * (2 if landmark.name in tool.regions else 1), shown.state(number)
+    widgets.state_mark(ImVec2(left - 0.7 * em, corner.y + 0.5 * imgui.get_text_line_height()), mark)
     room = corner.x + width - left - gap.x
     state = widgets.fitted(state, 0.6 * room)
     right = corner.x + width - imgui.calc_text_size(state).x
@@ -135,12 +161,13 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     entered, name = imgui.input_text("##name", landmark.name, imgui.InputTextFlags_.enter_returns_true.value)
     widgets.tooltip("Name of the landmark. Press Enter to change it")
     _draw_partner(tool, landmark)
-    imgui.begin_disabled(not tool.has_key())
-    row = ui.row("Remove correction in this frame", "Delete")
+    row, reason = ui.row("Remove correction in this frame", "Delete"), tool.why_no_correction()
+    imgui.begin_disabled(bool(reason))
     if row.button():
         tool.take_key_away()
-    ui.tooltip("Remove the place that you set in this frame; tracking finds it again", "landmark_key")
     imgui.end_disabled()
+    about = "Remove the place that you set in this frame; tracking finds it again"
+    ui.tooltip(reason or about, "landmark_key")
     if row.button():
         tool.delete()
     ui.tooltip("Delete the landmark and its measures. Undo restores them", "delete_landmark")

@@ -92,15 +92,31 @@ class ShownLandmarks:
         return {Known.PENDING: "not tracked yet", Known.TRACKED: "tracked", Known.PLACED: "placed"}[known]
 
 
-def drawn_landmarks(shown: ShownLandmarks, has_names: bool) -> tuple[DrawnLandmark, ...]:
-    """Give those that are there to pictures that are saved."""
+def names_over(shown: ShownLandmarks, regions: Mapping[str, str]) -> dict[int, str]:
+    """Find the names that stand over a picture, by number: that of a region at the first of its corners that
+    is there, and those of all other landmarks. regions: names of corners -> of their regions."""
+    names: dict[int, str] = {}
+    for number in np.flatnonzero(shown.is_there).tolist():
+        name = shown.landmarks[number].name
+        region = regions.get(name)
+        if region is None or region not in names.values():
+            names[number] = name if region is None else region
+    return names
+
+
+def drawn_landmarks(
+    shown: ShownLandmarks, has_names: bool, regions: Mapping[str, str]
+) -> tuple[DrawnLandmark, ...]:
+    """Give those that are there to pictures that are saved. regions: as of `names_over`."""
+    names = names_over(shown, regions) if has_names else {}
     return tuple(
         DrawnLandmark(
             vector(shown.positions[number]),
-            shown.landmarks[number].name if has_names else "",
+            names.get(number, ""),
             bool(shown.known[number] == Known.PLACED),
             float(np.nan_to_num(shown.sure[number])),
             float(shown.spacings[number]),
+            shown.landmarks[number].name in regions,
         )
         for number in np.flatnonzero(shown.is_there).tolist()
     )

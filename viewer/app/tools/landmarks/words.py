@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -29,8 +30,19 @@ def place_words(shown: ShownLandmarks, number: int, scale: Scale) -> str:
     return f"{place} ± {factor * sure:.2g} {scale.unit}" if sure > 0 else f"{place} {scale.unit}"
 
 
-def gap_spans(landmarks: Iterable[Landmark], tracks: Mapping[str, Track]) -> list[FrameSpan]:
-    """The runs of frames in which the same landmarks are gaps, for the timeline."""
+def corners_words(states: Sequence[str]) -> str:
+    """Say how many corners a region has, and how they stand, the commonest state first."""
+    told = [state if count == len(states) else f"{count} {state}" for state, count in Counter(
+        state.partition(":")[0] for state in states
+    ).most_common()]  # fmt: skip
+    return f"{len(states)} corners: {', '.join(told)}"
+
+
+def gap_spans(
+    landmarks: Iterable[Landmark], tracks: Mapping[str, Track], regions: Mapping[str, str]
+) -> list[FrameSpan]:
+    """The runs of frames in which the same landmarks are gaps, for the timeline. regions: names of corners ->
+    of their regions, which are named instead."""
     listed = [landmark.name for landmark in landmarks if landmark.name in tracks]
     if not listed:
         return []
@@ -41,7 +53,8 @@ def gap_spans(landmarks: Iterable[Landmark], tracks: Mapping[str, Track]) -> lis
     }
     spans: list[FrameSpan] = []
     last: Sequence[str] = ()
-    for frame, names in by_frame.items():
+    for frame, gone in by_frame.items():
+        names = list(dict.fromkeys(regions.get(name, name) for name in gone))
         if spans and spans[-1].frames.stop == frame and names == last:
             spans[-1] = FrameSpan(range(spans[-1].frames.start, frame + 1), _GAP_COLOR, spans[-1].words)
         else:

@@ -46,11 +46,9 @@ def _draw_one(
     seen = view.box.clipped(there[0], there[-1]) if there else None
     if seen is None:
         return None
-    lines = [f"{number}:  {distance_words(reading, measuring.desk.scale)}"]
-    if len(measuring.desk.timeline) > 1:
-        lines.append(reading.motion)
+    text = f"{number}:  {distance_words(reading, measuring.desk.scale)}"
     line = np.array([(place.x, place.y) for place in seen])
-    return Label(lines, line, LINE_COLOR, faint=alpha < 1)
+    return Label([text], line, LINE_COLOR, faint=alpha < 1)
 
 
 def _draw_end(end: Spot, place: ImVec2, alpha: float, canvas: Canvas) -> None:

@@ -12,7 +12,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ....analysis.measures.curves import correlations
-from ....output.plots import BAND_ALPHA, CurvePlot, PlotLine
+from ....output.overlays import BAND_OPACITY
+from ....output.plots import CurvePlot, PlotLine
 from ... import widgets
 from ...ui import Ui
 from .choices import AGAINST, MODE_WORDS, ORDER_WORDS, REPEATS, TIME
@@ -217,7 +218,7 @@ def _draw_line(tool: Tool, plot: CurvePlot, line: PlotLine, number: int) -> None
     em, color = imgui.get_font_size(), _color(line.color)
     is_pointed = tool.pointed is not None and line.label.startswith(tool.pointed)
     if line.edges is not None:
-        spec = implot.Spec(fill_color=color, fill_alpha=BAND_ALPHA)
+        spec = implot.Spec(fill_color=color, fill_alpha=BAND_OPACITY)
         implot.plot_shaded(f"##band {number}", plot.x, *line.edges, spec)
     thick = _THIN if line.is_thin else _POINTED if is_pointed else _LINE
     spec = implot.Spec(line_color=color, line_weight=thick * em)
