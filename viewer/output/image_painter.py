@@ -69,7 +69,7 @@ class ImagePainter:
 
         cover = Image.new("L", self.image.size)
         fill = ImageDraw.Draw(cover)
-        there = np.isfinite(edges).all(axis=1)
+        there = np.logical_and.reduce(np.isfinite(edges), axis=1)
         for at in np.flatnonzero(there[:-1] & there[1:]).tolist():
             (x, low, high), (next_x, next_low, next_high) = edges[at : at + 2].tolist()
             fill.polygon([(x, low), (next_x, next_low), (next_x, next_high), (x, high)], round(255 * opacity))
