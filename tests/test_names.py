@@ -19,9 +19,9 @@ BY_PROTOCOL = {"Params", "Tool", "Settings"}  # each backend, and each tool, dec
 
 # Functions that modules of a kind have under one name, or that do the work of one of that name.
 FUNCTIONS_BY_PROTOCOL = {
-    "add_arguments", "find", "run", "draw", "needs", "suits", "check", "frame_count", "read", "read_faces",
+    "add_arguments", "find", "run", "draw", "check", "frame_count", "read", "read_faces",
     "read_times", "read_unit", "write", "write_poses", "render", "digest", "read_measurement", "tables",
-    "lacks", "owns", "offers",
+    "lacks", "owns",
 }  # fmt: skip
 PAPERS = "bench/papers/"  # whose modules are made alike, each with the same few functions
 

@@ -128,7 +128,7 @@ class FrameView:
 
 
 class Derives(Enum):
-    """Where a backend's `derive` runs for a window, which does not wait for it."""
+    """Place where a window, which does not wait, runs a backend's `derive`."""
 
     NEVER = "never"  # the backend prepares nothing
     IN_PROCESS = "in a process"  # several poses at once
@@ -204,7 +204,7 @@ class Backend(ABC):
 
     @property
     def about(self) -> str:
-        """What it does, and from which paper: the docstring of its module."""
+        """The docstring of its module: what it does, and from which paper."""
         return sys.modules[type(self).__module__].__doc__ or ""
 
     @property
@@ -222,7 +222,7 @@ class Backend(ABC):
         return parse(self.params_class, values or {}, f"parameter of '{self.name}'")
 
     def limits_of(self, row: str) -> tuple[Limit, ...]:
-        """Its limits in a row of the stability suite."""
+        """The limits that it declares for a row of the stability suite."""
         found = self.limits.get(row, ())
         return (found,) if isinstance(found, Limit) else found
 
