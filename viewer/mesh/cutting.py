@@ -44,6 +44,10 @@ class Piece:
             np.concatenate([piece.sources for piece in pieces]),
         )
 
+    def of_faces(self, chosen: NDArray[np.bool_]) -> Piece:
+        """The piece of the chosen faces alone, (F,)."""
+        return Piece(self.vertices, self.faces[chosen], self.sources[chosen])
+
     @property
     def corners(self) -> NDArray[np.float64]:
         """The corners of the faces, (3, F, 3)."""
@@ -79,16 +83,10 @@ def _chords(
 ) -> tuple[dict[int, list[Chord]], dict[tuple[int, int], list[tuple[float, float]]]]:
     """Face -> the lines' pieces that cross it, as weights of its corners; and edge -> what of it lines run
     along, from and to shares of it."""
-    from .cutting_kernels import faces_under
-
     chords: dict[int, list[Chord]] = defaultdict(list)
     along: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
-    order = np.argsort(patch.faces.ravel(), kind="stable")
-    firsts = np.searchsorted(patch.faces.ravel()[order], np.arange(len(patch.vertices) + 1))
     for line in lines:
-        found, weights = np.empty(len(line) - 1, np.int64), np.empty((len(line) - 1, 2, 3))
-        faces_under(patch.vertices, patch.faces, firsts, order // 3, line, _SAME, found, weights)
-        for face, ends in zip(found.tolist(), weights, strict=True):
+        for face, ends in zip(*_under(patch, line), strict=True):
             if face < 0:
                 continue
             empty = np.flatnonzero((ends == 0).all(axis=0))
@@ -100,6 +98,29 @@ def _chords(
                 start, end = map(tuple, ends.tolist())
                 chords[face].append((start, end))
     return chords, along
+
+
+def _under(patch: Patch, line: Line) -> tuple[list[int], NDArray[np.float64]]:
+    """The face that each piece of a line crosses, -1: of no length, and the weights of its corners at both
+    ends, (P - 1, 2, 3)."""
+    from .cutting_kernels import faces_under
+
+    found, weights = np.empty(len(line) - 1, np.int64), np.empty((len(line) - 1, 2, 3))
+    faces_under(patch.vertices, patch.faces, *patch.around, line, _SAME, found, weights)
+    return found.tolist(), weights
+
+
+def length_over(patch: Patch, line: Line, first: int) -> float:
+    """How much of a line, (P, 3), as of `pieces_along`, runs over the faces from a number on, scan units;
+    what runs along an edge of another face does not."""
+    total = 0.0
+    for face, ends, a, b in zip(*_under(patch, line), line[:-1], line[1:], strict=True):
+        beside = [face]
+        if (ends == 0).all(axis=0).any():
+            beside = patch.faces_at(*patch.faces[face][(ends != 0).any(axis=0)].tolist()).tolist()
+        if min(beside) >= first:
+            total += math.dist(a, b)
+    return total
 
 
 def _side(chord: Chord, place: Weights) -> float:
@@ -229,17 +250,19 @@ def _which(
 def _piece(patch: Patch, names: Rows, polygons: list[tuple[int, Polygon]]) -> Piece:
     """Faces and polygons by number, these as fans."""
     count = len(patch.faces)
-    whole = names[names < count]
-    vertices, faces, sources = [patch.vertices], [patch.faces[whole]], [whole]
-    number = len(patch.vertices)
-    for name in names[names >= count].tolist():
-        face, polygon = polygons[name - count]
-        vertices.append(np.array(polygon) @ patch.vertices[patch.faces[face]])
-        fan = np.arange(1, len(polygon) - 1)
-        faces.append(number + np.stack([np.zeros_like(fan), fan, fan + 1], axis=1))
-        sources.append(np.full(len(fan), face))
-        number += len(polygon)
-    return Piece(np.concatenate(vertices), np.concatenate(faces), np.concatenate(sources))
+    whole, crossed = names[names < count], [polygons[name - count] for name in names[names >= count]]
+    sizes = np.array([len(polygon) for _, polygon in crossed], np.int64)
+    sources = np.array([face for face, _ in crossed], np.int64)
+    weights = np.array([corner for _, polygon in crossed for corner in polygon]).reshape(-1, 3)
+    added = (weights[..., None] * patch.vertices[patch.faces[np.repeat(sources, sizes)]]).sum(axis=1)
+    first = np.repeat(len(patch.vertices) + np.cumsum(sizes) - sizes, sizes - 2)
+    step = np.arange(len(first)) - np.repeat(np.cumsum(sizes - 2) - (sizes - 2), sizes - 2)
+    fans = np.stack([first, first + step + 1, first + step + 2], axis=1)
+    return Piece(
+        np.concatenate([patch.vertices, added]),
+        np.concatenate([patch.faces[whole], fans]),
+        np.concatenate([whole, np.repeat(sources, sizes - 2)]),
+    )
 
 
 def plane_section(patch: Patch, point: NDArray[np.float64], normal: NDArray[np.float64]) -> list[Line]:

@@ -7,7 +7,10 @@ to know about openings is borders.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
+from heapq import heappop, heappush
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,21 +18,26 @@ from numpy.typing import NDArray
 from .geodesic import Line
 from .manifold import Rows, joined
 from .patch import SMALL_HOLE, Patch
+from .smoothing import Points
 
 _OFF = 0.5  # spacings above the patch, where rays begin
+_RAYS = 12
+_OPEN = 8  # of these that reach the sky, from which on a vertex is open; by a wall at a right angle half do
 _SAME = 1e-6  # of the length of a line, within which its places are on the border
+
+
+Marks = Callable[[Points], NDArray[np.bool_]]  # takes places (N, 3), gives (N,)
 
 
 def without_pockets(patch: Patch, seeds: Sequence[int], spacing: float) -> Patch:
     """The patch without the pockets behind its openings.
 
     seeds: numbers of faces. spacing: of points, scan units. The front is what connects to the seeds over
-    faces that are open: the ray along the normal of most of their corners meets the patch nowhere. In a
-    pocket, and in a fold, it meets the other side. A pocket is a connected part of what is not the front, see
-    `_is_pocket`; holes of the patch do not interrupt it. A part with a seed is none.
+    faces of which most corners are open, see `_is_open`. A pocket is a connected part of what is not the
+    front, see `_is_pocket`; holes of the patch do not interrupt it. A part with a seed is none.
     """
-    whole = patch.closed(_inner_holes(patch))
-    is_open = _misses(whole, spacing)[whole.faces].sum(axis=1) > 1
+    whole = patch.closed(inner_holes(patch))
+    is_open = _is_open(whole, spacing)[whole.faces].sum(axis=1) > 1
     before, after = whole.pairs
     one, other = before // 3, after // 3
     both = is_open[one] & is_open[other]
@@ -48,30 +56,123 @@ def without_pockets(patch: Patch, seeds: Sequence[int], spacing: float) -> Patch
     return patch if stays.all() else patch.of_faces(np.flatnonzero(stays))
 
 
-def _inner_holes(patch: Patch) -> Rows:
-    """The holes of a patch by number, but for the longest of each connected part, around which it ends."""
+def inner_holes(patch: Patch, is_cut: Marks | None = None) -> Rows:
+    """The holes of a patch by number, but for the longest of each connected part, around which it ends.
+
+    is_cut: whether the patch was cut out of its surface at places; holes there are none.
+    """
     start, end = patch.border
     if not len(start):
         return patch.holes
     lengths = np.bincount(patch.holes, np.linalg.norm(patch.vertices[end] - patch.vertices[start], axis=1))
+    if is_cut is not None:
+        lengths[patch.holes[is_cut(patch.vertices[start])]] = np.inf
     part = np.zeros(len(lengths), np.int64)
     part[patch.holes] = patch.parts[start]
     order = np.lexsort((lengths, part))
-    return order[:-1][part[order[1:]] == part[order[:-1]]]
+    inner = order[:-1][part[order[1:]] == part[order[:-1]]]
+    return inner[np.isfinite(lengths[inner])]
 
 
-def _misses(patch: Patch, spacing: float) -> NDArray[np.bool_]:
-    """Whether the ray along the normal of each vertex meets the patch nowhere, (V,)."""
+def bridged(patch: Patch, holes: Rows) -> Patch:
+    """The patch with lids over some of its holes, by number; their faces stand behind those that there are.
+
+    The face on three vertices in a row with the least circumcircle comes first, again and again: so a lid
+    joins the sides of a slit straight across, and has no flat faces. A vertex in the middle closes what is
+    left where two vertices are joined already.
+    """
+    start, end = patch.border
+    chosen = np.isin(patch.holes, holes)
+    before = dict(zip(end[chosen].tolist(), start[chosen].tolist(), strict=True))
+    places = dict(zip(before, patch.vertices[list(before)].tolist(), strict=True))
+    taken = _edges_among(patch, np.array(list(before), np.int64))
+    vertices, faces = patch.vertices, [patch.faces]
+    while before:
+        loop = [next(iter(before))]
+        while before[loop[-1]] != loop[0]:
+            loop.append(before.pop(loop[-1]))
+        del before[loop[-1]]
+        lid, left = _zipped(loop, places, taken)
+        faces.append(np.array(lid, np.int64).reshape(-1, 3))
+        if left:
+            faces.append(np.array([(a, b, len(vertices)) for a, b in pairwise([*left, left[0]])]))
+            vertices = np.vstack([vertices, patch.vertices[left].mean(axis=0)])
+    added = np.full(len(vertices) - len(patch.vertices), -1)
+    return Patch(vertices, np.concatenate(faces), np.append(patch.sources, added))
+
+
+def _edges_among(patch: Patch, vertices: Rows) -> set[tuple[int, int]]:
+    """The edges of a patch whose ends are both among some vertices, the lower number first."""
+    is_among = np.zeros(len(patch.vertices), bool)
+    is_among[vertices] = True
+    ends = np.stack([patch.faces, np.roll(patch.faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    return set(map(tuple, np.sort(ends[is_among[ends].all(axis=1)], axis=1).tolist()))
+
+
+def _zipped(
+    loop: list[int], places: dict[int, list[float]], taken: set[tuple[int, int]]
+) -> tuple[list[tuple[int, int, int]], list[int]]:
+    """Faces over a loop of vertices, and the loop that is left where no two vertices may be joined; empty:
+    none. taken: edges that there are; those of the faces are added."""
+    before, after = dict(zip(loop[1:] + loop[:1], loop, strict=True)), dict(pairwise([*loop, loop[0]]))
+    ears: list[tuple[float, int, int, int]] = []
+    faces = []
+
+    def offer(vertex: int) -> None:
+        a, b = before[vertex], after[vertex]
+        heappush(ears, (_circumradius(places[a], places[vertex], places[b]), vertex, a, b))
+
+    for vertex in loop:
+        offer(vertex)
+    while ears and len(after) > 3:
+        _, vertex, a, b = heappop(ears)
+        edge = min(a, b), max(a, b)
+        if before.get(vertex) != a or after.get(vertex) != b or edge in taken:
+            continue
+        faces.append((a, vertex, b))
+        taken.add(edge)
+        del before[vertex], after[vertex]
+        before[b], after[a] = a, b
+        offer(a)
+        offer(b)
+    first = next(iter(after))
+    rest = [first]
+    while after[rest[-1]] != first:
+        rest.append(after[rest[-1]])
+    return (faces, rest) if len(rest) > 3 else ([*faces, (rest[0], rest[1], rest[2])], [])
+
+
+def _is_open(patch: Patch, spacing: float) -> NDArray[np.bool_]:
+    """Whether most of the light that a bright sky would cast on each vertex reaches it, (V,).
+
+    Enough rays in directions that carry equal light (Malley 1988) meet the patch nowhere. One ray along the
+    normal does not tell: through a wide mouth the teeth see straight out.
+    """
     import open3d
 
     lengths = np.linalg.norm(patch.vertex_normals, axis=1, keepdims=True)
-    normals = patch.vertex_normals / np.maximum(lengths, np.finfo(float).tiny)
-    middle = patch.vertices.mean(axis=0)
-    local = patch.vertices - middle
-    rays = np.concatenate([local + _OFF * spacing * normals, normals], axis=1, dtype=np.float32)
+    up = patch.vertex_normals / np.maximum(lengths, np.finfo(float).tiny)
+    right = np.cross(up, np.eye(3)[np.abs(up).argmin(axis=1)])
+    right /= np.maximum(np.linalg.norm(right, axis=1, keepdims=True), np.finfo(float).tiny)
+    ahead = np.cross(up, right)
+    local = patch.vertices - patch.vertices.mean(axis=0)
     scene, tensor = open3d.t.geometry.RaycastingScene(), open3d.core.Tensor.from_numpy
     scene.add_triangles(tensor(local.astype(np.float32)), tensor(patch.faces.astype(np.uint32)))
-    return ~scene.test_occlusions(tensor(rays)).numpy()
+    starts, reached = local + _OFF * spacing * up, np.zeros(len(local), np.int64)
+    for number in range(_RAYS):
+        away, turn = math.sqrt((number + 0.5) / _RAYS), number * math.pi * (3 - math.sqrt(5))
+        directions = away * (math.cos(turn) * right + math.sin(turn) * ahead) + math.sqrt(1 - away**2) * up
+        rays = np.concatenate([starts, directions], axis=1, dtype=np.float32)
+        reached += ~scene.test_occlusions(tensor(rays)).numpy()
+    is_open: NDArray[np.bool_] = reached >= _OPEN
+    return is_open
+
+
+def _circumradius(a: list[float], b: list[float], c: list[float]) -> float:
+    """The radius of the circle through three places; inf: they lie on a line."""
+    x, y, z = math.dist(b, c), math.dist(c, a), math.dist(a, b)
+    squared = (x + y + z) * (y + z - x) * (z + x - y) * (x + y - z)
+    return x * y * z / math.sqrt(squared) if squared > 0 else math.inf
 
 
 def _is_pocket(patch: Patch, faces: Rows, rim: Rows) -> bool:

@@ -129,6 +129,14 @@ class Patch:
         part = joined(start, end, len(self.vertices))[1][start]
         return np.unique(part, return_inverse=True)[1]
 
+    @cached_property
+    def around(self) -> tuple[Rows, Rows]:
+        """The faces at each vertex: those of v are others[firsts[v] : firsts[v + 1]], of firsts (V + 1,) and
+        others (3 F,)."""
+        corners = self.faces.ravel()
+        order = np.argsort(corners, kind="stable")
+        return np.searchsorted(corners[order], np.arange(len(self.vertices) + 1)), order // 3
+
     def of_faces(self, numbers: Rows) -> Patch:
         """The patch of some of the faces, by number."""
         part = Patch.of(self.vertices, self.faces[numbers])

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from shapes import found, pose_of, refused, sphere_points
 
+from viewer.analysis.measures.outlines import Prism
+from viewer.analysis.measures.prism import area_through
 from viewer.analysis.measures.surface import PoseSurface
+from viewer.mesh.patch import Patch
 
 R = 20.0
 AWAY = np.array([3e5, -2e5, 1e5])
@@ -82,6 +85,22 @@ def test_all_in_a_prism_is_on_both_sides(ball: PoseSurface) -> None:
     grown = found(ball, "area", corners + 0.5 * outward + AWAY, depth="through")
     widened = float((0.5 * outward * through.gradient).sum())
     assert grown.value - through.value == pytest.approx(widened, rel=0.1)
+
+
+def test_over_a_square_of_small_faces_there_is_its_area() -> None:
+    """Faces are a tenth of a unit wide, so that each length in the measure has to be in spacings."""
+    places = np.stack(np.meshgrid(np.arange(-30, 31), np.arange(-30, 31)), axis=-1).reshape(-1, 2) / 10
+    row, column = (each.ravel() for each in np.mgrid[:60, :60])
+    a = row * 61 + column
+    faces = np.concatenate([np.stack([a, a + 1, a + 61], axis=1), np.stack([a + 1, a + 62, a + 61], axis=1)])
+    surface = PoseSurface(pose_of(np.pad(places, ((0, 0), (0, 1)))), faces.astype(np.uint32))
+    square = np.array([[-1.02, -1.02, 0], [1.02, -1.02, 0], [1.02, 1.02, 0], [-1.02, 1.02, 0]])
+    area = found(surface, "area", square, depth="through")
+    assert area.value == pytest.approx(2.04**2, rel=4e-3)
+    assert area.gradient == pytest.approx(square, abs=0.12), "half the diagonal across, outwards"
+    patch = Patch.of(surface._points, faces)
+    areas = area_through(patch, Prism.over(square))
+    assert areas.sum() == pytest.approx(2.04**2, rel=4e-3), "however far the patch reaches"
 
 
 @pytest.mark.parametrize("kind", ["area", "perimeter", "volume", "path"])

@@ -9,7 +9,7 @@ import pytest
 from shapes import Frames, found, pose_of, refused, track_of
 
 from viewer.analysis.measures import Measure
-from viewer.analysis.measures.series import all_series, surface_of
+from viewer.analysis.measures.series import all_series, series_of, surface_of
 from viewer.analysis.measures.surface import PoseSurface
 from viewer.analysis.track import Known
 from viewer.scan.open import open_scan
@@ -84,9 +84,25 @@ def test_paths_around_a_hole_are_refused_and_those_beside_it_are_not(holed: Pose
     assert refused(holed, "path", np.array([[0.0, 10, 0], *across])).startswith("the path from 1 to 2 goes")
     beside = np.array([[-10.0, 8, 0], [10, 8, 0]])
     assert found(holed, "path", beside).value == pytest.approx(20, rel=2e-3)
-    corners = np.array([[-10.0, 0, 0], [10, 0, 0], [0, 12, 0]])
-    for kind in ("area", "perimeter", "volume"):
-        assert refused(holed, kind, corners) == reason
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_outline_crosses_a_hole_straight(holed: PoseSurface, order: int) -> None:
+    corners = np.array([[-10.0, 0, 0], [10, 0, 0], [0, 12, 0]])[::order]
+    area, outline = (found(holed, kind, corners) for kind in ("area", "perimeter"))
+    assert area.value == pytest.approx(120 - np.pi * 18, abs=2 * area.deviation + 4)
+    assert area.share == pytest.approx(1 - np.pi * 18 / 120, abs=0.04)
+    assert outline.value == pytest.approx(20 + 2 * np.hypot(10, 12), rel=5e-3)
+    assert outline.share == pytest.approx(1 - 12 / outline.value, abs=0.03)
+    assert "% of the area within its outline has surface" in refused(holed, "volume", corners)
+
+
+def test_the_end_of_a_patch_is_no_opening() -> None:
+    """What a cone has within an outline around it reaches far beyond the first patch, which ends there."""
+    cone = [(12 - z / 10, float(z)) for z in range(-20, 81)]
+    surface = turned([*cone, *((radius, 80.0) for radius in np.linspace(4, 0.2, 6)[1:])])
+    area = found(surface, "area", ring(12))
+    assert area.value == pytest.approx(np.pi * (12 + 4) * np.hypot(80, 8) + np.pi * 4**2, rel=0.02)
 
 
 def test_a_path_that_touches_a_hole_tells_how_much_longer_that_may_make_it(holed: PoseSurface) -> None:
@@ -187,24 +203,40 @@ LIPS = {  # frame -> where ten landmarks around the demo's lips are; in frame 0 
         (10.162, -76.618, 79.171), (0.217, -78.035, 79.767), (-11.461, -76.519, 78.447),
         (-23.579, -65.348, 79.165),
     ),
+    16: (
+        (-17.431, -60.478, 84.616), (-8.783, -53.37, 89.553), (0.213, -51.349, 88.542),
+        (11.489, -54.472, 88.554), (19.559, -62.981, 82.765), (25.957, -70.423, 73.979),
+        (10.176, -86.911, 73.887), (0.217, -88.749, 74.125), (-11.481, -86.558, 73.288),
+        (-23.17, -71.289, 77.262),
+    ),
+    24: (
+        (-17.508, -60.205, 84.651), (-8.811, -53.33, 89.551), (0.214, -51.348, 88.542),
+        (11.536, -54.383, 88.554), (19.635, -62.644, 82.826), (25.995, -69.976, 74.133),
+        (10.174, -86.091, 74.362), (0.217, -87.897, 74.633), (-11.478, -85.758, 73.752),
+        (-23.203, -70.808, 77.434),
+    ),
 }  # fmt: skip
 
 
 def test_lips_that_part_are_measured_along_the_skin() -> None:
-    """The demo has a mouth behind its lips. As these part the skin within their outline stays the same, to a
-    few percent, and no more than a circle as long as the outline holds."""
+    """The demo has a mouth with teeth behind its lips. As these part the skin within their outline stays the
+    same, to 5 %, and its wet rim comes out; teeth, and what else is behind, do not count. Where the mouth is
+    wide the outline crosses its corners."""
     values, shares = {}, {}
     with open_scan("demo") as timeline:
         for frame, corners in LIPS.items():
             surface = surface_of(timeline, timeline.visit(frame))
             area, outline = (found(surface, kind, np.array(corners)) for kind in ("area", "perimeter"))
             values[frame], shares[frame] = area.value, area.share
-            assert outline.value == pytest.approx(121.6, rel=0.06)
             assert area.value < outline.value**2 / (4 * np.pi)
+            assert outline.share > 0.95
+            if frame < 16:
+                assert outline.value == pytest.approx(121.6, rel=0.06)
     assert values[0] == pytest.approx(937, rel=0.02)
-    assert [values[8], values[12]] == pytest.approx([values[0]] * 2, rel=0.08)
+    assert [values[8], values[12]] == pytest.approx([values[0]] * 2, rel=0.05)
+    assert [values[16], values[24]] == pytest.approx([values[0]] * 2, rel=0.1)
     assert shares[0] == pytest.approx(1)
-    assert 0.6 < shares[12] < shares[8] < 0.93
+    assert shares[16] < shares[24] < shares[12] < shares[8] < 0.93
 
 
 def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
@@ -227,5 +259,12 @@ def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
     assert way.warning == "no value in 1 of 3 frames: the path from a to b goes around an opening"
     assert area.note(1) == f"surface fills {100 * area.shares[1]:.0f} % of the outline"
     assert area.note(2) == "c3 is a gap"
+    rim = Measure("rim", "perimeter", ("a", "b", "c3"))
+    with Frames([whole, holed]).timeline() as timeline:
+        pair = {name: track_of(track.positions[:2].tolist()) for name, track in tracks.items()}
+        across = series_of(rim, pair, timeline)
+    told = f"{100 * across.shares[1]:.0f} % of the line lies on the surface"
+    assert [across.note(frame) for frame in range(2)] == ["", told]
+    assert across.warning == f"openings in 1 of 2 frames: as little as {told}"
     assert "no value in 1 of 3 frames: c3 is a gap; openings in 1 of 3 frames" in area.warning
     assert way.in_frames([1, 2]).note(0) == way.note(1)

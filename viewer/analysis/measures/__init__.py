@@ -66,12 +66,17 @@ class Series:
         )
 
     def note(self, frame: int) -> str:
-        """A remark on the value in a frame: why there is none, or how much of a region has surface
-        where that is not all of it; "" for nothing."""
+        """A remark on the value in a frame: why there is none, or how much of a region has surface, or of a
+        line lies on it, where that is not all; "" for nothing."""
         if frame in self.reasons and np.isnan(self.values[frame]):
             return self.reasons[frame]
         share = self.shares[frame] if len(self.shares) else np.nan
-        return f"surface fills {100 * share:.0f} % of the outline" if share < WHOLE else ""
+        return self._filled(share) if share < WHOLE else ""
+
+    def _filled(self, share: float, least: str = "") -> str:
+        if self.quantity == "length":
+            return f"{least}{100 * share:.0f} % of the line lies on the surface"
+        return f"surface fills {least}{100 * share:.0f} % of the outline"
 
     @property
     def warning(self) -> str:
@@ -84,7 +89,6 @@ class Series:
             told.append(f"no value in {len(gaps)} of {count} frames: {reasons}")
         open_ = self.shares < WHOLE if len(self.shares) else np.zeros(count, bool)
         if open_.any():
-            least = 100 * float(self.shares[open_].min())
-            words = f"openings in {int(open_.sum())} of {count} frames"
-            told.append(f"{words}: surface fills as little as {least:.0f} % of the outline")
+            filled = self._filled(float(self.shares[open_].min()), "as little as ")
+            told.append(f"openings in {int(open_.sum())} of {count} frames: {filled}")
         return "; ".join(told)

@@ -43,9 +43,10 @@ class Region:
     share: float
 
 
-def region_within(patch: Patch, lines: Sequence[Line]) -> Region | Refused:
+def region_within(patch: Patch, lines: Sequence[Line], lids: int) -> Region | Refused:
     """The piece of a patch that lines go around, each (P, 3), together closed: of those on their sides, what
-    lies within them as seen across their plane. A reason where they go around none.
+    lies within them as seen across their plane, without the lids of openings. A reason where they go around
+    none. lids: the number of the first face that is a lid.
 
     By Stokes' theorem a surface has, seen against a normal, the area of its outline less that of its
     openings, however it bends. A piece that goes inwards and is larger than a hemisphere on its outline is a
@@ -70,6 +71,9 @@ def region_within(patch: Patch, lines: Sequence[Line]) -> Region | Refused:
     piece = Piece.joined(
         [piece for piece, share in zip(pieces, shares, strict=True) if share > 0.5 or share == most]
     )
+    piece = piece.of_faces(piece.sources < lids)
+    if not len(piece.faces):
+        return Refused(_NOTHING)
     length = sum(map(length_of, lines))
     if piece.areas.sum() > length**2 / (2 * np.pi) and below(piece, *plane_facing(piece, around)) < 0:
         return Refused(_BAG)

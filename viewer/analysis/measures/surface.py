@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from hashlib import blake2b
 
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...backends.hpr.noise import noise_of
+from ...mesh.cutting import length_over
 from ...mesh.geodesic import Geodesics, Line, length_of
-from ...mesh.openings import detour, without_pockets
+from ...mesh.openings import bridged, detour, inner_holes, without_pockets
 from ...mesh.patch import Patch
 from ...mesh.smoothing import Points, moved_to_quadrics, noise_over_faces, smoothing_radius
 from ...scan.estimate import cloud_normals
@@ -20,7 +21,7 @@ from ...scan.faces import Triangles
 from ...scan.pose import Pose
 from ...scan.range_view import merged_normals
 from .outlines import Prism
-from .regions import Refused, Region, region_within
+from .regions import NO_PLANE, Refused, Region, region_within
 
 Beyond = Callable[[Points], NDArray[np.float64]]  # how far places (N, 3) are outside, negative within, (N,)
 
@@ -43,7 +44,7 @@ class Found:
     value: scan units, or their square or cube. gradient: (K, 3), its change as each landmark moves.
     deviation: standard deviation by what sampling and noise leave open of the surface. lines: those that were
     measured, or that are around it, each (P, 3), to be drawn. share: of the area within the outline of a
-    region that has surface; NaN where the measure has none.
+    region that has surface, or of a line that lies on it; NaN where the measure has none.
     """
 
     value: float
@@ -55,18 +56,29 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class Circuit:
-    """Landmarks on a patch, and paths from each to the next. numbers: (K,) of the vertices. detour: how much
-    longer the paths are, as they go around openings, scan units."""
+    """Landmarks on a patch, and paths from each to the next. numbers: (K,) of the vertices. lids: the number
+    of the first face that is a lid over an opening."""
 
     patch: Patch
     numbers: tuple[int, ...]
     lines: tuple[Line, ...]
-    detour: float
+    lids: int
 
     @cached_property
     def region(self) -> Region | Refused:
         """The surface within the paths, which come back to the first landmark."""
-        return region_within(self.patch, self.lines)
+        return region_within(self.patch, self.lines, self.lids)
+
+    @cached_property
+    def detours(self) -> tuple[float, ...]:
+        """How much longer each path is as it goes around openings or along borders, scan units."""
+        return tuple(detour(self.patch, line) for line in self.lines)
+
+    @cached_property
+    def share(self) -> float:
+        """How much of the paths lies on the surface, the rest crosses openings."""
+        over = sum(length_over(self.patch, line, self.lids) for line in self.lines)
+        return 1 - over / max(sum(map(length_of, self.lines)), np.finfo(float).tiny)
 
 
 class PoseSurface:
@@ -167,7 +179,7 @@ class PoseSurface:
             return (both - reach) / 2
 
         for _ in range(_TRIES):
-            found = self._joined(self.patch(beyond), [start, end], is_closed=False)
+            found = self._joined(self.patch(beyond), [start, end], beyond, is_closed=False)
             length = length_of(found.lines[0]) if isinstance(found, Circuit) else np.inf
             if length <= reach or beyond(self._points).max() <= 0:
                 break
@@ -177,7 +189,7 @@ class PoseSurface:
     def loop(self, corners: NDArray[np.float64]) -> Circuit | Refused:
         """The paths from each of some places (K, 3) to the next and back to the first, on a patch that has
         what is within them; a reason where they are not on the surface, nothing joins them, or one goes
-        around an opening.
+        along a border. Paths cross openings straight.
 
         The patch and its lines are relative to the origin. Found once for each places.
         """
@@ -190,8 +202,10 @@ class PoseSurface:
         """Looked for within and around the outline of the corners, in a ball about their middle, and not far
         behind them; all of these grow until they hold the paths and what is within."""
         middle, prism = corners.mean(axis=0), Prism.over(corners)
+        if prism is None:
+            return Refused(NO_PLANE)
         size = float(np.linalg.norm(corners - middle, axis=1).max())
-        inwards, factor = np.zeros(3) if prism is None else self._inwards(corners, prism.normal), 1.0
+        inwards, factor = self._inwards(corners, prism.normal), 1.0
         deepest = float(((corners - middle) @ inwards).max())
 
         def beyond(points: Points) -> NDArray[np.float64]:
@@ -199,12 +213,11 @@ class PoseSurface:
             away = np.sqrt(np.einsum("pi,pi->p", offsets, offsets)) - _WIDER * factor * size
             away = np.maximum(away, offsets @ inwards - deepest - _DEEPER * factor * size)
             near = np.flatnonzero(away <= 2 * _RIM * self.spacing)
-            if prism is not None:
-                away[near] = np.maximum(away[near], prism.beyond(points[near]) - _AROUND * factor * size)
+            away[near] = np.maximum(away[near], prism.beyond(points[near]) - _AROUND * factor * size)
             return away - _RIM * self.spacing
 
         for _ in range(_TRIES):
-            found = self._joined(self.patch(beyond), list(corners), is_closed=True)
+            found = self._joined(self.patch(beyond), list(corners), beyond, is_closed=True)
             if isinstance(found, Circuit) and self._is_whole(found, beyond):
                 break
             if beyond(self._points).max() <= 0:
@@ -226,26 +239,33 @@ class PoseSurface:
         surface faces away from; zeros where nothing tells that."""
         if self._normals is None:
             return np.zeros(3)
+        reach = _ASTRAY * (self.spacing + self.noise)
+        low, high = corners.min(axis=0) - reach, corners.max(axis=0) + reach
+        near = np.flatnonzero(((self._points >= low) & (self._points <= high)).all(axis=1))
+        if not len(near):
+            return np.zeros(3)
         nearest = [
-            int(np.einsum("pi,pi->p", away, away).argmin()) for away in self._points - corners[:, None]
+            int(np.einsum("pi,pi->p", away, away).argmin()) for away in self._points[near] - corners[:, None]
         ]
-        faces_it = float(self._normals[nearest].sum(axis=0) @ normal)
+        faces_it = float(self._normals[near[nearest]].sum(axis=0) @ normal)
         return -normal if faces_it >= 0 else normal
 
     def _straight(self, found: Circuit | Refused) -> Circuit | Refused:
         """Paths, or the reason where one goes around an opening by more than the surface leaves open."""
         if isinstance(found, Refused):
             return found
-        detours = [detour(found.patch, line) for line in found.lines]
-        for number, (longer, line) in enumerate(zip(detours, found.lines, strict=True)):
+        for number, (longer, line) in enumerate(zip(found.detours, found.lines, strict=True)):
             if longer > max(_DETOUR * length_of(line), self.spacing):
                 return Refused("the path from {} to {} goes around an opening", (number, number + 1))
-        return replace(found, detour=sum(detours))
+        return found
 
     def _joined(
-        self, patch: Patch, corners: Sequence[NDArray[np.float64]], is_closed: bool
+        self, patch: Patch, corners: Sequence[NDArray[np.float64]], beyond: Beyond, is_closed: bool
     ) -> Circuit | Refused:
-        """The paths over a patch from each place to the next, without the pockets behind its openings."""
+        """The paths over a patch from each place to the next, without the pockets behind its openings.
+
+        is_closed: the paths come back to the first place, and cross openings straight.
+        """
         if not len(patch.faces):
             return Refused("there is no surface near {}", (0,))
         places = [patch.nearest(corner) for corner in corners]
@@ -256,6 +276,9 @@ class PoseSurface:
         for corner in corners:
             patch, number = patch.with_point(patch.nearest(corner))
             numbers.append(number)
+        lids = len(patch.faces)
+        if is_closed:
+            patch = bridged(patch, inner_holes(patch, lambda points: beyond(points) > 0))
         geodesics, lines = Geodesics(patch), []
         for number, (start, end) in enumerate(
             zip(numbers, numbers[1:] + (numbers[:1] if is_closed else []), strict=False)
@@ -264,7 +287,7 @@ class PoseSurface:
             if line is None:
                 return Refused("no surface joins {} and {}", (number, number + 1))
             lines.append(line)
-        return Circuit(patch, tuple(numbers), tuple(lines), 0.0)
+        return Circuit(patch, tuple(numbers), tuple(lines), lids)
 
 
 def _rows(faces: Triangles, ids: NDArray[np.uint32] | None) -> NDArray[np.int64]:

@@ -31,7 +31,7 @@ def _path(surface: PoseSurface, positions: NDArray[np.float64], options: Options
             return replace(found, landmarks=tuple(number + each for each in found.landmarks))
         line = found.lines[0] + surface.origin
         lines.append(line)
-        detour += found.detour
+        detour += sum(found.detours)
         gradient[number] -= direction(line)
         gradient[number + 1] -= direction(line[::-1])
     if closed:

@@ -31,8 +31,9 @@ def _perimeter(surface: PoseSurface, positions: NDArray[np.float64], options: Op
         return loop
     gradient = -np.array([direction(line) for line in loop.lines])
     gradient -= np.roll([direction(line[::-1]) for line in loop.lines], 1, axis=0)
-    deviation = off_smooth(surface, loop.lines) + loop.detour
-    return Found(sum(map(length_of, loop.lines)), gradient, deviation, _absolute(surface, loop))
+    deviation = off_smooth(surface, loop.lines) + sum(loop.detours)
+    value = sum(map(length_of, loop.lines))
+    return Found(value, gradient, deviation, _absolute(surface, loop), loop.share)
 
 
 def _area(surface: PoseSurface, positions: NDArray[np.float64], options: Options) -> Found | Refused:
@@ -128,7 +129,7 @@ def _absolute(surface: PoseSurface, loop: Circuit) -> tuple[Line, ...]:
 
 def _beside(loop: Circuit) -> float:
     """The area that may lie between paths that go around openings and straight ones, squared scan units."""
-    return loop.detour * max(map(length_of, loop.lines)) / 2
+    return sum(loop.detours) * max(map(length_of, loop.lines)) / 2
 
 
 def _widening(loop: Circuit) -> NDArray[np.float64]:
