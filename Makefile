@@ -9,7 +9,7 @@ COUNT := 40
 COMMIT = $(shell git rev-parse HEAD)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup run test test-all test-tenth test-drivers mutate fuzz bench lint wheel clean
+.PHONY: help setup run test test-all test-tenth test-drivers mutate fuzz bench lint docs wheel clean
 
 help: ## print this list
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 22
@@ -50,6 +50,9 @@ lint: setup ## ruff and mypy
 	$(PYTHON) -m ruff check .
 	$(PYTHON) -m ruff format --check .
 	$(PYTHON) -m mypy
+
+docs: setup ## the documentation as a site that needs no network: out/docs/index.html
+	NO_MKDOCS_2_WARNING=1 $(PYTHON) -m mkdocs build --strict --site-dir out/docs
 
 wheel: setup ## build the wheel into dist/
 	$(PYTHON) -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .

@@ -7,12 +7,16 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 
+from viewer.app import tools
+from viewer.app.commands import Command, Commands, Menu
 from viewer.backends import backends
 from viewer.bench import measuring
 from viewer.bench.papers.farooq_2013 import farooq, laplacian
@@ -33,6 +37,14 @@ _PATH = re.compile(r"(?<![\w/.-])(?:viewer|shaders|tests|docs|assets)/[\w/.-]*\w
 _GIVEN = re.compile(r"`([\w/]+\.\w+)`:?\n\n```")
 # These set up, open a window or run all tests; they have tests of their own.
 ELSEWHERE = ("make ", "git clone", "cd ", "pipx ", "scan4d view", "python ")
+
+
+def test_the_gallery_shows_every_renderer() -> None:
+    page = page_named("gallery.md").read_text(encoding="utf-8")
+    drawn = set(re.findall(r"^scan4d render .*--backend (\w+) .*-o gallery-\1\.png$", page, re.M))
+    assert drawn == set(backends())
+    for picture in re.findall(r"-o (gallery-\w+\.png)", page):
+        assert f"(pictures/{picture})" in page
 
 
 def table(parameters: Sequence[Parameter]) -> str:
@@ -75,6 +87,51 @@ def backends_page() -> str:
         table(describe(Look)),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def key_rows(menu: Menu[Any], path: str = "") -> Iterator[tuple[str, str]]:
+    """The commands of a menu that have keys: the path of titles to each, and its keys."""
+    for entry in (entry for group in menu.groups for entry in group):
+        if isinstance(entry, Menu):
+            yield from key_rows(entry, f"{path}{entry.title} > ")
+        elif isinstance(entry, Command) and entry.key:
+            yield path + entry.title, " or ".join(f"`{key}`" for key in entry.key.split())
+
+
+def keys_page() -> str:
+    """docs/reference/keys.md as the commands of the window and its tools declare it."""
+    commands, mouse = Commands(), []
+    for name in tools.tool_names():
+        module = import_module(f"viewer.app.tools.{name}")
+        for menu, entries in getattr(module, "COMMANDS", {}).items():
+            commands.add(menu, entries, name)
+        mouse += getattr(module, "MOUSE", ())
+    parts = [
+        "# Keys and mouse",
+        "`F1` shows and searches this list in the window. The menus have every command.\n"
+        "[Your own keys](../guide/looking.md#keyboard) replace the default keys.",
+        "This page is made from the declarations in the code:\n"
+        "`python -m pytest tests/test_docs.py --bless`.",
+        "## Mouse",
+        "\n".join(
+            [
+                "| mouse | action |",
+                "|---|---|",
+                *(f"| {how} | {does} |" for how, does in [*commands.mouse, *mouse]),
+            ]
+        ),
+    ]
+    for menu in commands.menus:
+        rows = [f"| {keys} | {title} |" for title, keys in key_rows(menu)]
+        parts += [f"## {menu.title}", "\n".join(["| keys | command |", "|---|---|", *rows])]
+    return "\n\n".join(parts) + "\n"
+
+
+def test_the_page_of_keys_is_up_to_date(bless: bool) -> None:
+    page = page_named("keys.md")
+    if bless:
+        page.write_text(keys_page(), encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == keys_page()
 
 
 def test_the_page_of_parameters_is_up_to_date(bless: bool) -> None:
