@@ -21,7 +21,8 @@ PAGE = DOCS / "gallery.md"
 
 def commands(text: str) -> list[list[str]]:
     """The words of each command of the page, after `scan4d`."""
-    return [shlex.split(line)[1:] for line in re.findall(r"^scan4d .*$", text, re.M)]
+    lines = re.findall(r"^scan4d .*$", text.replace("\\\n", " "), re.M)
+    return [shlex.split(line)[1:] for line in lines]
 
 
 def main() -> None:
