@@ -22,8 +22,10 @@ run: setup ## open the demo scan, or yours: make run SCAN=path (without a displa
 
 # Most shaders run a few times here: Mesa's software driver compiles them in less time without optimising, and
 # test-all has it optimise. Processes that tests start find modules compiled, whatever the environment says.
+# Each core has its tests already: further threads of matrix products would only wait for it.
 test: export GALLIVM_PERF := nopt
 test: export PYTHONDONTWRITEBYTECODE :=
+test: export OPENBLAS_NUM_THREADS := 1
 test: setup ## the tests, without the slow ones; a process for each core: make test WORKERS=0 has but one
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -m "not slow"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import os
 import re
@@ -46,6 +47,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if marker := item.get_closest_marker("backend"):
             assert marker.args[0] in backends(), f"{item.nodeid} is about no backend"
             item.user_properties.append(("backend", marker.args[0]))
+
+
+def pytest_collection_finish() -> None:
+    """Keep the collected tests, a million objects that stay to the end, out of garbage collections."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
-import subprocess
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -14,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import pytest
+from command_line import Run
 
 from viewer.app import tools
 from viewer.app.commands import Command, Commands, Menu
@@ -199,18 +197,18 @@ def commands(text: str) -> list[str]:
 
 
 @pytest.mark.parametrize("page", DOCS, ids=lambda page: page.name)
-def test_commands_in_the_docs_run(page: Path, tmp_path: Path) -> None:
+def test_commands_in_the_docs_run(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: Run
+) -> None:
+    monkeypatch.chdir(tmp_path)
     ran = 0
     for command in commands(page.read_text(encoding="utf-8")):
         if command.startswith(ELSEWHERE):
             continue
         name, *arguments = shlex.split(command)
         assert name == "scan4d", f"{page.name}: what is '{command}'?"
-        done = subprocess.run(
-            [sys.executable, "-m", "viewer.cli", *arguments],
-            cwd=tmp_path, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT)},
-        )  # fmt: skip
-        assert done.returncode == 0, f"{command}\n{done.stderr}"
+        done = run(*arguments)
+        assert done.code == 0, f"{command}\n{done.err}"
         ran += 1
     assert ran or page.name != "README.md"
 

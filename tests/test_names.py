@@ -34,6 +34,7 @@ RIDDLES = re.compile(
 Documented = ast.ClassDef | ast.FunctionDef
 
 
+@pytest.fixture(scope="module")
 def modules() -> list[tuple[str, ast.Module]]:
     """The path below the package and the syntax of each module."""
     files = sorted(PACKAGE.rglob("*.py"))
@@ -65,13 +66,13 @@ def shared_names(kind: type[Documented], among: list[tuple[str, ast.Module]]) ->
     return {name: found for name, found in places.items() if len(found) > 1}
 
 
-def test_no_two_public_classes_share_a_name() -> None:
-    shared = shared_names(ast.ClassDef, modules())
+def test_no_two_public_classes_share_a_name(modules: list[tuple[str, ast.Module]]) -> None:
+    shared = shared_names(ast.ClassDef, modules)
     assert shared.keys() <= BY_PROTOCOL, shared
 
 
-def test_no_two_public_functions_share_a_name() -> None:
-    others = [(path, syntax) for path, syntax in modules() if not path.startswith(PAPERS)]
+def test_no_two_public_functions_share_a_name(modules: list[tuple[str, ast.Module]]) -> None:
+    others = [(path, syntax) for path, syntax in modules if not path.startswith(PAPERS)]
     shared = shared_names(ast.FunctionDef, others)
     assert shared.keys() <= FUNCTIONS_BY_PROTOCOL, shared
 
@@ -90,8 +91,8 @@ def test_a_riddle_is_told_from_a_docstring(text: str, found: int) -> None:
     assert len(riddles(ast.parse(f'class A:\n    def f(self):\n        """{text}"""\n'))) == found
 
 
-def test_docstrings_name_their_subject() -> None:
-    found = {path: riddles(syntax) for path, syntax in modules()}
+def test_docstrings_name_their_subject(modules: list[tuple[str, ast.Module]]) -> None:
+    found = {path: riddles(syntax) for path, syntax in modules}
     assert not {path: told for path, told in found.items() if told}
 
 
@@ -114,7 +115,7 @@ def test_frames_that_are_told(text: str, found: int) -> None:
     assert len(frames_told(ast.parse(text))) == found
 
 
-def test_texts_count_frames_by_one_rule() -> None:
+def test_texts_count_frames_by_one_rule(modules: list[tuple[str, ast.Module]]) -> None:
     """A text that adds 1 by itself, or forgets to, is beside the others that a person reads."""
-    found = {path: told for path, syntax in modules() if (told := frames_told(syntax))}
+    found = {path: told for path, syntax in modules if (told := frames_told(syntax))}
     assert list(found) == ["scan/times.py"], found

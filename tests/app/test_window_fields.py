@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from scenes import rarely
 from virtual_screen import RunningApp, Screen, running_app
 
 from viewer.app import tools
@@ -19,6 +20,10 @@ XDO = {
     "[": "bracketleft", "]": "bracketright", ",": "comma", ".": "period", "-": "minus", "=": "equal",
     "/": "slash", ";": "semicolon", "'": "apostrophe", "\\": "backslash", "`": "grave", "Tab": "Tab",
 }  # fmt: skip
+# What Escape ends, in states.
+KINDS = (
+    "fields", "lists", "pages", "is_export_open", "is_browser_open", "clicking", "shown_notes", "works",
+)  # fmt: skip
 NOT_PRESSED = {"quit", "full_screen", "play", "turntable"}  # they end the window, or never come to rest
 
 
@@ -59,7 +64,9 @@ def put_away(app: RunningApp) -> None:
     """Close what is open."""
     for _ in range(6):
         app.screen.do("key", "Escape")
-        app.settle()
+        state = app.settle()
+        if not any(getattr(state, kind) for kind in KINDS):
+            break
 
 
 def holds(fields: dict[str, str], keys: str) -> list[str]:
@@ -67,7 +74,7 @@ def holds(fields: dict[str, str], keys: str) -> list[str]:
     return [label for label, text in fields.items() if text.lower() == keys.rpartition("+")[2].lower()]
 
 
-@pytest.mark.parametrize("keys", ["Q", "Shift+U", "Alt+M", "U"])
+@pytest.mark.parametrize("keys", ["Q", "Shift+U", *rarely("Alt+M"), "U"])
 def test_a_key_that_opens_a_field_is_not_typed_into_it(app: RunningApp, keys: str) -> None:
     fields = pressed(app, keys)
     assert fields

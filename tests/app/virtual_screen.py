@@ -259,9 +259,11 @@ class RunningApp:
         """Bring it back to how it was at its start: frame, renderer, camera, pace, theme; at rest."""
 
         def press_while(keys: str, differs: Callable[[State], bool]) -> None:
-            while differs(self.settle()):
+            while differs(self.state):
                 self.screen.do("key", keys)
+                self.settle()
 
+        self.settle()
         first = next(state for state in self.states if state.pictures)
         press_while("space", lambda state: state.is_playing)
         press_while("Escape", lambda state: state.clicking or state.is_export_open or state.shown_notes)

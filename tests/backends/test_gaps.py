@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import sphere
+from scenes import rarely, sphere
 
 from viewer.backends import backend
 from viewer.backends.surfels.gaps import GapRadii
@@ -165,7 +165,7 @@ def test_without_usable_normals_they_are_of_that_size(renderer: Renderer) -> Non
     assert known.max() < 5
 
 
-@pytest.mark.parametrize("copies", [1, 100])
+@pytest.mark.parametrize("copies", [1, *rarely(100)])
 def test_stored_radii_are_enlarged_where_they_leave_gaps(renderer: Renderer, draw: Draw, copies: int) -> None:
     """The scan's own that close the surface stay to the last bit, whatever the place of a few that do not."""
     cloud = torus(3000)

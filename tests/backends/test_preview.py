@@ -96,10 +96,10 @@ def shuffled(cloud: PointCloud) -> PointCloud:
 def test_the_same_preview_again_and_in_full_as_if_nothing_had_been(
     renderer: Renderer, preview: Preview, name: str
 ) -> None:
-    cloud = sphere(20_000)
+    cloud = sphere(8_000)
     first = preview(cloud, name, 0.3)
     full = preview(cloud, name, 1.0)
-    for share, count in product((0.5, 1.0), (30_000, 500)):
+    for share, count in product((0.5, 1.0), (12_000, 500)):
         preview(sphere(count), name, share)
     for before, share in ((first, 0.3), (full, 1.0)):
         again = preview(cloud, name, share)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hardware import displaced, stored
 from numpy.typing import NDArray
-from scenes import NOTHING, looking_down_z, sphere, sphere_hits
+from scenes import NOTHING, looking_down_z, rarely, sphere, sphere_hits
 from scipy import ndimage
 from scipy.ndimage import distance_transform_edt
 from test_instancing import assert_agree
@@ -77,8 +77,9 @@ def exact(surface: Surface, off: tuple[float, float] = (0.0, 0.0)) -> tuple[NDAr
     return depth, row
 
 
-@pytest.mark.parametrize("least", [0.0, 0.25])
-@pytest.mark.parametrize("depth", [3, pytest.param(5, marks=pytest.mark.slow), 21])
+@pytest.mark.parametrize(
+    ("depth", "least"), [(3, 0.0), (21, 0.25), *rarely((3, 0.25), (5, 0.0), (5, 0.25), (21, 0.0))]
+)
 @every_camera
 def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, least: float) -> None:
     fixed = {"shape": "cubes", "max_depth": depth, "least": least, "pixel_threshold": 0.25}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import DRAWS_POINTS, NOTHING, sphere
+from scenes import DRAWS_POINTS, NOTHING, rarely, sphere
 
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -130,7 +130,7 @@ def test_impossible_sizes_are_explained(renderer: Renderer, size: tuple[int, int
         Surface(renderer.gpu, size)
 
 
-@pytest.mark.parametrize("name", DRAWS_POINTS)
+@pytest.mark.parametrize("name", ["surfels", *rarely(*(name for name in DRAWS_POINTS if name != "surfels"))])
 def test_passes_add_up_to_the_frame(renderer: Renderer, name: str) -> None:
     cloud = sphere(200_000)
     surface = Surface(renderer.gpu, (960, 640))

@@ -41,11 +41,27 @@ WAYS = [
     pytest.param(one, way, marks=marks_of(one, way), id=f"{one}-{next(iter(way.items()))}")
     for one in map(find_backend, DRAWS_POINTS) for way in ways_of(one)
 ]  # fmt: skip
-# Slow where geometry shaders make the quads that another feed brings; tests of instancing compare the two.
+# Rows between two others that go further each way, or of which a farther one tells the same.
+BETWEEN = {
+    *(f"translated by 10^{power}" for power in (3, 4, 5, 7, 8)),
+    *(f"scaled by 10^{power}" for power in (-4, -2, 4)),
+    *(f"a sphere of 10^{n} times the size, {place}" for n in (4, 6) for place in ("inside", "around")),
+    "rotated by a quarter turn", "fitted, scaled by 10^-6", "float32 input", "telephoto x10^3",
+    "zoomed in on 10^-3 of the scan", "zoomed in on 10^-3 of a splat", "zoomed out x10^6",
+    "normals within 10^-4 of y", "points x1000, all over again",
+}  # fmt: skip
+LONG = {("8192x1 pixels", "hpr"), ("points of a body x1000", "surfels instancing=tiles")}
+
+
+def is_slow(row: Row, name: str) -> bool:
+    """Also where geometry shaders make the quads of another feed: tests of instancing compare the two."""
+    return name.endswith("=gs") or row.name in BETWEEN or (row.name, name) in LONG
+
+
 PICTURES = [
     pytest.param(row, name, marks=[pytest.mark.backend(of_variant(name)[0]), *slow], id=f"{row.name}-{name}")
-    for name in variants() for slow in ([pytest.mark.slow] if name.endswith("=gs") else [],)
-    for row in ROWS if row.is_for(backends()[of_variant(name)[0]])
+    for name in variants() for row in ROWS if row.is_for(backends()[of_variant(name)[0]])
+    for slow in ([pytest.mark.slow] if is_slow(row, name) else [],)
 ]  # fmt: skip
 
 
@@ -176,6 +192,7 @@ def test_hardware_may_round_otherwise_but_not_where_the_same_numbers_reach_it() 
 
 def test_rows_have_names_of_their_own() -> None:
     assert len({row.name for row in ROWS}) == len(ROWS)
+    assert {row.name for row in ROWS} >= BETWEEN | {name for name, _ in LONG}
 
 
 def test_limits_of_backends_name_rows() -> None:

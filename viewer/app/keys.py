@@ -34,6 +34,7 @@ _KEYS = {
 }
 _SHIFT = int(imgui.Key.mod_shift)
 _MODIFIER_BITS = sum(int(bit) for bit in _MODIFIERS.values())
+_REPEATED = int(imgui.InputFlags_.route_global | imgui.InputFlags_.repeat)  # of shortcuts
 _ARROWS = {"Right": (1, 0), "Left": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 # What leads the keyboard through widgets, and works them.
 _WIDGETS_OWN = {
@@ -87,7 +88,8 @@ class Keys:
 
     def has(self, keys: str) -> bool:
         """Whether a command has these keys."""
-        return any(pressed == chord(keys) for _, pressed in self._chords)
+        wanted = chord(keys)
+        return any(pressed == wanted for _, pressed in self._chords)
 
     def hint(self, name: str) -> str:
         """A command's title, and its keys where it has some."""
@@ -129,20 +131,20 @@ class Keys:
         for command, pressed in self._chords:
             if pressed in of_tool or (is_in_widgets and pressed & ~_SHIFT in _WIDGETS_OWN):
                 continue
-            flags = imgui.InputFlags_.route_global | (imgui.InputFlags_.repeat if command.repeats else 0)
+            if not imgui.shortcut(pressed, _REPEATED if command.repeats else imgui.InputFlags_.route_global):
+                continue
             with app.failures.told(command.title):
-                if imgui.shortcut(pressed, flags) and command.can(app):
+                if command.can(app):
                     self._used = imgui.Key(pressed & ~_MODIFIER_BITS)
                     command.act(app)
 
 
 def _arrows_of_tool(app: App) -> set[int]:
     """The arrow keys that were pressed since the last frame and that a tool has taken, as chords."""
-    flags = imgui.InputFlags_.route_global | imgui.InputFlags_.repeat
     return {
         pressed
         for name, way in _ARROWS.items()
-        if imgui.shortcut(pressed := int(_KEYS[name]), flags) and app.tools.arrow(*way)
+        if imgui.shortcut(pressed := int(_KEYS[name]), _REPEATED) and app.tools.arrow(*way)
     }
 
 

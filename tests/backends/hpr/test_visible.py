@@ -191,7 +191,7 @@ class DrawnMarks:
 
 
 @pytest.mark.parametrize("eye", [*rarely((0.0, 0, 4)), (0.2, 0.1, 0.3)])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("mode", [MODES[0], *rarely(HULL)])
 def test_nothing_is_found_again_while_pose_and_eye_stand_still(
     renderer: Renderer, mode: str, eye: tuple[float, float, float]
 ) -> None:
