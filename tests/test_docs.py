@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -58,7 +59,7 @@ def table(parameters: Sequence[Parameter]) -> str:
 
 def values_table(values: Mapping[str, ValueKind]) -> str:
     """A Markdown table of the numbers that a backend finds."""
-    rows = ["| number | what it is |", "|---|---|"]
+    rows = ["| number | meaning |", "|---|---|"]
     return "\n".join([*rows, *(f"| `{name}` | {kind.help} |" for name, kind in values.items())])
 
 
@@ -68,22 +69,40 @@ def page_named(name: str) -> Path:
     return page
 
 
+def wrapped(text: str) -> str:
+    """A text as one paragraph, in lines of at most 100 characters."""
+    return textwrap.fill(" ".join(text.split()), 100, break_long_words=False, break_on_hyphens=False)
+
+
+def tables_by_reader(parameters: Sequence[Parameter]) -> list[str]:
+    """Parameters for every user, then those for research."""
+    basic, research = ([p for p in parameters if p.basic is wanted] for wanted in (True, False))
+    return [*([table(basic)] if basic else []), *(["For research:", table(research)] if research else [])]
+
+
 def backends_page() -> str:
     """docs/reference/parameters.md as the declarations have it."""
     parts = [
-        "# Backends and looks",
-        "This page is made from the declarations in the code: `python -m pytest tests/test_docs.py --bless`.",
+        "# Parameters",
+        wrapped(
+            "This page lists the parameters of all renderers and of the look. The panel of the window shows "
+            "them, and the command line sets them with `--set name=value` and `--look name=value`. "
+            "Parameters for every user come first. The other ones are for research."
+        ),
+        wrapped(
+            "*Affects* says what a change does. `draw` changes the picture, `derive` also prepares each pose "
+            "again, and `speed` changes the time alone."
+        ),
+        wrapped(
+            "The declarations in the code make this page: `python -m pytest tests/test_docs.py --bless`."
+        ),
     ]
     for backend in backends().values():
-        about = " ".join(backend.about.split())
-        parts += [f"## {backend.title} (`--backend {backend.name}`)", about, table(backend.parameters)]
+        parts += [f"## {backend.title} (`--backend {backend.name}`)", wrapped(backend.about)]
+        parts += tables_by_reader(backend.parameters)
         if backend.values:
-            parts += ["Numbers that it finds, for `--look color_by=`:", values_table(backend.values)]
-    parts += [
-        "## Look (`--look key=value`)",
-        " ".join((Look.__doc__ or "").split()),
-        table(describe(Look)),
-    ]
+            parts += ["Numbers that it computes, for `--look color_by=`:", values_table(backend.values)]
+    parts += ["## Look (`--look key=value`)", wrapped(Look.__doc__ or ""), *tables_by_reader(describe(Look))]
     return "\n\n".join(parts) + "\n"
 
 

@@ -4,8 +4,8 @@ Machado e Silva 2014 approximates the operator of Katz 2007: flip the points abo
 point is visible if its flip lies on the convex hull. Directions are divided into sectors, and each sector
 keeps the point whose flip lies farthest along it (sections 3 to 5). The radius, the number of sectors and the
 number of steps follow section 6. Scan4D differs in two ways. It divides angles evenly, so that sectors have
-about the same size up to 45 degrees off the middle, and uses six such grids, like the faces of a cube, around
-an eye near the scan. It also compares points that lost their sector with the candidates around them, which
+about the same size up to 45 degrees off the middle. Around an eye near the scan it uses six such grids, like
+the faces of a cube. It also compares points that lost their sector with the candidates around them, which
 keeps points that share a sector and needs fewer sectors.
 """
 
@@ -103,7 +103,7 @@ class Params:
     )
     quality: float = param(
         _QUALITY,
-        "Number of sectors, relative to the number of which half would hold a point",
+        "Number of sectors, relative to the number at which half of them would hold a point",
         title="Sector density",
         low=0.05,
         high=64,

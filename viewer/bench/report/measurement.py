@@ -15,6 +15,7 @@ from __future__ import annotations
 import json
 import math
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -111,13 +112,21 @@ def machines(measurements: Sequence[Measurement], backend: str, paper: Mapping[s
 
     paper: its `year` and `gpu`, and of `cpu`, `system` and `timing` what it tells.
     """
-    told = (paper[part] for part in ("gpu", "cpu", "system", "timing") if part in paper)
-    return "\n".join([f"* **{paper['year']}**: {'; '.join(told)}", machines_of_today(measurements, backend)])
+    known = (paper[part] for part in ("gpu", "cpu", "system", "timing") if part in paper)
+    theirs = _item(f"**{paper['year']}**: {'; '.join(known)}")
+    return f"{theirs}\n{machines_of_today(measurements, backend)}"
 
 
 def machines_of_today(measurements: Sequence[Measurement], backend: str = "") -> str:
-    """A Markdown list of where ours were measured. backend: whose parameters are told; empty: of several."""
-    return "\n".join(f"* {_machine(each, backend)}" for each in measurements)
+    """A Markdown list of our machines. backend: gives its parameters, unless empty."""
+    return "\n".join(_item(_machine(each, backend)) for each in measurements)
+
+
+def _item(text: str) -> str:
+    """An item of a Markdown list in lines of at most 100 characters."""
+    return textwrap.fill(
+        text, 100, initial_indent="* ", subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+    )
 
 
 def _machine(measurement: Measurement, backend: str) -> str:
@@ -125,7 +134,7 @@ def _machine(measurement: Measurement, backend: str) -> str:
     views = sorted(
         {len(row["gpu_ms"]) for row in measurement["rows"]}
     )  # fewer of a scan where it was stopped
-    params = (f"{name} {str(value).lower()}" for name, value in measurement["params"].items())
+    params = (f"{name}={str(value).lower()}" for name, value in measurement["params"].items())
     parts = [
         f"**{measurement['device']}**: {measurement['driver']}, {measurement['processors']} processors",
         _TIMERS[measurement["timer"]],
@@ -133,7 +142,7 @@ def _machine(measurement: Measurement, backend: str) -> str:
         f"Scan4D {measurement['version']}, {measurement['date']}",
     ]
     if backend:
-        parts[-1] += f", `{backend}` with {', '.join(params)}"
+        parts[-1] += f", `{backend}` with `{' '.join(params)}`"
     return "; ".join(parts) + (f". {measurement['note']}" if measurement["note"] else "")
 
 
