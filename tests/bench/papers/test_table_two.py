@@ -76,7 +76,7 @@ def test_timer_queries_need_no_line_of_the_processors() -> None:
 
 def test_a_run_that_was_stopped_says_how_many_views_it_has() -> None:
     stopped = [a_row("gs", [10.0], [40.0], n=87_003, scene="owlii")]
-    assert "1 or 2 views a scan" in page([digest([*ROWS, *stopped])])
+    assert "1 or 2 views a scan" in " ".join(page([digest([*ROWS, *stopped])]).split())
 
 
 def test_a_driver_without_geometry_shaders_has_times_alone() -> None:
@@ -89,7 +89,7 @@ def test_machines_stand_under_each_other() -> None:
     other = digest([{**row, "device": "another card"} for row in ROWS])
     text = page([digest(ROWS), {**other, "note": "While other programs ran."}])
     assert len(cells(text, "a card")) == len(cells(text, "another card")) == 2
-    assert text.count("While other programs ran.") == 1
+    assert " ".join(text.split()).count("While other programs ran.") == 1
 
 
 def test_a_measurement_survives_its_file(tmp_path: Path) -> None:
