@@ -96,7 +96,7 @@ def test_each_default_that_is_beaten_has_a_reason_to_stay() -> None:
     files = sorted((Path(__file__).parents[3] / "docs" / "data").glob("defaults*.json"))
     beaten = [row for file in files for row in read_measurement(file)["rows"] if beats(row)]
     assert files
-    assert [row for row in beaten if row["parameter"] not in backend(row["backend"]).kept] == []
+    assert [row for row in beaten if row["parameter"] not in backend(row["backend"]).default_reasons] == []
 
 
 def test_tables_are_put_between_their_marks() -> None:
