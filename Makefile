@@ -40,7 +40,7 @@ test-drivers: setup ## backends and numerics on a second driver (Zink), shaders 
 	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p poisoned tests/gpu tests/backends tests/numerics -m "not slow"
 
 mutate: setup ## small mistakes in the code by chance: do the quick tests find them? make mutate COUNT=40 SEED=7
-	$(PYTHON) tools/mutate.py --count $(COUNT) --seed $(SEED)
+	$(PYTHON) tools/mutate.py $(COUNT) $(SEED)
 
 fuzz: setup ## damaged files by the thousand: make fuzz MINUTES=60 SEED=7
 	$(PYTHON) tests/fuzz/campaign.py --minutes $(MINUTES) --seed $(SEED)

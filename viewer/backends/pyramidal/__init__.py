@@ -239,8 +239,6 @@ class Pyramidal(Backend):
     fills = True
     limits = {
         "eye inside the cloud": Limit(0.01, _BY_CELLS),
-        "zoomed in on 10^-3 of the scan": Limit(0.025, _BY_CELLS),
-        "zoomed in on 10^-6 of the scan": Limit(0.025, _BY_CELLS),
         "coplanar points": Limit(0.008, _BY_CELLS),
         "collinear points": Limit(0.035, _BY_CELLS),
         "collinear points end on, perspective": Limit(0.08, NO_SPACING),
