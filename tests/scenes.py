@@ -59,6 +59,11 @@ def rarely(*values: object) -> list[object]:
     return [pytest.param(value, marks=pytest.mark.slow) for value in values]
 
 
+def rarely_together(*rows: tuple[object, ...]) -> list[object]:
+    """Values of several parameters at once, a row with one of each, that repeat what others show."""
+    return [pytest.param(*row, marks=pytest.mark.slow) for row in rows]
+
+
 every_backend = _for_each(variants())
 # Those that show the points themselves, where they lie.
 every_backend_of_points = _for_each(

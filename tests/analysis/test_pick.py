@@ -8,7 +8,7 @@ from dataclasses import replace
 import filling
 import numpy as np
 import pytest
-from scenes import looking_down_z, plane, sphere, sphere_hits
+from scenes import looking_down_z, plane, rarely, sphere, sphere_hits
 
 from viewer.analysis.pick import are_seen, before_gap, is_seen, pick
 from viewer.camera import Camera
@@ -69,7 +69,15 @@ RENDERERS = {
 }
 
 
-@pytest.mark.parametrize("which", RENDERERS)
+@pytest.mark.parametrize(
+    "which",
+    [
+        "points that touch",
+        "surfels",
+        "voxels",
+        *rarely("points of a pixel", "points of three", "auto splats"),
+    ],
+)
 def test_picks_are_on_the_surface_though_the_nearest_wins_a_pixel(draw: Draw, which: str) -> None:
     """Squares of three pixels write depths that are 0.07 spacings before it in the median, those that touch
     0.2."""

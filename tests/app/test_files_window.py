@@ -151,6 +151,7 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
         close(app)
 
 
+@pytest.mark.slow
 def test_a_folder_of_range_images_plays_upright(screen: Screen, tmp_path: Path, study: Path) -> None:
     scene = tmp_path / "scene"
     for number in range(3):  # their world is an image's: y goes down

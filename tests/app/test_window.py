@@ -400,6 +400,7 @@ def is_red(pixels: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return (red > 180) & (green < 110) & (blue < 110)
 
 
+@pytest.mark.slow
 def test_closing_saves_what_is_being_recorded(screen: Screen, tmp_path: Path, scan: Path) -> None:
     with running_app(screen, tmp_path, scan / "0.ply") as app:
         screen.do("key", "r")
@@ -410,6 +411,7 @@ def test_closing_saves_what_is_being_recorded(screen: Screen, tmp_path: Path, sc
     assert [entry.pose for entry in Recording.load(path).entries] == [0]
 
 
+@pytest.mark.slow
 def test_escape_does_not_quit_and_ctrl_q_does(screen: Screen, tmp_path: Path, scan: Path) -> None:
     with running_app(screen, tmp_path, scan / "0.ply") as app:
         screen.do("key", "Escape")

@@ -50,6 +50,7 @@ def below_cube(app: RunningApp) -> tuple[int, int]:
     return round(left + x), round(top + 2.02 * y + 0.7 * EM)
 
 
+@pytest.mark.slow
 def test_each_scan_stands_upright_by_itself_and_keeps_what_its_user_said(
     app: RunningApp, tmp_path: Path, scans: Path
 ) -> None:

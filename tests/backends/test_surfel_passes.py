@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from hardware import at_borders
-from scenes import NOTHING, looking_down_z, plane, sphere
+from scenes import NOTHING, looking_down_z, plane, rarely, sphere
 from test_instancing import assert_blends_alike, assert_covers_the_same
 
 from viewer.analysis.pick import pick
@@ -73,7 +73,7 @@ def test_a_sphere_of_one_colour_is_one_colour(
 
 
 @every_feed
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
 def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None:
     """Zero holes; depth within 5 % of a pixel and the discs' sagitta; shading within 40 dB."""
     cloud, look = sphere(20_000), Look(light="head", color_by="plain")
@@ -439,7 +439,7 @@ def test_a_scan_without_colours_keeps_the_looks_colour(draw: Draw) -> None:
 
 
 @every_feed
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
 def test_nothing_is_shown_before_the_near_plane(draw: Draw, instancing: str, projection: str) -> None:
     """The plane cuts a sphere's front, and splats with it: rounding took some pixels before it."""
     cloud, before = sphere(3000), 0

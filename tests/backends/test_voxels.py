@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hardware import displaced, stored
 from numpy.typing import NDArray
-from scenes import NOTHING, looking_down_z, rarely, sphere, sphere_hits
+from scenes import NOTHING, looking_down_z, rarely_together, sphere, sphere_hits
 from scipy import ndimage
 from scipy.ndimage import distance_transform_edt
 from test_instancing import assert_agree
@@ -78,7 +78,7 @@ def exact(surface: Surface, off: tuple[float, float] = (0.0, 0.0)) -> tuple[NDAr
 
 
 @pytest.mark.parametrize(
-    ("depth", "least"), [(3, 0.0), (21, 0.25), *rarely((3, 0.25), (5, 0.0), (5, 0.25), (21, 0.0))]
+    ("depth", "least"), [(3, 0.0), (21, 0.25), *rarely_together((3, 0.25), (5, 0.0), (5, 0.25), (21, 0.0))]
 )
 @every_camera
 def test_a_pixel_shows_the_nearest_cube(draw: Draw, camera: Camera, depth: int, least: float) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import DRAWS_POINTS, NOTHING, sphere, sphere_mesh
+from scenes import DRAWS_POINTS, NOTHING, rarely, sphere, sphere_mesh
 
 from viewer.analysis.measure import Measurement, reading_of
 from viewer.analysis.pick import is_seen, pick
@@ -150,7 +150,7 @@ def test_what_is_no_layer_is_told(renderer: Renderer) -> None:
             Rigid(matrix)
 
 
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
 @pytest.mark.parametrize("backend", DRAWS_POINTS)
 def test_a_pose_that_is_shifted_gives_the_very_picture(
     renderer: Renderer, backend: str, projection: str
@@ -173,7 +173,7 @@ def test_a_pose_that_is_shifted_gives_the_very_picture(
             np.testing.assert_array_equal(channel, other.arrays()[name])
 
 
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
 @pytest.mark.parametrize("backend", [name for name in OF_POINTS if name != SECTORS])
 @pytest.mark.parametrize("place", [TURNED, turned(2.5, (1e6, -2e6, 3e5))], ids=["near", "far"])
 def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(

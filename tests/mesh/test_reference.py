@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from scenes import sphere, sphere_mesh
+from scenes import rarely, sphere, sphere_mesh
 
 from viewer.bench import metrics
 from viewer.bench.truth.shapes import AnalyticScene, Plane, Sphere
@@ -134,7 +134,7 @@ def sees(mesh: Mesh, row: int, eye: np.ndarray) -> bool:
     return not ((along > 0) & (along < 1 - 1e-9)).any()
 
 
-@pytest.mark.parametrize("turn", [20, 110, 200, 290])
+@pytest.mark.parametrize("turn", [20, *rarely(110, 200, 290)])
 def test_faces_that_hold_a_vertex_do_not_hide_it(data_dir: Path, turn: float) -> None:
     """Where rays are tangents, a first hit in float32 is on the vertex's own faces."""
     mesh = read_mesh(data_dir / "models" / "stanford_bunny_35947.ply")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scenes import rarely
 from swinging_arms import APART, LONG, SPACING, THICK, arms, on_arm
 
 from viewer.analysis.landmarks import Landmark
@@ -55,7 +56,7 @@ def test_an_empty_frame_leaves_it_where_it_was() -> None:
     assert np.array_equal(body.pose.places, DeformableBody(arms(0), SPACING).pose.places)
 
 
-@pytest.mark.parametrize("count", [1, 20])
+@pytest.mark.parametrize("count", [1, *rarely(20)])
 def test_a_few_points_are_a_body_too(count: int) -> None:
     points, motion = arms(0)[:count], np.array([0, 0, 0.5])
     body = DeformableBody(points, SPACING)

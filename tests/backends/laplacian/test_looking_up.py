@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from range_scenes import heights, straight_above
-from scenes import rarely
+from scenes import rarely_together
 from test_spline import ROUNDING, SHAPE, speckled
 
 from viewer.gpu.surface import Surface
@@ -71,7 +71,7 @@ def drawn(
         ("fine", 0.6, 2, linear),
         ("fast", 1.0, 1, linear),
         ("fine", 3.0, 1, cubic),
-        *rarely(
+        *rarely_together(
             ("fine", 0.8, 1, linear),
             ("fine", 0.5, 2, linear),
             ("fast", 0.6, 1, linear),

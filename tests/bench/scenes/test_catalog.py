@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import rarely
 
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.subjects import Moment, Subject, smooth
@@ -122,7 +123,7 @@ def test_analytic_scenes_come_in_any_number_of_points(name: str) -> None:
     assert (np.einsum("ij,ij->i", exact.normal[both], drawn.normal[both]) > 0.99).mean() > 0.99
 
 
-@pytest.mark.parametrize("name", STILL)
+@pytest.mark.parametrize("name", ["horse", *rarely(*(name for name in STILL if name != "horse"))])
 def test_models_are_their_vertices(name: str, data_dir: Path) -> None:
     subject = catalog.subject(name, data_dir)
     moment = subject.moment(0)
