@@ -21,11 +21,11 @@ _OTHERS = {"set": "is for one renderer", "quality": "is more than one picture, w
 def add_goal_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
     """The arguments of what an automatic choice is to keep."""
     parser.add_argument(
-        "--budget", metavar="TIME", help="have the best renderer chosen of those that are done in, as 50ms"
+        "--budget", metavar="TIME", help="choose the best renderer that takes at most this time, such as 50ms"
     )
     parser.add_argument(
         "--error", metavar="LENGTH",
-        help="have the fastest renderer chosen of those that are off by less than, as 0.5px or 0.1mm",
+        help="choose the fastest renderer with an error below this, such as 0.5px or 0.1mm",
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from ._console import escaped
 
 def add_force_argument(parser: ArgumentParser) -> None:
     """`--force`."""
-    parser.add_argument("--force", action="store_true", help="replace files that are there already")
+    parser.add_argument("--force", action="store_true", help="replace existing files")
 
 
 def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:

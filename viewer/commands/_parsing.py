@@ -145,17 +145,27 @@ def _parsers(commands: Sequence[str]) -> tuple[_Parser, dict[str, _Parser]]:
 
 def _common_arguments() -> _Parser:
     parser = _Parser(add_help=False)
-    group = parser.add_argument_group("with every command")
-    group.add_argument("--device", type=int, metavar="N", help="which GPU, where there are several")
-    group.add_argument("--unit", type=_unit, metavar="U", help="the scan's unit of length, for example mm")
+    group = parser.add_argument_group("all commands")
     group.add_argument(
-        "--fps", type=float, metavar="F", help="poses a second, and pictures a second of a film"
+        "--device",
+        type=int,
+        metavar="N",
+        help="GPU to draw with, if there are several; 'scan4d doctor' lists them",
     )
-    group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="the axis that is up, else guessed")
     group.add_argument(
-        "-q", "--quiet", action="store_true", help="no progress, no warnings, no names of what was written"
+        "--unit", type=_unit, metavar="U", help="name of the scan's unit of length, for example mm"
     )
-    group.add_argument("--debug", action="store_true", help="show the tracebacks of errors")
+    group.add_argument(
+        "--fps", type=float, metavar="F", help="poses a second; also pictures a second of a film"
+    )
+    group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: guessed")
+    group.add_argument(
+        "-q",
+        "--quiet",
+        action="store_true",
+        help="print no progress, no warnings and no names of written files",
+    )
+    group.add_argument("--debug", action="store_true", help="print the tracebacks of errors")
     return parser
 
 

@@ -34,10 +34,10 @@ SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'f
 
 def add_pose_arguments(parser: ArgumentParser) -> None:
     """The arguments that choose poses."""
-    group = parser.add_argument_group("which poses").add_mutually_exclusive_group()
+    group = parser.add_argument_group("poses").add_mutually_exclusive_group()
     group.add_argument("--pose", type=int, metavar="I", help="one pose, counted from 0")
     group.add_argument("--time", type=float, metavar="S", help="the pose nearest to a time in seconds")
-    group.add_argument("--poses", metavar="A:B[:STEP]", help="from A up to but not including B")
+    group.add_argument("--poses", metavar="A:B[:STEP]", help="poses from A up to but not including B")
     group.add_argument("--all", action="store_true", help="all poses")
 
 

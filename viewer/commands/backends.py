@@ -25,7 +25,7 @@ _NO_POINTS = Pose(0, 0.0, "", PointCloud.from_arrays(np.zeros((0, 3))))
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d backends`."""
-    parser.add_argument("--json", action="store_true", help="as a JSON list")
+    parser.add_argument("--json", action="store_true", help="print a JSON list")
 
 
 def run(args: Namespace) -> int:

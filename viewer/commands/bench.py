@@ -68,7 +68,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="DIR",
         type=Path,
         required=True,
-        help="the folder of the results",
+        help="folder for the results",
     )
     add_force_argument(parser)
     parser.add_argument(
@@ -76,39 +76,39 @@ def add_arguments(parser: ArgumentParser) -> None:
         nargs="+",
         action="extend",
         metavar="NAME",
-        help="default: all; gl-points and mesh are always in",
+        help="only these renderers; gl-points and mesh are always included",
     )
     parser.add_argument(
         "--scene",
         nargs="+",
         action="extend",
         metavar="NAME|FILE",
-        help="scenes by name, or meshes (PLY, OBJ); default: all there are",
+        help="only these scenes, by name, or meshes (PLY, OBJ, NPZ)",
     )
-    parser.add_argument("--suite", choices=_SUITES, help="only this part; default: scenes and numerics")
+    parser.add_argument("--suite", choices=_SUITES, help="one suite; default: scenes and numerics")
     parser.add_argument(
         "--calibrate", action="store_true",
-        help="measure what the automatic choice goes by on this device, and keep it for this user",
+        help="measure only what the automatic choice needs on this device, and store it for this user",
     )  # fmt: skip
     parser.add_argument(
         "--quick", action="store_true", help="few scenes, few views, small pictures: two minutes"
     )
     parser.add_argument(
-        "--report", action="store_true", help="measure nothing: make the page of the rows that are in DIR"
+        "--report", action="store_true", help="measure nothing; make the report from the rows in DIR"
     )
     parser.add_argument(
         "--data", type=Path, metavar="DIR",
-        help="the folder of real scans; default: SCAN4D_DATA, or shared/data beside the checkout",
+        help="folder of real scans; default: SCAN4D_DATA, or shared/data beside the checkout",
     )  # fmt: skip
     parser.add_argument(
-        "--compare", type=Path, metavar="OLD", help="say what got slower or worse than in these results"
+        "--compare", type=Path, metavar="OLD", help="list what got slower or worse than these results"
     )
     parser.add_argument(
-        "--size", type=arguments.size, metavar="WxH", help="of the pictures, default 1920x1280"
+        "--size", type=arguments.size, metavar="WxH", help="size of the pictures; default 1920x1280"
     )
-    parser.add_argument("--views", type=arguments.count, metavar="N", help="of each scene, default 20")
+    parser.add_argument("--views", type=arguments.count, metavar="N", help="views of each scene; default 20")
     parser.add_argument(
-        "--seed", type=arguments.seed, metavar="N", help="of viewpoints, samples and noise, default 0"
+        "--seed", type=arguments.seed, metavar="N", help="seed of viewpoints, samples and noise; default 0"
     )
 
 

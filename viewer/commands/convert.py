@@ -52,23 +52,21 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_force_argument(parser)
     add_pose_arguments(parser)
     for name in _ESTIMATES:
-        parser.add_argument(
-            f"--{name}", action="store_true", help=f"estimate and store {name}, where it has none"
-        )
+        parser.add_argument(f"--{name}", action="store_true", help=f"estimate and store missing {name}")
     parser.add_argument(
         "--visible-from",
         type=_eye,
         metavar="X,Y,Z",
-        help="only the points that an eye here sees, in scan units",
+        help="write only the points that an eye at this position sees, in scan units",
     )
     group = parser.add_argument_group("octrees (.svo)").add_mutually_exclusive_group()
     group.add_argument(
         "--delta",
         type=float,
         metavar="D",
-        help="share of the positions that may lack a leaf, 0.05 if not given",
+        help="share of the positions that may lack a leaf of their own; default 0.05",
     )
-    group.add_argument("--depth", type=int, metavar="H", help="level of the leaves, 0 to 21, in its stead")
+    group.add_argument("--depth", type=int, metavar="H", help="level of the leaves instead, 0 to 21")
 
 
 def run(args: Namespace) -> int:

@@ -28,7 +28,7 @@ from ._scans import SCAN_HELP, first_readable, open_timeline, report
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d info`."""
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
-    parser.add_argument("--json", action="store_true", help="as a JSON object")
+    parser.add_argument("--json", action="store_true", help="print a JSON object")
 
 
 def run(args: Namespace) -> int:

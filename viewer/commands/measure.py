@@ -82,65 +82,71 @@ def add_arguments(parser: ArgumentParser) -> None:
         help=f"{' '.join(landmark_suffixes())}, or a series such as smile_%%04d.mrk.json",
     )  # fmt: skip
     parser.add_argument(
-        "--measures", type=Path, metavar="FILE", help="JSON or TOML, or a template; default: landmarks alone"
+        "--measures",
+        type=Path,
+        metavar="FILE",
+        help="the measures, JSON or TOML, or a template; default: none",
     )
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True, help=" or ".join(_SUFFIXES)
     )
     parser.add_argument(
         "--numbers", type=Path, metavar="FILE",
-        help="the largest movement of each measure: amplitude, onset, peak, ...; "
-        f"{' or '.join(_SUFFIXES)}, default: OUT_numbers",
+        help="table of the largest movement of each measure (amplitude, onset, peak, ...), "
+        f"{' or '.join(_SUFFIXES)}; default: OUT_numbers",
     )  # fmt: skip
     parser.add_argument(
         "--repeats", type=Path, metavar="FILE",
-        help=f"the measures around each peak of one, over one another; {' or '.join(_SUFFIXES)}",
+        help=f"table of the measures around each peak of one measure, {' or '.join(_SUFFIXES)}",
     )  # fmt: skip
     parser.add_argument(
         "--plot", type=Path, metavar="FILE",
-        help=f"the measures over time, as the window plots them; {', '.join(PLOT_SUFFIXES)}",
+        help=f"plot of the measures over time, {', '.join(PLOT_SUFFIXES)}",
     )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
-    how = parser.add_argument_group("how")
+    how = parser.add_argument_group("tracking and measuring")
     how.add_argument(
         "--noise", type=_length, default=0.0, metavar="SIGMA",
-        help="of the scanner: the standard deviation of a coordinate that it measures, scan units",
+        help="standard deviation of a coordinate of the scanner, scan units",
     )  # fmt: skip
     how.add_argument(
         "--order", choices=ORDERS, default=ORDERS[0],
-        help="what is told of measures: values, or how fast these change, and landmarks move; "
+        help="content of the rows of measures; speed and acceleration add rows of trajectories; "
         f"default {ORDERS[0]}",
     )  # fmt: skip
     how.add_argument(
-        "--traced", type=_names, metavar="NAME,...", help="whose speed is told of landmarks; default: of all"
+        "--traced",
+        type=_names,
+        metavar="NAME,...",
+        help="landmarks with rows of speed or acceleration; default: all",
     )
     how.add_argument(
         "--anchors", type=_names, metavar="NAME,...",
-        help="landmarks that hold the others still: the motion of these is taken off",
+        help="rigid references, at least three landmarks, whose motion is removed",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=_time, metavar="SECONDS",
-        help="width of the window in which curves are smoothed for speed, acceleration and numbers; "
+        help="width of the smoothing window for speed, acceleration and numbers; "
         f"default {Smoothing().seconds}",
     )  # fmt: skip
     how.add_argument(
-        "--aligned", metavar="MEASURE", help="whose peaks repeats are aligned by; default: the first measure"
+        "--aligned", metavar="MEASURE", help="measure whose peaks align the repeats; default: the first"
     )
     how.add_argument(
         "--least", type=_share, metavar="SHARE",
-        help=f"how much of its range a peak stands out by to count as a repeat; default {_LEAST}",
+        help=f"least height of a peak that counts as a repeat, as a share of the range; default {_LEAST}",
     )  # fmt: skip
     how.add_argument(
         "--against", metavar="MEASURE",
-        help="what others are plotted over in place of time, and correlated with in the numbers",
+        help="plot the others over this measure, and correlate them with it",
     )  # fmt: skip
     how.add_argument(
         "--placed-in", type=int, metavar="I",
-        help="the pose that landmarks are of where FILE tells no frame; default: the first that is measured",
+        help="pose of the landmarks if FILE has no frame; default: the first measured pose",
     )  # fmt: skip
-    how.add_argument("--no-snap", action="store_true", help="leave landmarks where they are in FILE")
-    how.add_argument("--axes", choices=AXES, default=AXES[0], help="of the scan, default LPS")
+    how.add_argument("--no-snap", action="store_true", help="leave landmarks where FILE has them")
+    how.add_argument("--axes", choices=AXES, default=AXES[0], help="axes of the scan; default LPS")
 
 
 def run(args: Namespace) -> int:

@@ -46,22 +46,23 @@ def add_arguments(parser: ArgumentParser) -> None:
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
         help=f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d",
     )  # fmt: skip
-    parser.add_argument("--report", type=Path, metavar="FILE.json", help="write what was found")
+    parser.add_argument("--report", type=Path, metavar="FILE.json", help="write all findings")
     add_force_argument(parser)
     add_pose_arguments(parser)
-    how = parser.add_argument_group("how")
-    how.add_argument("--refine", action="store_true", help="correct the alignment of the views first")
+    how = parser.add_argument_group("merging")
+    how.add_argument("--refine", action="store_true", help="first correct the alignment of the views")
     how.add_argument(
         "--ties", type=float, default=Rules.ties, metavar="T",
-        help="by how much a weight may be less than the best and its pixel still be kept, default 0",
+        help="keep a pixel whose weight is less than the best by at most T; default 0",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=int, default=Rules.smoothing, metavar="PIXELS",
-        help=f"that weights are averaged over, default {Rules.smoothing}",
+        help=f"radius of the average of weights; default {Rules.smoothing}",
     )  # fmt: skip
     how.add_argument(
         "--tolerance", type=float, metavar="LENGTH",
-        help="between two measures of one surface, scan units; default: as the scan's noise and pixels ask",
+        help="largest distance between two measurements of one surface, scan units; default: from "
+        "noise and pixels",
     )  # fmt: skip
 
 

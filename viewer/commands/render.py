@@ -62,34 +62,34 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("scan", metavar="SCAN", nargs="?", help=SCAN_HELP)
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
-        help=".png .exr .npz .mp4, or a pattern with %%04d",
+        help=".png .exr .npz .mp4, or a pattern with %%04d; with --no-gl also .cw",
     )  # fmt: skip
     parser.add_argument(
         "--replay", type=Path, metavar="FILE",
-        help="draw again what a recording (.json) or a picture (.png, .exr) tells; of SCAN, if given",
+        help="draw a recording (.json) or a picture (.png, .exr) again; SCAN replaces its scan",
     )  # fmt: skip
     parser.add_argument(
         "--anonymous", action="store_true",
-        help="pictures do not tell which scan they show, where it was and when",
+        help="leave out which scan the output shows, where it was and when",
     )  # fmt: skip
-    parser.add_argument(
-        "--progress", action="store_true", help="say what is drawn on standard output, a line of JSON a step"
-    )
+    parser.add_argument("--progress", action="store_true", help="print a line of JSON for each picture")
     add_force_argument(parser)
     add_pose_arguments(parser)
-    picture = parser.add_argument_group("the picture")
-    picture.add_argument("--size", type=arguments.size, metavar="WxH", help="default 1920x1280")
-    picture.add_argument("--backend", metavar="NAME", help="default: auto, what suits what the scan stores")
-    add_goal_arguments(picture)
+    picture = parser.add_argument_group("picture")
     picture.add_argument(
-        "--no-gl", action="store_true", help="without OpenGL, which needs not be there: --backend codeword"
+        "--size", type=arguments.size, metavar="WxH", help="size in pixels; default 1920x1280"
     )
     picture.add_argument(
-        "--behind", type=Path, metavar="FILE", help="a picture of the same size that --no-gl draws over"
+        "--backend", metavar="NAME", help="the renderer; default auto: the one that suits the scan"
+    )
+    add_goal_arguments(picture)
+    picture.add_argument("--no-gl", action="store_true", help="draw without OpenGL, with --backend codeword")
+    picture.add_argument(
+        "--behind", type=Path, metavar="FILE", help="picture of the same size, over which --no-gl draws"
     )
     picture.add_argument(
         "--set", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
-        help="the backend's parameters; 'scan4d backends' lists them",
+        help="the renderer's parameters; 'scan4d backends' lists them",
     )  # fmt: skip
     picture.add_argument(
         "--look", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
@@ -97,29 +97,34 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     picture.add_argument(
         "--quality", choices=tuple(SAMPLES),
-        help="how smooth edges are in .png and .mp4: the mean of 1, 5 or 17 samples of each pixel; default: "
-        "balanced, or as --replay tells",
+        help="anti-aliasing of .png and .mp4: the mean of 1, 5 or 17 samples a pixel; default: balanced, or "
+        "that of --replay",
     )  # fmt: skip
     picture.add_argument(
         "--marks", choices=MARKS, nargs="+", action="extend", metavar="MARK",
-        help=f"draw over .png and .mp4: {', '.join(MARKS)}",
+        help=f"overlays of .png and .mp4: {', '.join(MARKS)}",
     )  # fmt: skip
-    camera = parser.add_argument_group("from where").add_mutually_exclusive_group()
-    camera.add_argument("--camera", type=Path, metavar="FILE.json", help="as a file has it")
+    camera = parser.add_argument_group("camera").add_mutually_exclusive_group()
+    camera.add_argument("--camera", type=Path, metavar="FILE.json", help="camera from a file")
     camera.add_argument(
         "--orbit", type=_orbit, metavar="AZIMUTH,ELEVATION[,DISTANCE]",
-        help="degrees, and scan units; without a distance, fitted",
+        help="camera around the scan, degrees and scan units; without a distance, fitted to the scan",
     )  # fmt: skip
     camera.add_argument(
         "--turntable",
         type=arguments.count,
         metavar="N",
-        help="all round in N pictures; several poses play on the way",
+        help="N pictures all around; several poses play meanwhile",
     )
-    measuring = parser.add_argument_group("measuring")
-    measuring.add_argument("--stats", type=Path, metavar="FILE.json", help="write what the pictures took")
+    measuring = parser.add_argument_group("statistics")
     measuring.add_argument(
-        "--repeat", type=arguments.count, metavar="N", help="medians of N draws after two warm-ups in --stats"
+        "--stats", type=Path, metavar="FILE.json", help="write times and counts of the pictures"
+    )
+    measuring.add_argument(
+        "--repeat",
+        type=arguments.count,
+        metavar="N",
+        help="in --stats, medians of N draws after two warm-ups",
     )
 
 

@@ -52,52 +52,66 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--faces", type=Path, metavar="FILE",
-        help=f"the faces of every frame; default: its own, else those of {FACES_FILE} beside them",
+        help=f"mesh with the faces of every frame; default: its own, or {FACES_FILE} beside the frames",
     )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
-    pods = parser.add_argument_group("the scanner")
+    pods = parser.add_argument_group("scanner")
     places = pods.add_mutually_exclusive_group()
     places.add_argument(
-        "--pods", type=int, default=2, metavar="N", help="1 to 8; default 2, left and right of the front"
+        "--pods",
+        type=int,
+        default=2,
+        metavar="N",
+        help="number of pods, 1 to 8; default 2, left and right of the front",
     )
     places.add_argument(
-        "--azimuths", type=float, nargs="+", action="extend", metavar="A", help="of each pod, degrees"
+        "--azimuths", type=float, nargs="+", action="extend", metavar="A", help="azimuth of each pod, degrees"
     )
-    pods.add_argument("--elevation", type=float, default=0.0, metavar="E", help="of all pods, degrees")
+    pods.add_argument(
+        "--elevation", type=float, default=0.0, metavar="E", help="elevation of all pods, degrees"
+    )
     pods.add_argument(
         "--size",
         type=arguments.size,
         default=(640, 480),
         metavar="WxH",
-        help="of a range image, default 640x480",
+        help="pixels of a range image; default 640x480",
     )
-    pods.add_argument("--fov", type=float, default=30.0, metavar="F", help="vertical, degrees, default 30")
-    faults = parser.add_argument_group("its faults")
+    pods.add_argument(
+        "--fov", type=float, default=30.0, metavar="F", help="vertical field of view, degrees; default 30"
+    )
+    faults = parser.add_argument_group("faults")
     faults.add_argument(
         "--noise", type=_numbers, default=(0.0,), metavar="SIGMA[,SIGMA...]",
-        help="of depth, scan units; for all pods or for each",
+        help="standard deviation of depth, scan units; for all pods or for each",
     )  # fmt: skip
     faults.add_argument(
-        "--disparity", type=float, default=0.0, metavar="STEP", help="round disparity, pixels"
+        "--disparity", type=float, default=0.0, metavar="STEP", help="step of the disparity, pixels"
     )
     faults.add_argument(
-        "--dropouts", type=float, default=0.0, metavar="FRACTION", help="pixels without depth"
+        "--dropouts", type=float, default=0.0, metavar="FRACTION", help="share of the pixels without depth"
     )
-    faults.add_argument("--outliers", type=float, default=0.0, metavar="FRACTION", help="pixels far off")
+    faults.add_argument(
+        "--outliers",
+        type=float,
+        default=0.0,
+        metavar="FRACTION",
+        help="share of the pixels with a depth far off",
+    )
     faults.add_argument(
         "--grazing", type=float, default=90.0, metavar="DEGREES", help="no depth beyond this incidence"
     )
     faults.add_argument(
         "--gain", type=_factors, nargs="+", action="extend", metavar="G|R,G,B",
-        help="times the colour, linear light; for all pods or for each",
+        help="factor on the colour in linear light; for all pods or for each",
     )  # fmt: skip
     faults.add_argument(
         "--calibration-error", type=_numbers, default=(0.0,), metavar="DEGREES[,DEGREES...]",
-        help="the stored calibration is turned so far to the left; for all pods or for each",
+        help="turn the stored calibration to the left; for all pods or for each",
     )  # fmt: skip
     faults.add_argument(
-        "--seed", type=arguments.seed, default=0, metavar="N", help="of all chance, default 0"
+        "--seed", type=arguments.seed, default=0, metavar="N", help="seed of all random numbers; default 0"
     )
 
 

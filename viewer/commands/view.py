@@ -40,7 +40,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d view`."""
     parser.add_argument("scans", metavar="SCAN", nargs="*", help=SCAN_HELP)
     parser.add_argument(
-        "--fallback", type=Path, metavar="DIR", help="where no window can be opened, play into this folder"
+        "--fallback", type=Path, metavar="DIR", help="if no window can open, play into this folder"
     )
     add_force_argument(parser)
 
