@@ -1,9 +1,14 @@
-"""Playing and scrubbing by real events for as long as one likes, with an eye on memory."""
+"""Playing and scrubbing by real events for as long as one likes, with an eye on memory.
+
+`python tests/app/endurance.py SECONDS` does so, and prints the memory after each round.
+"""
 
 from __future__ import annotations
 
 import itertools
 import re
+import sys
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -94,3 +99,16 @@ def problems(before: int, sizes: list[int]) -> list[str]:
 def trouble(app: RunningApp) -> list[str]:
     """The lines of the log that tell of something wrong."""
     return [line for line in app.log().splitlines() if _TROUBLE.search(line)]
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder, playing_app(Path(folder)) as app:
+        before, sizes = own_megabytes(app), []
+        print(f"{before} MB with one frame", flush=True)
+        for seconds, megabytes in endure(app, float(sys.argv[1])):
+            sizes.append(megabytes)
+            print(f"{seconds:.0f} s: {megabytes} MB", flush=True)
+        full = sizes[len(sizes) // 10 :]  # once the cache is
+        first, last = median(full[: len(full) // 2]), median(full[len(full) // 2 :])
+        print(f"first half {first} MB, second half {last} MB: {last / first - 1:+.1%}")
+        print("\n".join(problems(before, sizes) + trouble(app)) or "no trouble")

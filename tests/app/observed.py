@@ -32,6 +32,7 @@ from viewer.backends import backends
 from viewer.document.measurements import Measurements
 from viewer.document.schema import plain
 
+_SETTLING = 3  # turns in which the window shows what an event has changed, whatever else goes on
 FIELDS = ("input_text", "input_text_with_hint")  # functions of ImGui
 
 
@@ -41,7 +42,7 @@ class Observer:
     def __init__(self, stream: int) -> None:
         self._lines = os.fdopen(stream, "w", buffering=1)
         self._asked: queue.SimpleQueue[tuple[int, list[Any]]] = queue.SimpleQueue()
-        self._seen = self._answered = 0
+        self._seen = self._answered = self._turns = 0
         self._actor: Actor | None = None
         self._is_acting = False
         self._problem = ""
@@ -49,6 +50,8 @@ class Observer:
         self._fields: tuple[int, dict[str, str]] = 0, {}  # frame; the text of each field in it, by its label
         for name in FIELDS:
             setattr(imgui, name, self._noting(getattr(imgui, name)))
+        self._typed = 0  # characters that came
+        imgui.backends.glfw_char_callback = self._counting(imgui.backends.glfw_char_callback)
         self._cut = CutTexts()
         self._track = 0.0  # width of the timeline's track, in heights of the font
         imgui.invisible_button = self._noting_track(imgui.invisible_button)
@@ -65,6 +68,15 @@ class Observer:
             return changed, text
 
         return declare
+
+    def _counting(self, take: Callable[..., None]) -> Callable[..., None]:
+        """A function that takes in a character, and counts it."""
+
+        def take_one(*event: Any) -> None:
+            self._typed += 1
+            take(*event)
+
+        return take_one
 
     def _noting_track(self, area: Callable[..., bool]) -> Callable[..., bool]:
         """A function of ImGui that declares an area, and notes how wide the track is."""
@@ -97,6 +109,7 @@ class Observer:
             "shown_notes": [note.text for note in app.notices.shown(time.monotonic())],
             "cut": self._cut.found,
             "track": self._track,
+            "typed": self._typed,
             "fields": self._fields[1] if self._fields[0] == imgui.get_frame_count() else {},
             **shown(app),
         }
@@ -110,10 +123,16 @@ class Observer:
             app.window.touch()
             glfw.post_empty_event()
             return
-        # A turn that began before a question may have looked for events before they came: the next answers.
+        # A turn that began before a question may have looked for events before they came: the next answers,
+        # or the one in which ImGui has taken in all of them, a press or a release of a key or button a frame.
+        self._turns += 1
+        is_queued = imgui.get_current_context().input_events_queue.size() > 0
+        if is_queued or (app.window.due and self._turns <= _SETTLING):
+            return
         self._answered = self._seen
         with suppress(queue.Empty):
             self._seen, task = self._asked.get_nowait()
+            self._turns = 0
             self._problem = ""
             if task:
                 self._actor = self._actor or Actor()
@@ -190,6 +209,8 @@ def shown(app: App) -> dict[str, Any]:
         "range_note": app.ranging.words(),
         "thumbnails": len(app.thumbnails),
         "scan_rate": app.pacing.rate,
+        "is_step_open": app.session.history._merging is not None,
+        "knows_files": app.changes._known is not None,
         "undoes": app.session.history.undoes,
         "redoes": app.session.history.redoes,
     }

@@ -33,7 +33,7 @@ def study(tmp_path: Path) -> Path:
 
 def ctrl(app: RunningApp, key: str) -> None:
     """As fingers do it: one key after the other."""
-    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl")
+    app.screen.do("key", f"ctrl+{key}")
 
 
 def close(app: RunningApp) -> None:
@@ -56,13 +56,13 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
     with running_app(screen, tmp_path, study / "one") as app:
         ctrl(app, "o")
         app.settle()
-        screen.do("key", "Down", "sleep", 0.1, "key", "Down")  # from the open scan past odd.npz
+        app.do(("key", "Down"), ("key", "Down"))  # from the open scan past odd.npz
         app.settle()
         screen.do("key", "Return")
         app.see(scan=str(study / "three.npy"))
         ctrl(app, "o")
         app.settle()
-        screen.do("key", "Tab", "sleep", 0.2, "type", "--delay", 15, study / "two.npy")
+        app.do(("key", "Tab"), ("type", "--delay", 15, study / "two.npy"))
         app.settle()
         screen.do("key", "Return")
         app.see(scan=str(study / "two.npy"))
@@ -76,11 +76,9 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
         app.see(scan=str(study / "one"))
         app.settle()
 
-        screen.do(
-            "key", "Right", "sleep", 0.2, "key", "b", "sleep", 0.2, "key", "t", "sleep", 0.2, "key", "e"
-        )
+        app.do(("key", "Right"), ("key", "b"), ("key", "t"), ("key", "e"))
         app.see(every_frame=True)
-        screen.do("mousemove", 400, 300, "sleep", 0.2, "click", 4, "sleep", 0.2, "click", 4)
+        app.do(("mousemove", 400, 300), ("click", 4), ("click", 4))
         app.settle()
         left = described(app)
         window = screen.do("search", "--name", "Scan4D").split()[-1]
@@ -196,7 +194,7 @@ def test_the_dialog_says_at_the_field_what_cannot_be_opened(
             (damaged / "1.npy", r"1\.npy"),
             (damaged / "%d.npy", "none of its 3 frames can be read"),
         ):
-            screen.do("key", "Tab", "sleep", 0.2, "key", "ctrl+a", "type", "--delay", 15, path)
+            app.do(("key", "Tab"), ("key", "ctrl+a", "type", "--delay", 15, path))
             app.settle()
             screen.do("key", "Return")
             state = app.see(lambda state, why=why: re.search(why, state.refusal))
@@ -204,7 +202,7 @@ def test_the_dialog_says_at_the_field_what_cannot_be_opened(
             assert state.scan == str(study / "two.npy")
             app.settle()
             assert app.notes == [note for note in app.notes if "Cannot" not in note], "told in one place"
-            screen.do("key", "Escape", "sleep", 0.2)  # the field lets go of the keys
+            screen.do("key", "Escape")  # the field lets go of the keys
             app.settle()
             if not app.state.is_browser_open:
                 ctrl(app, "o")
@@ -286,7 +284,7 @@ def test_a_card_over_the_demo_goes_with_the_first_act_for_good(screen: Screen, t
         left, top, width, _ = app.view()
         card = np.s_[top + 20 : top + 100, left + width // 2 - 80 : left + width // 2 + 80]
         there = screen.picture()[card]
-        screen.do("key", "Tab", "sleep", 0.2, "key", "Tab")
+        app.do(("key", "Tab"), ("key", "Tab"))
         assert app.settle().is_welcomed
         assert (screen.picture()[card] != there).any()
         close(app)

@@ -36,10 +36,7 @@ class Person:
         self.actions: Counter[str] = Counter()
 
     def press(self, *keys: str) -> None:
-        *held, key = keys
-        down = [word for name in held for word in ("keydown", name, "sleep", 0.1)]
-        up = [word for name in held for word in ("sleep", 0.1, "keyup", name)]
-        self._act(*down, "key", key, *up)
+        self._act("key", "+".join(keys))
 
     def drag(self, button: int, right: float, up: float) -> None:
         """From the middle of the view; right, up: in heights of it."""
@@ -47,13 +44,12 @@ class Person:
         x, y = left + width // 2, top + height // 2
         end = x + round(right * height), y - round(up * height)
         middle = (x + end[0]) // 2, (y + end[1]) // 2
-        self._act(
-            "mousemove", x, y, "sleep", 0.1, "mousedown", button, "sleep", 0.1, "mousemove", *middle,
-            "sleep", 0.1, "mousemove", *end, "sleep", 0.3, "mouseup", button,
-        )  # fmt: skip
+        self.app.drag((x, y), middle, end, button=button)
+        self.actions[self.task] += 1
 
     def click(self, place: tuple[int, int]) -> None:
-        self._act("mousemove", *place, "sleep", 0.2, "click", 1)
+        self.app.do(("mousemove", *place))
+        self._act("click", 1)
 
     def choose(self, name: str, word: str) -> None:
         """An item of a list in the panel; opening the list is part of it."""

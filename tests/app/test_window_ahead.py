@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, running_app
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, running_app, wait_until
 
 FRAMES, POINTS = 16, 10_000
 # Of which points alone need normals, and octrees.
@@ -56,18 +55,11 @@ def children(process: int) -> list[int]:
     return found
 
 
-def until(condition: Callable[[], object]) -> None:
-    deadline = time.monotonic() + PATIENCE
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", CHOSEN)
 def test_no_frame_is_shown_as_points(app: RunningApp, backend: str) -> None:
     first = choose(app, backend)
-    app.screen.do("key", "space")
+    app.screen.do("key", "e", "key", "space")
     app.see(is_playing=True)
     app.see(lambda state: len(set(frames_of(app.pictures(first.pictures)))) == FRAMES)
     app.screen.do("key", "End", "key", "ctrl+Home", "key", "space")
@@ -131,7 +123,7 @@ def test_jumping_about_drops_what_was_queued(app: RunningApp) -> None:
     screen.do("key", "bracketleft", "key", "bracketleft", "key", "bracketleft", "key", "space")
     app.see(is_playing=True)
     for _ in range(10):
-        screen.do("key", "End", "sleep", 0.05, "key", "ctrl+Home", "sleep", 0.05)
+        app.do(("key", "End"), ("key", "ctrl+Home"))
     screen.do("key", "space", "key", "End")
     state = app.settle()
     assert (state.frame, state.backend, state.jobs) == (FRAMES - 1, "surfels", 0)
@@ -157,4 +149,4 @@ def test_nothing_is_left_of_work_when_the_window_ends(app: RunningApp, how: str 
     else:
         app.process.send_signal(how)
     app.process.wait(PATIENCE)
-    until(lambda: not [number for number in helpers if Path(f"/proc/{number}").exists()])
+    wait_until(lambda: not [number for number in helpers if Path(f"/proc/{number}").exists()])

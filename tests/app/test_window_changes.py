@@ -36,11 +36,11 @@ def test_new_frames_come_in_by_the_button_that_reloads(screen: Screen, tmp_path:
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "End")
         assert app.settle().frame == 2
-        screen.do("sleep", 4)  # until it has looked at the files once
+        app.see(knows_files=True)
         np.save(scan / "3.npy", points(3))
         app.told("The scan has 1 more file on disk")
         app.settle()
-        screen.do("mousemove", *lowest_button(app), "sleep", 0.2, "click", 1)
+        app.do(("mousemove", *lowest_button(app)), ("click", 1))
         app.see(lambda state: state.is_opening)
         app.see(lambda state: not state.is_opening)
         screen.do("key", "End")

@@ -73,7 +73,7 @@ def click_point(app: RunningApp, number: int) -> None:
     place = Camera.from_json(app.state.camera).place_in_picture(tuple(frames()[0, number]))
     assert place is not None
     x, y = int(left + width / 2 + place[0] * height), int(top + height / 2 - place[1] * height)
-    app.screen.do("mousemove", x, y, "sleep", 0.2, "click", 1)
+    app.do(("mousemove", x, y), ("click", 1))
     app.settle()
 
 
@@ -84,7 +84,7 @@ def press(app: RunningApp, key: str) -> None:
 
 def ctrl(screen: Screen, key: str) -> None:
     """As fingers do it: one key after the other."""
-    screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl")
+    screen.do("key", f"ctrl+{key}")
 
 
 def pasted(screen: Screen) -> list[dict[str, str]]:
@@ -172,7 +172,7 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
 
         before = playhead(app)
         x = screen.picture().shape[1] // 4
-        screen.do("mousemove", x, before[1], "sleep", 0.2, "click", 1)
+        app.do(("mousemove", x, before[1]), ("click", 1))
         clicked = app.settle().frame
         assert 10 < clicked < FRAMES
         column, row = playhead(app)

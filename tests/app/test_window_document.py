@@ -6,7 +6,6 @@ import json
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,7 +13,16 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PANEL, PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app
+from virtual_screen import (
+    PANEL,
+    ROOT,
+    RunningApp,
+    Screen,
+    kept_of,
+    running_app,
+    wait_until,
+    wait_until_kept,
+)
 from written import picture
 
 from viewer.document.measurements import Measurements
@@ -51,26 +59,22 @@ class Hands:
             self.app.settle()
 
     def move(self, right: int = 0, down: int = 0) -> None:
-        self.app.screen.do("mousemove", self.middle[0] + right, self.middle[1] + down, "sleep", 0.1)
+        self.app.screen.do("mousemove", self.middle[0] + right, self.middle[1] + down)
+        self.app.settle()
 
     def drag(self, button: int, right: int, down: int) -> None:
-        self.move()
-        self.app.screen.do("mousedown", button, "sleep", 0.1)
-        for share in (0.5, 1.0):
-            self.move(round(share * right), round(share * down))
-        self.app.settle()
-        self.app.screen.do("mouseup", button)
-        self.app.settle()
+        x, y = self.middle
+        self.app.drag((x, y), (x + right // 2, y + down // 2), (x + right, y + down), button=button)
 
     def wheel(self, button: int, times: int) -> None:
         self.move(20, 10)
         self.app.screen.do("click", "--repeat", times, "--delay", 30, button)
         self.app.settle()
-        time.sleep(0.7)  # or else it would go on
+        self.app.see(is_step_open=False)  # or else it would go on
 
     def click(self, right: int, down: int, times: int = 1) -> None:
         self.move(right, down)
-        self.app.screen.do("click", "--repeat", times, "--delay", 60, 1)
+        self.app.screen.do("click", "--repeat", times, "--delay", 0, 1)
         self.app.settle()
 
     def slide(self, parameter: str, right: int) -> None:
@@ -79,7 +83,10 @@ class Hands:
 
     def turn(self) -> None:
         """By the turntable."""
-        self.app.screen.do("key", "y", "sleep", 0.6, "key", "y")
+        before = self.app.state.camera
+        self.app.screen.do("key", "y")
+        self.app.see(lambda state: state.camera != before)
+        self.app.screen.do("key", "y")
         self.app.settle()
 
     def measure(self, right: int) -> None:
@@ -143,13 +150,6 @@ def test_fifty_mixed_actions_are_undone_by_keys_to_the_same_document_and_picture
         assert "Traceback" not in app.log()
 
 
-def wait_until(holds: Callable[[], object]) -> None:
-    end = time.monotonic() + PATIENCE
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.05)
-
-
 @pytest.mark.slow
 def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_path: Path, scan: Path) -> None:
     with running_app(screen, tmp_path, scan) as app:
@@ -158,7 +158,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
         hands.measure(60)
         hands.press("o", "ctrl+b", "b")
         done = app.settle()
-        time.sleep(1.0)
+        wait_until_kept(tmp_path, scan, done)
         app.process.send_signal(signal.SIGKILL)
         app.process.wait()
     kept = kept_of(tmp_path, scan)

@@ -91,7 +91,7 @@ def test_a_submenu_then_its_menu_then_the_tool(app: RunningApp, opened: str) -> 
         app.screen.do("mousemove", *VIEW_MENU, "click", 1)
         app.settle()
         for step in range(3):  # ImGui opens it once the mouse moves on it
-            app.screen.do("mousemove", LOOK_FROM[0] + step, LOOK_FROM[1], "sleep", 0.2)
+            app.screen.do("mousemove", LOOK_FROM[0] + step, LOOK_FROM[1])
         app.settle()
     assert stack(app)["lists"] == 2
     assert ended_in_turn(app) == ["lists", "lists", "clicking"]
@@ -140,7 +140,7 @@ def test_work_in_the_status_bar_goes_on(screen: Screen, tmp_path_factory: pytest
         app.see(lambda state: any("normals" in name for name in state.works))
         for _ in range(4):
             app.screen.do("key", "Escape")
-            app.see()
+            app.take_in()
         assert not any("Cancelled" in text for text in app.notes)
         app.act("timeline", ("item_click", "###work"))
         app.see(lists=1)

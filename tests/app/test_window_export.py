@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from range_scenes import sphere_view
 from scenes import sphere
-from virtual_screen import PANEL, ROOT, SIZE, RunningApp, running_app, virtual_screen
+from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, running_app, virtual_screen, wait_until
 from written import film
 
 from viewer.document.recording import Recording
@@ -52,8 +51,7 @@ def app(tmp_path_factory: pytest.TempPathFactory, folder: Path) -> Iterator[Runn
 
 
 def press_with_ctrl(app: RunningApp, key: str) -> None:
-    """As fingers do it: one key after the other."""
-    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl", "sleep", 0.1)
+    app.screen.do("key", f"ctrl+{key}")
 
 
 class Dialog:
@@ -158,9 +156,9 @@ def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, fo
     )
     assert app.settle().document["span"] == [1, 3]
     before = app.state.pictures
-    app.screen.do("key", "space")
+    app.screen.do("key", "e", "key", "space")
     app.see(lambda _: len(app.pictures(before)) > 6)
-    app.screen.do("key", "space")
+    app.screen.do("key", "space", "key", "e")
     app.settle()
     assert {state.frame for state in app.pictures(before)} == {1, 2, 3}
     dialog = Dialog(app)
@@ -235,7 +233,7 @@ def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path)
     before = (folder / "view.exr").stat().st_mtime_ns
     dialog = Dialog(app)
     dialog.open_list("what")
-    app.screen.do("key", "Escape", "sleep", 0.3)  # closes the list alone
+    app.screen.do("key", "Escape")  # closes the list alone
     dialog.enter("name", "view")
     dialog.export()
     app.settle()
@@ -248,16 +246,13 @@ def test_what_is_there_is_replaced_only_when_told(app: RunningApp, folder: Path)
 def begin_a_long_one(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
     dialog.choose("what", "###turntable")
-    dialog.enter("pictures", 300)
+    dialog.enter("pictures", 3600)
     dialog.choose("format", "###png")
     dialog.choose("size", "###1920x1080")
     dialog.enter("name", "long")
     dialog.export()
     app.see(is_exporting=True)
-    deadline = time.monotonic() + 60
-    while not list(folder.glob(".scan4d_*/made/long*")):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
+    wait_until(lambda: list(folder.glob(".scan4d_*/made/long*")))
 
 
 @pytest.mark.slow
@@ -266,9 +261,7 @@ def test_a_cancelled_export_leaves_nothing_and_closing_asks(app: RunningApp, fol
     begin_a_long_one(app, folder)
     screen = app.screen
     screen.do("key", "Escape")  # that is for something else
-    left, top, width, _ = app.view()
-    right = left + (width + min(28 * 16, 0.9 * width)) / 2
-    screen.do("mousemove", right - 40, top + 16 + 46, "sleep", 0.3, "click", 1)
+    app.act("timeline", ("item_click", "###cancel"))
     app.told("Cancelled: Exporting long")
     app.see(is_exporting=False)
     assert listed(folder) == before
@@ -276,15 +269,13 @@ def test_a_cancelled_export_leaves_nothing_and_closing_asks(app: RunningApp, fol
     begin_a_long_one(app, folder)
     press_with_ctrl(app, "q")
     app.see(asks_before_closing=True)
-    screen.do("sleep", 0.3, "key", "Escape")  # on second thoughts, no
+    screen.do("key", "Escape")  # on second thoughts, no
     app.see(asks_before_closing=False)
     assert app.process.poll() is None
     press_with_ctrl(app, "q")
     app.see(asks_before_closing=True)
-    screen.do("sleep", 0.5)
-    middle = SIZE[1] // 2
-    screen.do("mousemove", LEFT + 80, middle + 28, "sleep", 0.2, "click", 1)
-    assert app.process.wait(30) == 0
+    app.act("Close Scan4D?", ("item_click", "Cancel the export and close"), ends=True)
+    assert app.process.wait(PATIENCE) == 0
     assert listed(folder) == before
     assert "Traceback" not in app.log()
 
@@ -324,7 +315,7 @@ def test_a_signal_cancels_an_export_without_asking(
     ):
         begin_a_long_one(app, folder)
         app.process.terminate()
-        assert app.process.wait(30) == 0
+        assert app.process.wait(PATIENCE) == 0
         assert not any(state.asks_before_closing for state in app.states)
         assert "Traceback" not in app.log()
     assert listed(folder) == before

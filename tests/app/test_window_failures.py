@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import time
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ import pytest
 from scenes import sphere
 from virtual_screen import PANEL, PATIENCE, SIZE, RunningApp, Screen, running_app
 
+from viewer.app.loop import _AWAIT
 from viewer.document.recording import Recording
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -36,7 +36,7 @@ def lacking(tmp_path: Path) -> Path:
 
 
 def close(app: RunningApp) -> None:
-    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
+    app.screen.do("key", "ctrl+q")
     assert app.process.wait(PATIENCE) == 0
 
 
@@ -63,7 +63,7 @@ def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
         assert (without.pose, without.look.color_by) == (2, "auto")
         screen.do("key", "r")
         app.see(is_recording=True)
-        screen.do("key", "space")
+        screen.do("key", "e", "key", "space")
         for frame in (0, 1, 2, 1, 2, 0):
             app.see(frame=frame)
         screen.do("key", "space")
@@ -121,14 +121,14 @@ def test_whatever_fails_in_each_frame_is_told_once_and_the_window_goes_on(
         (tmp_path / "fail").touch()
         screen.do("key", "space")
         for x in range(300, 700, 20):
-            screen.do("mousemove", x, 300, "sleep", 0.1)
-        screen.do("mousemove", 400, 300, "mousedown", 1, "mousemove", 460, 320, "mouseup", 1, "sleep", 0.2)
+            screen.do("mousemove", x, 300)
+        screen.do("mousemove", 400, 300, "mousedown", 1, "mousemove", 460, 320, "mouseup", 1)
         app.told("made to fail")
-        screen.do("key", "space", "sleep", 0.5, "mousemove", 2, SIZE[1] - 2)
-        time.sleep(1.0)
-        before = app.cpu_seconds()
-        time.sleep(2.0)
-        assert app.cpu_seconds() - before < 1.0, "it does not spin"
+        screen.do("key", "space", "mousemove", 2, SIZE[1] - 2)
+        begun = app.state.at
+        app.see(lambda state: state.at > begun + 3)
+        last = [state for state in app.states if state.at > begun + 1]
+        assert len(last) < (last[-1].at - last[0].at) / _AWAIT + 2, "it does not spin"
         assert app.process.poll() is None
         app.process.terminate()
         assert app.process.wait(PATIENCE) == 0
@@ -164,11 +164,11 @@ def test_folders_and_files_that_are_no_utf_8(screen: Screen, tmp_path: Path) -> 
         app.settle()
         screen.do("key", "ctrl+o")  # the dialog that opens scans
         app.settle()
-        screen.do("key", "Escape", "sleep", 0.3)
+        screen.do("key", "Escape")
         screen.do("key", "ctrl+e")
         app.see(is_export_open=True)
         app.settle()
-        screen.do("key", "Escape", "sleep", 0.3, "key", "Escape")
+        app.do(("key", "Escape"), ("key", "Escape"))
         app.settle()
         close(app)
     assert "Traceback" not in app.log()

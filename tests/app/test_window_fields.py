@@ -83,14 +83,17 @@ def test_a_key_that_opens_a_field_is_not_typed_into_it(app: RunningApp, keys: st
 
 
 def test_what_is_typed_after_the_key_is_in_the_field(app: RunningApp) -> None:
-    app.screen.do("key", "q", "sleep", 0.5, "type", "--delay", 60, "qa")
+    app.do(("key", "q"), ("type", "--delay", 60, "qa"))
     app.settle()
     assert app.state.fields["##filter"] == "qa"
     put_away(app)
 
 
 def test_a_key_that_is_held_types_nothing(app: RunningApp) -> None:
-    app.screen.do("keydown", "q", "sleep", 1.5, "keyup", "q")
+    before = app.state.typed
+    app.screen.do("keydown", "q")
+    app.see(lambda state: state.typed > before + 3)
+    app.screen.do("keyup", "q")
     app.settle()
     assert app.state.fields["##filter"] == ""
     put_away(app)

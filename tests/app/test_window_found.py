@@ -43,7 +43,7 @@ def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.Monke
     assert app.settle().document["look"]["color_by"] == "gap"
     left, top, width, height = app.view()
     app.act("##MainMenuBar", ("menu_click", "View/###point_details"))
-    app.screen.do("mousemove", left + width // 2, top + height // 2, "sleep", 0.2)
+    app.screen.do("mousemove", left + width // 2, top + height // 2)
     words = app.settle().pointed
     point = next(int(word.split()[1].rstrip(",")) for word in words if word.startswith("point"))
     assert f"gap {finding.numbers(CLOUD)['gap'][point]:.6g}" in words

@@ -1,18 +1,16 @@
-"""Nothing that was done is lost where the window is killed a second later."""
+"""Nothing that was done and kept is lost where the window is killed."""
 
 from __future__ import annotations
 
 import random
-import time
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, RunningApp, Screen, running_app
+from virtual_screen import PANEL, RunningApp, Screen, running_app, wait_until_kept
 
 ACTS = 100
-SECOND = 1.0
 KEYS = {
     "view": ("ctrl+1", "ctrl+2", "ctrl+3", "ctrl+4", "ctrl+5", "ctrl+6", "o", "f", "ctrl+b", "n", "z"),
     "look": ("g", "b", "shift+b", "ctrl+r"),
@@ -44,8 +42,8 @@ class Hand:
 
     def drag(self) -> None:
         start, end = self.place(), self.place()
-        self.app.screen.do("mousemove", *start, "mousedown", self.random.choice((1, 2)))
-        self.app.screen.do("sleep", 0.05, "mousemove", *end, "sleep", 0.05, "mouseup", 1, "mouseup", 2)
+        down = "mousedown", self.random.choice((1, 2))
+        self.app.do(("mousemove", *start, *down), ("mousemove", *end), ("mouseup", 1, "mouseup", 2))
 
     def wheel(self) -> None:
         times, button = self.random.randrange(1, 5), self.random.choice((4, 5))
@@ -53,10 +51,8 @@ class Hand:
 
     def measure(self) -> None:
         """Between two places near the middle, where the scan mostly is."""
-        self.app.screen.do("key", "m", "sleep", 0.05)
-        for _ in range(2):
-            self.app.screen.do("mousemove", *self.place(0.1), "sleep", 0.1, "click", 1, "sleep", 0.1)
-        self.app.screen.do("key", "Escape")
+        clicks = [(("mousemove", *self.place(0.1)), ("click", 1)) for _ in range(2)]
+        self.app.do(("key", "m"), *clicks[0], *clicks[1], ("key", "Escape"))
 
     def choose(self) -> None:
         name = self.random.choice(list(LISTS))
@@ -71,9 +67,7 @@ class Hand:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
-def test_a_hundred_acts_are_there_again_after_a_kill_a_second_later(
-    screen: Screen, tmp_path: Path, seed: int
-) -> None:
+def test_a_hundred_acts_are_there_again_after_a_kill(screen: Screen, tmp_path: Path, seed: int) -> None:
     scan = tmp_path / "scan"
     scan.mkdir()
     for number in range(4):
@@ -90,7 +84,7 @@ def test_a_hundred_acts_are_there_again_after_a_kill_a_second_later(
         assert "Traceback" not in app.log()
         app.screen.do("key", "ctrl+b")  # an act that nothing settles after
         done = app.see(lambda state: len(state.document["bookmarks"]) > len(done.document["bookmarks"]))
-        time.sleep(SECOND)
+        wait_until_kept(home, scan, app.settle())
         app.process.kill()
         app.process.wait()
     parts = done.document

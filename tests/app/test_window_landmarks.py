@@ -50,7 +50,7 @@ def on_screen(app: RunningApp, point: NDArray[np.float64]) -> tuple[int, int]:
 
 
 def click(app: RunningApp, point: NDArray[np.float64]) -> State:
-    app.screen.do("mousemove", *on_screen(app, point), "sleep", 0.1, "click", 1)
+    app.do(("mousemove", *on_screen(app, point)), ("click", 1))
     return app.settle()
 
 
@@ -93,7 +93,7 @@ def test_21_landmarks_take_21_clicks_and_are_followed(screen: Screen, tmp_path: 
         assert {state for state, _ in before.landmarks.values()} == {"not placed"}
         for number in numbers:
             x, y = on_screen(app, grid(1)[number])
-            screen.do("mousemove", x, y, "sleep", 0.1, "click", 1, "sleep", 0.1)
+            app.do(("mousemove", x, y), ("click", 1))
         state = app.see(lambda state: all(one[0] == "placed" for one in state.landmarks.values()))
         assert list(state.landmarks) == names, "they are in the order of the template"
         for name, number in zip(names, numbers, strict=True):
@@ -135,8 +135,10 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         assert after[1] - before[1] == pytest.approx(pixel, rel=0.2), "arrows move it by a pixel each"
         state = press(app, "ctrl+z", "ctrl+z", "ctrl+z")
         assert keys_of(state, "Landmark 3")[0] == before
-        screen.do("keydown", "Right", "sleep", 1.5, "keyup", "Right")
-        assert keys_of(app.settle(), "Landmark 3")[0][0] > before[0] + 3 * pixel
+        screen.do("keydown", "Right")
+        app.see(lambda state: keys_of(state, "Landmark 3")[0][0] > before[0] + 3 * pixel)
+        screen.do("keyup", "Right")
+        app.settle()
         state = press(app, "ctrl+z")
         assert keys_of(state, "Landmark 3")[0] == before, "what a held key does is one step"
 

@@ -172,7 +172,7 @@ def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
     for level in (1, 2):
         rows, columns = np.nonzero((view == rgba(LEVEL_COLORS[level - 1])[:3]).all(axis=2))
         place = len(rows) // 2
-        app.screen.do("mousemove", left + columns[place], top + rows[place], "sleep", 0.2)
+        app.screen.do("mousemove", left + columns[place], top + rows[place])
         assert f"filled from level {level}" in app.settle().pointed
     press(app, "m")
     app.screen.do("click", 1)
@@ -187,7 +187,7 @@ def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes
     draw_pyramids(app, "polygons")
     press(app, "r")
     app.see(is_recording=True)
-    app.screen.do("key", "space")
+    app.screen.do("key", "e", "key", "space")
     app.see(is_playing=True)
     for key, name in KEYS:
         for wanted in (False, True):
@@ -195,7 +195,7 @@ def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes
             state = app.see(lambda state: params(state).get(name) is wanted)  # noqa: B023
             app.see(lambda later: later.frame != state.frame)  # noqa: B023
             assert app.state.is_playing
-    app.screen.do("key", "space", "key", "h")
+    app.screen.do("key", "space", "key", "e", "key", "h")
     app.settle()
     press(app, "p")
     picture = Path(app.told(r"Saved (.+\.png)")[1])

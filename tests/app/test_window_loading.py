@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 
 from scenes import sphere
@@ -51,8 +50,9 @@ def test_no_picture_passes_for_another_scan_or_frame(screen: Screen, tmp_path: P
         waited_for = app.see(lambda state: state.loading).loading
         assert waited_for.startswith("Preparing frame ")
         dropped = app.state.dropped
-        time.sleep(1)  # of the clock, in which 25 frames are due
-        assert (app.state.dropped, app.state.loading) == (dropped, waited_for)
+        begun = app.state.at
+        waited = app.see(lambda state: state.at > begun + 1)  # in which 25 frames are due
+        assert (waited.dropped, waited.loading) == (dropped, waited_for)
         assert brightness(app) < 0.6 * bright
         unprepared.unlink()
         app.see(lambda state: state.frame > dropped and state.loading is None)
@@ -63,7 +63,7 @@ def test_no_picture_passes_for_another_scan_or_frame(screen: Screen, tmp_path: P
         screen.do("key", "Next")
         assert app.see(lambda state: state.loading).loading == "Loading ball.npz"
         assert app.state.scan == "demo"
-        app.see()
+        app.take_in()
         assert brightness(app) < 0.6 * bright
         before = len(app.states)
         unread.unlink()

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PANEL, RunningApp, Screen, running_app
+from virtual_screen import PANEL, RunningApp, Screen, running_app, slow_pictures
 from written import write_mesh
 
 from viewer.camera import Camera
@@ -43,12 +43,12 @@ def pixel_of(app: RunningApp, points: NDArray[np.float64], number: int) -> tuple
 
 
 def click(app: RunningApp, place: tuple[int, int], times: int = 1) -> None:
-    app.screen.do("mousemove", *place, "sleep", 0.2, "click", "--repeat", times, "--delay", 60, 1)
+    app.do(("mousemove", *place), ("click", "--repeat", times, "--delay", 0, 1))
 
 
 def ctrl(screen: Screen, key: str) -> None:
     """As fingers do it: one key after the other."""
-    screen.do("keydown", "ctrl", "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", "ctrl")
+    screen.do("key", f"ctrl+{key}")
 
 
 def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) -> tuple[float, float]:
@@ -209,22 +209,11 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
         assert "Traceback" not in app.log()
 
 
-SLOW = """
-import time
-from viewer.app.window import Window
-end = Window.end
-def end_late(self):
-    time.sleep(0.2)
-    end(self)
-Window.end = end_late
-"""
-
-
 @pytest.mark.slow
 def test_a_double_click_in_a_slow_window_sets_one_end(screen: Screen, tmp_path: Path) -> None:
     points = grid(1.0)
     write_mesh(tmp_path / "scan.ply", points, FACES)
-    with running_app(screen, tmp_path, tmp_path / "scan.ply", before=SLOW) as app:
+    with running_app(screen, tmp_path, tmp_path / "scan.ply", before=slow_pictures(0.2)) as app:
         screen.do("key", "m")
         app.see(clicking="measuring")
         measure(app, points, 34, 128)

@@ -33,7 +33,7 @@ def click(app: RunningApp, x: float, y: float) -> None:
     place = Camera.from_json(app.state.camera).place_in_picture((x, y, 0.0))
     assert place is not None
     at = int(left + width / 2 + place[0] * height), int(top + height / 2 - place[1] * height)
-    app.screen.do("mousemove", *at, "sleep", 0.1, "click", 1)
+    app.do(("mousemove", *at), ("click", 1))
     app.settle()
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, RunningApp, Screen, running_app, virtual_screen
+from virtual_screen import PANEL, RunningApp, Screen, running_app, slow_pictures, virtual_screen
 from written import picture
 
 from viewer.app.theme import PALETTES, rgb
@@ -25,7 +25,8 @@ def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
         np.save(scan / f"{number}.npy", np.random.default_rng(number).random((500, 3)))
     with (
         virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
-        running_app(screen, tmp_path_factory.mktemp("app"), scan) as app,
+        # So slow that no machine shows 250 frames a second.
+        running_app(screen, tmp_path_factory.mktemp("app"), scan, before=slow_pictures(0.01)) as app,
     ):
         yield app
 
@@ -38,7 +39,7 @@ def app(running: RunningApp) -> RunningApp:
 
 def shift_space(screen: Screen) -> None:
     """As fingers do it: one key after the other."""
-    screen.do("keydown", "shift", "sleep", 0.1, "key", "space", "sleep", 0.1, "keyup", "shift")
+    screen.do("key", "shift+space")
 
 
 def wait_for_frames(app: RunningApp, count: int) -> list[int]:
@@ -100,8 +101,8 @@ def handles(app: RunningApp) -> tuple[tuple[int, int], tuple[int, int]]:
 
 
 def drag_to(app: RunningApp, start: tuple[int, int], x: float) -> None:
-    app.screen.do("mousemove", *start, "sleep", 0.1, "mousedown", 1, "sleep", 0.1)
-    app.screen.do("mousemove", round(x), start[1], "sleep", 0.2, "mouseup", 1)
+    app.do(("mousemove", *start), ("mousedown", 1))
+    app.do(("mousemove", round(x), start[1]), ("mouseup", 1))
     app.settle()
 
 
@@ -117,7 +118,7 @@ def test_the_mouse_chooses_the_frames_that_are_played(app: RunningApp) -> None:
     near, far = handles(app)
     assert near[0] == pytest.approx(first[0] + 2 * wide, abs=3)
     assert far[0] == pytest.approx(first[0] + 5 * wide, abs=3)
-    app.screen.do("key", "space")
+    app.screen.do("key", "e", "key", "space")
     app.see(is_playing=True)
     assert set(wait_for_frames(app, 6)[1:]) == {2, 3, 4}
     app.screen.do("key", "space")

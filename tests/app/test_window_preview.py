@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, RunningApp, State, running_app, virtual_screen
+from virtual_screen import PANEL, RunningApp, State, running_app, slow_pictures, virtual_screen
 from written import picture
 
 from viewer import cli
@@ -18,19 +18,28 @@ from viewer.document.recording import Recording
 from viewer.scan import formats
 
 SIZE = (1280, 720)
-FRAMES, POINTS = 5, 200_000  # surfels that a software driver takes several times a frame's 40 ms for
+# Of pictures to save nothing is drawn before there is a file "go" in the working directory.
+HELD = """
+from os.path import exists
+from viewer.app.output.unsaved_picture import UnsavedPicture
+draw = UnsavedPicture.advance
+UnsavedPicture.advance = lambda picture: draw(picture) if exists("go") else None
+"""
+FRAMES, POINTS = 5, 200_000
+SLOW = 0.1  # seconds over each picture: several times what a frame lasts
 MIDDLE = np.s_[120:440, 300:640]  # of the view: no cube, scale bar or note there
 
 
 @pytest.fixture(scope="module")
 def running(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
-    scan = tmp_path_factory.mktemp("scan")
+    scan, folder = tmp_path_factory.mktemp("scan"), tmp_path_factory.mktemp("app")
     for number in range(FRAMES):
         formats.write(scan / f"{number}.npz", sphere(POINTS, radius=1 + 0.1 * number))
     with (
         virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,
-        running_app(screen, tmp_path_factory.mktemp("app"), scan) as app,
+        running_app(screen, folder, scan, before=f"exec({HELD!r}); " + slow_pictures(SLOW)) as app,
     ):
+        (folder / "go").touch()
         yield app
 
 
@@ -45,9 +54,9 @@ def is_full(app: RunningApp, state: State) -> bool:
     return (state.pixels, state.points) == ([width, height], POINTS)
 
 
-def wait_for_preview(app: RunningApp) -> None:
-    if any("Drawn in software" in note for note in app.notes):  # a graphics card may need none
-        app.see(lambda state: not is_full(app, state), backend="surfels")
+def wait_for_preview(app: RunningApp, since: int = 0) -> None:
+    """Since: the number of the picture before."""
+    app.see(lambda _: any(not is_full(app, state) for state in app.pictures(since)), backend="surfels")
 
 
 def expect_full(app: RunningApp) -> None:
@@ -68,12 +77,12 @@ def saved(app: RunningApp) -> tuple[Path, np.ndarray]:
 @pytest.mark.slow
 def test_playing_is_previewed_and_saved_in_full(app: RunningApp) -> None:
     screen = app.screen
-    screen.do("mousemove", *(v - 1 for v in SIZE), "key", "r", "key", "space")
-    wait_for_preview(app)
+    screen.do("mousemove", *(v - 1 for v in SIZE), "key", "r", "key", "e", "key", "space")
+    wait_for_preview(app, app.state.pictures)
     app.see(frame=4)
     path, again = saved(app)
     np.testing.assert_array_equal(picture(path), again)
-    wait_for_preview(app)
+    wait_for_preview(app, app.state.pictures)
     screen.do("key", "space")
     expect_full(app)
 
@@ -115,12 +124,13 @@ def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: 
     screen = app.screen
     left, top, width, height = app.view()
     x, y = left + width // 2, top + height // 2
-    screen.do("mousemove", x, y, "mousedown", 1)
-    screen.do(*(word for i in range(15) for word in ("mousemove", x + 3 * i, y, "sleep", 0.03)))
-    wait_for_preview(app)
+    before = app.settle().pictures
+    app.do(("mousemove", x, y), ("mousedown", 1), *(("mousemove", x + 9 * move, y) for move in range(5)))
+    wait_for_preview(app, before)
     expect_full(app)  # with the button held
-    screen.do("mouseup", 1, "click", "--repeat", 8, "--delay", 40, 4)
-    wait_for_preview(app)
+    before = app.state.pictures
+    screen.do("mouseup", 1, "click", "--repeat", 8, 4)
+    wait_for_preview(app, before)
     expect_full(app)
     before = app.state.pictures
     time.sleep(2 * REST)  # what comes sooner counts as moving
@@ -155,8 +165,11 @@ def test_a_picture_is_saved_as_it_was_while_the_window_goes_on_and_can_be_cancel
     app.settle()
     screen.do("key", "Right")
     app.see(frame=1)
+    go = app.folder / "go"
+    go.unlink()
     screen.do("key", "p", "key", "Right")
     app.see(frame=2, is_saving=True)
+    go.touch()
     path = Path(app.told(r"Saved (.+\.png)")[1])
     (entry,) = Recording.load(path).entries
     assert (entry.pose, entry.look.quality) == (1, "fine")
@@ -168,10 +181,13 @@ def test_a_picture_is_saved_as_it_was_while_the_window_goes_on_and_can_be_cancel
     there = set(path.parent.glob("scan4d_*"))
     screen.do("key", "Right")
     app.see(frame=3)
+    go.unlink()
     screen.do("key", "p")
-    app.see(is_saving=True)
-    screen.do("sleep", 0.5, "key", "Escape")  # once it is shown as work
+    app.see(works=["Drawing the picture to save"])
+    screen.do("key", "Escape")  # which ends no work
+    app.act("timeline", ("item_click", "###cancel"))
     app.told("Cancelled: Drawing the picture to save")
+    go.touch()
     app.settle()
     assert set(path.parent.glob("scan4d_*")) == there
     app.choose(PANEL, "quality/##value", "###balanced")

@@ -28,10 +28,10 @@ def test_a_rate_and_names_tell_the_times(screen: Screen, tmp_path: Path) -> None
         app.screen.do("key", "End")
         app.see(frame=2)
         assert app.settle().shown_time == 1.0
-        app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", "z", "sleep", 0.1, "keyup", "ctrl")
+        app.screen.do("key", "ctrl+z")
         app.see(scan_rate=pytest.approx(50))
         app.see(shown_time=pytest.approx(0.04))
-        app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
+        app.screen.do("key", "ctrl+q")
         app.process.wait(60)
     assert kept_of(tmp_path, scan).document.fps == 50
     with running_app(screen, tmp_path, scan) as app:

@@ -17,13 +17,13 @@ def test_what_was_made_comes_back_under_another_name(screen: Screen, tmp_path: P
     for number in range(3):
         np.save(old / f"{number}.npy", points(number))
     with running_app(screen, tmp_path, old) as app:
-        screen.do("key", "ctrl+b", "sleep", 0.5, "key", "Return")
+        app.do(("key", "ctrl+b"), ("key", "Return"))
         document = app.see(lambda state: state.document["bookmarks"]).document
     old.rename(new)
     with running_app(screen, tmp_path, new) as app:
         app.told("Scan4D knows these files by another name: .*doe .bookmarks., which is no longer there")
         assert not app.settle().document["bookmarks"]
-        screen.do("mousemove", *lowest_button(app), "sleep", 0.2, "click", 1)
+        app.do(("mousemove", *lowest_button(app)), ("click", 1))
         used = app.see(lambda state: state.document["bookmarks"])
         assert used.document["bookmarks"] == document["bookmarks"]
         screen.do("key", "ctrl+z")

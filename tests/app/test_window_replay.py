@@ -24,17 +24,13 @@ from viewer.scan.points import PointCloud
 SIZE = (960, 640)
 
 
-def press(app: RunningApp, *keys: str) -> None:
-    """As fingers do it: one key after the other."""
-    *held, key = keys
-    down = [word for name in held for word in ("keydown", name, "sleep", 0.1)]
-    up = [word for name in reversed(held) for word in ("sleep", 0.1, "keyup", name)]
-    app.screen.do(*down, "key", key, *up)
+def press(app: RunningApp, key: str) -> None:
+    app.screen.do("key", key)
 
 
 def replay(app: RunningApp) -> None:
     """The recording saved last, to its end."""
-    press(app, "shift", "r")
+    press(app, "shift+r")
     app.see(is_replaying=True)
     app.see(is_replaying=False)
     app.settle()
@@ -85,7 +81,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         _, first = recorded(app)
         assert [entry.pose for entry in first] == sorted(entry.pose for entry in first)
         press(app, "ctrl+Home")
-        press(app, "shift", "b")
+        press(app, "shift+b")
         app.see(frame=0, backend="auto_splats")
         app.settle()
 
@@ -111,7 +107,7 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
         with viewed(app, path) as title:
             assert title == "a - Scan4D"
         path.write_text(text[:-100])
-        press(app, "shift", "r")
+        press(app, "shift+r")
         app.told("is not JSON")
         assert "Traceback" not in app.log()
 
@@ -140,5 +136,5 @@ def test_an_anonymous_picture_is_shown_where_the_scan_stands(tmp_path: Path) -> 
             "its hash is another one, of the same scan"
         )
         formats.write(scan, PointCloud.from_arrays(points[:200]))
-        press(app, "shift", "r")
+        press(app, "shift+r")
         app.told("far.npz has changed since")

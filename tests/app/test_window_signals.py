@@ -7,12 +7,21 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 from scenes import rarely, sphere
-from virtual_screen import PATIENCE, ROOT, SIZE, RunningApp, Screen, kept_of, running_app, virtual_screen
+from virtual_screen import (
+    PATIENCE,
+    ROOT,
+    SIZE,
+    RunningApp,
+    Screen,
+    kept_of,
+    running_app,
+    virtual_screen,
+    wait_until,
+)
 
 from viewer.document.recording import Recording
 from viewer.scan import formats
@@ -33,18 +42,15 @@ def play_and_record(app: RunningApp) -> None:
     """Until a whole round was recorded."""
     app.screen.do("key", "r")
     app.see(is_recording=True)
-    app.screen.do("key", "space")
+    app.screen.do("key", "e", "key", "space")
     for frame in (COUNT // 2, 3, COUNT // 2):
         app.see(frame=frame)
 
 
 def wait_for_recording(folder: Path) -> Path:
     """Until a closing window has saved one."""
-    end = time.monotonic() + PATIENCE
-    while not (found := list(folder.glob("scan4d_*.json"))):
-        assert time.monotonic() < end
-        time.sleep(0.01)
-    return found[0]
+    wait_until(lambda: list(folder.glob("scan4d_*.json")))
+    return next(folder.glob("scan4d_*.json"))
 
 
 def check_recording(path: Path) -> None:
@@ -87,10 +93,7 @@ def test_settings_are_kept_while_a_scan_plays(screen: Screen, tmp_path: Path, sc
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "space", "key", "t")
         file = tmp_path / "config" / "scan4d" / "settings.json"
-        end = time.monotonic() + PATIENCE
-        while not (file.exists() and settings(tmp_path)["theme"] == "light"):
-            assert time.monotonic() < end
-            time.sleep(0.1)
+        wait_until(lambda: file.exists() and settings(tmp_path)["theme"] == "light")
         before = app.state.pictures
         app.see(lambda state: state.pictures > before + 1)
 
@@ -157,10 +160,7 @@ def test_a_signal_before_the_window_is_there_is_quiet(screen: Screen, tmp_path: 
 def wait_for_libraries(process: subprocess.Popen[bytes], name: str) -> None:
     """Until the process has loaded one of this name."""
     maps = Path(f"/proc/{process.pid}/maps")
-    end = time.monotonic() + PATIENCE
-    while process.poll() is None and name not in maps.read_text():
-        assert time.monotonic() < end
-        time.sleep(0.005)
+    wait_until(lambda: process.poll() is not None or name in maps.read_text())
 
 
 def test_signals_that_were_ignored_stay_ignored(screen: Screen, tmp_path: Path, scan: Path) -> None:

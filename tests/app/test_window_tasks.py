@@ -49,7 +49,7 @@ def press_until(app: RunningApp, key: str, words: str) -> None:
     while not any(words in note for note in app.notes):
         assert app.process.poll() is None, app.log()
         assert time.monotonic() < end, app.log()
-        app.screen.do("key", key, "sleep", 0.1)
+        app.screen.do("key", key)
     app.told(words)
 
 
@@ -86,9 +86,7 @@ def test_preparing_is_cancelled_and_the_renderer_before_comes_back(app: RunningA
     before, pictures = app.screen.picture()[part], app.state.pictures
     app.choose(PANEL, "##backend", "###surfels")
     app.see(lambda state: any("normals" in name for name in state.works))
-    app.screen.do(
-        "key", "Escape", "key", "Escape", "sleep", 0.3, "key", "Escape"
-    )  # meant for anything but the work
+    app.do(("key", "Escape", "key", "Escape"), ("key", "Escape"))  # meant for anything but the work
     app.act("timeline", ("item_click", "###cancel"))
     assert app.told("Cancelled")[0]
     assert app.notes[-1] == "Cancelled: Estimating normals."
@@ -119,7 +117,7 @@ def test_closing_ends_the_process_while_a_scan_is_read(app: RunningApp, folder: 
     go_to(app, folder / "0_small.npy")
     app.screen.do("key", "Next")
     app.see(is_opening=True)
-    app.screen.do("keydown", "ctrl", "sleep", 0.1, "key", "q", "sleep", 0.1, "keyup", "ctrl")
+    app.screen.do("key", "ctrl+q")
     assert app.process.wait(PATIENCE) == 0
     assert app.state.scan == str(folder / "0_small.npy")
     assert "Traceback" not in app.log()

@@ -37,7 +37,7 @@ def middle(app: RunningApp) -> tuple[int, int]:
 
 def click(app: RunningApp, x: int, y: int) -> None:
     """Click, and take the mouse out of the way."""
-    app.screen.do("mousemove", x, y, "sleep", 0.2, "click", 1, "sleep", 0.2, "mousemove", 2, SIZE[1] - 2)
+    app.do(("mousemove", x, y), ("click", 1), ("mousemove", 2, SIZE[1] - 2))
     app.settle()
 
 
@@ -93,7 +93,7 @@ def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Pat
         assert count(app, YELLOW) == one, "the clicks are measuring's now"
         screen.do("key", "Escape")
         app.see(clicking=None)
-        screen.do("key", "alt+p", "sleep", 0.2, "key", "Escape")
+        app.do(("key", "alt+p"), ("key", "Escape"))
         app.settle()
         click(app, x + 100, y + 60)
         assert count(app, YELLOW) == one, "Escape has put the pins away"
@@ -191,18 +191,18 @@ def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
     with running_app(screen, tmp_path, scan, before=USE.format(str(tmp_path / "tools"))) as app:
         x, y = middle(app)
         for name in ("in_command", "in_work", "in_result"):
-            screen.do("key", keys[name].lower(), "sleep", 0.2)
+            screen.do("key", keys[name].lower())
             app.told(f"{name} is switched off")
-        screen.do("key", keys["in_escape"].lower(), "sleep", 0.2, "key", "Escape")
+        app.do(("key", keys["in_escape"].lower()), ("key", "Escape"))
         app.told("in_escape is switched off")
         screen.do("key", keys["in_prompt"].lower())
         app.told("in_prompt is switched off")
-        screen.do("key", keys["in_click"].lower(), "sleep", 0.2)
+        screen.do("key", keys["in_click"].lower())
         click(app, x, y)
         app.told("in_click is switched off")
         click(app, x, y)
 
-        screen.do("key", keys["in_command"].lower(), "sleep", 0.2, "key", "m")
+        app.do(("key", keys["in_command"].lower()), ("key", "m"))
         app.see(clicking="measuring")
         click(app, x, y)
         app.see(is_under_way=True)
@@ -246,7 +246,7 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     use = USE.format(str(folder)) + USE.format(str(other))
     with running_app(screen, tmp_path, scan, before=use) as app:
         for _ in range(2):
-            screen.do("key", "alt+a", "sleep", 0.2)
+            screen.do("key", "alt+a")
             app.told("a mistake")
         screen.do("key", "m")
         app.see(clicking="measuring")
@@ -299,9 +299,9 @@ def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
         (folder / f"{name}.py").write_text(KEEPING.format(name=name, kind=kind) + code + keys)
     with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
         app.told(r"listed is switched off until the next start: TypeError: Kept\.all cannot be kept as list")
-        screen.do("key", "alt+p", "sleep", 0.2)
+        screen.do("key", "alt+p")
         click(app, *middle(app))
-        screen.do("key", "alt+a", "sleep", 0.2)
+        screen.do("key", "alt+a")
         click(app, *middle(app))
         app.told(
             r"array is switched off .*: TypeError: array\.all\[0\]\.position is to be a tuple, not array"
@@ -388,7 +388,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         app.settle()
         color, laid, _ = shown(app)
         assert (color, laid - before) == ("rising", 4 * 400 * 400), "a number a point, and nothing else"
-        screen.do("mousemove", x, y - 60, "sleep", 0.2)
+        screen.do("mousemove", x, y - 60)
         app.settle()
         height, number = pointed(app)
         assert number == pytest.approx(5 * height[1], abs=0.05)
@@ -407,7 +407,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         press(app, "f")
         assert shown(app) == ("rising", laid, 100), "nothing is uploaded again"
         press(app, "alt+c")
-        screen.do("mousemove", x, y, "sleep", 0.2)
+        screen.do("mousemove", x, y)
         app.settle()
         place = place_under_mouse(app)
         assert place == pytest.approx((100, 0, 3), abs=0.05), "it is fitted and picked where it is moved to"

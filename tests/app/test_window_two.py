@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_window_changes import points
-from virtual_screen import RunningApp, kept_of, running_app, virtual_screen
+from virtual_screen import RunningApp, kept_of, running_app, virtual_screen, wait_until_kept
 
 from viewer.document.saved_session import SavedSession
+
+CHANGED = "what is kept of it was changed elsewhere, perhaps in another window"
 
 
 def add_bookmark(app: RunningApp, count: int, right: int) -> None:
     """Turn the camera by some pixels, and add the view to the bookmarks, of which there are so many then."""
     left, top, width, height = app.view()
     app.drag((left + width / 2, top + height / 2), (left + width / 2 + right, top + height / 2))
-    app.screen.do("key", "ctrl+b", "sleep", 0.5, "key", "Return")
+    app.screen.do("key", "ctrl+b")
     app.see(lambda state: len(state.document["bookmarks"]) == count)
 
 
@@ -35,16 +37,17 @@ def test_what_is_made_in_two_windows_is_kept_of_both(tmp_path: Path) -> None:
     ):
         add_bookmark(one, 1, 20)
         made = one.settle().document["bookmarks"]
-        first.do("sleep", 2)  # until it is kept
+        wait_until_kept(tmp_path, scan, one.state)
         add_bookmark(two, 1, -50)
-        second.do("sleep", 2)
+        two.told(CHANGED)
         add_bookmark(one, 2, 40)
-        first.do("sleep", 2, "key", "ctrl+q")
+        one.told(CHANGED)
+        first.do("key", "ctrl+q")
         assert one.process.wait(60) == 0
         second.do("key", "ctrl+q")
         assert two.process.wait(60) == 0
         for log in (one.log(), two.log()):
-            assert "what is kept of it was changed elsewhere, perhaps in another window" in log
+            assert CHANGED in log
             assert "Traceback" not in log
     folder = tmp_path / "config" / "scan4d" / "scans"
     sessions = [kept_of(tmp_path, scan), *(SavedSession.load(path) for path in folder.glob("*.old-*"))]

@@ -50,7 +50,7 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     app.see(lambda state: state.pointed and state.pointed[0].endswith(" m"))
     metres = place(app)
     app.choose(PANEL, "##shown_unit", "###mm")
-    app.screen.do("mousemove", left, top, "sleep", 0.2, "mousemove", *middle)
+    app.do(("mousemove", left, top), ("mousemove", *middle))
     app.see(lambda state: state.pointed and state.pointed[0].endswith(" mm"))
     assert place(app) == pytest.approx([1000 * number for number in metres], abs=0.01)
 
@@ -68,7 +68,7 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     app.screen.do("key", "m")
     app.see(clicking="measuring")
     for x in (-width // 12, width // 12):
-        app.screen.do("mousemove", middle[0] + x, middle[1], "sleep", 0.2, "click", 1)
+        app.do(("mousemove", middle[0] + x, middle[1]), ("click", 1))
         app.settle()
     made = app.see(lambda state: state.measurements).measurements[0]
     assert made["distance"] < 0.25, "it is kept in units of the scan"

@@ -76,11 +76,11 @@ def test_each_scan_stands_upright_by_itself_and_keeps_what_its_user_said(
 @pytest.mark.slow
 def test_one_click_beside_the_cube_turns_the_view_upright(app: RunningApp) -> None:
     before, (x, y) = camera_of(app), below_cube(app)
-    app.screen.do("mousemove", x, y, "sleep", 0.5)
+    app.screen.do("mousemove", x, y)
     app.settle()
-    app.screen.do("mousemove", x, y + EM + 6 * ROW, "sleep", 0.2, "click", 1)  # the last of the six
+    app.do(("mousemove", x, y + EM + 6 * ROW), ("click", 1))  # the last of the six
     assert camera_of(app).up == up_vector("-z")
-    app.screen.do("mousemove", x, y, "sleep", 0.5, "mousemove", 300, 300, "sleep", 0.2)
+    app.do(("mousemove", x, y), ("mousemove", 300, 300))
     app.screen.do("key", "ctrl+z")
     assert camera_of(app) == before
 
@@ -101,7 +101,7 @@ def test_a_side_can_be_the_front(app: RunningApp, tmp_path: Path, scans: Path) -
 def test_a_surface_that_is_clicked_faces_up(app: RunningApp) -> None:
     app.act("##MainMenuBar", ("menu_click", "View/###pick_up"))
     left, top, width, height = app.view()
-    app.screen.do("mousemove", left + width // 2, top + height // 2, "sleep", 0.2, "click", 1)
+    app.do(("mousemove", left + width // 2, top + height // 2), ("click", 1))
     turned = camera_of(app)
     assert np.dot(turned.up, up_vector("+z")) > 0.99, "the chest is up now"
     assert not app.state.clicking

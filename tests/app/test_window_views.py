@@ -54,8 +54,7 @@ def test_on_a_display_of_scale_2_all_is_twice_as_large(tmp_path: Path) -> None:
 
 
 def chord(app: RunningApp, modifier: str, key: str) -> None:
-    """As fingers do it: one key after the other."""
-    app.screen.do("keydown", modifier, "sleep", 0.1, "key", key, "sleep", 0.1, "keyup", modifier)
+    app.screen.do("key", f"{modifier}+{key}")
     app.settle()
 
 
@@ -69,7 +68,7 @@ def on_cube(app: RunningApp, right: float, up: float) -> tuple[int, int]:
 
 
 def click_cube(app: RunningApp, right: float, up: float) -> Camera:
-    app.screen.do("mousemove", *on_cube(app, right, up), "sleep", 0.2, "click", 1)
+    app.do(("mousemove", *on_cube(app, right, up)), ("click", 1))
     return camera_of(app)
 
 
@@ -88,7 +87,7 @@ def test_the_cube_is_clicked_and_dragged_and_keeps_the_mouse_from_the_view(app: 
     assert back(click_cube(app, 0, 0.9)) == pytest.approx([0, 1, 0], abs=1e-3)
     chord(app, "ctrl", "1")
     place = on_cube(app, 0, 0)
-    app.screen.do("mousemove", *place, "sleep", 0.2, "click", 4, "click", 4)
+    app.do(("mousemove", *place), ("click", 4, "click", 4))
     assert camera_of(app) == start, "a wheel over the cube does nothing"
     drag(app, 1, place, (place[0] - 60, place[1]))
     dragged = camera_of(app)
@@ -127,11 +126,11 @@ def test_keys_typed_in_haste_are_what_was_typed(app: RunningApp) -> None:
 def test_the_turntable_turns_until_a_key_or_the_mouse_stops_it(app: RunningApp) -> None:
     chord(app, "ctrl", "1")
     cameras = [camera_of(app)]
-    for stop in (("key", "y"), ("mousemove", 300, 300, "sleep", 0.1, "click", 1)):
+    for stop in ([("key", "y")], [("mousemove", 300, 300), ("click", 1)]):
         app.screen.do("key", "y")
         pictures = app.state.pictures
         app.see(lambda state: state.pictures > pictures + 4)  # noqa: B023
-        app.screen.do(*stop)
+        app.do(*stop)
         cameras.append(camera_of(app))  # it would never settle while it turns
     angles = [float(np.degrees(np.arctan2(back(camera)[0], back(camera)[2]))) for camera in cameras]
     assert angles[0] == pytest.approx(0, abs=0.01)

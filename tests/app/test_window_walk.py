@@ -38,6 +38,7 @@ timeline.Timeline._read = lambda *of: threading.Event().wait()
 
 def check(app: RunningApp, report: Report, least: int) -> None:
     """Fails where something was wrong, or fewer widgets than that were found."""
+    print(len(report.seen), "widgets")
     assert not report.problems, "\n".join(report.problems)
     assert len(report.seen) >= least, report.seen
     assert "Traceback" not in app.log(), app.log()[-5000:]
@@ -62,19 +63,25 @@ def test_no_buttons_of_the_bars_share_an_id_but_those_that_do(
         assert "Traceback" not in app.log()
 
 
+PARTS = 6  # of a walk, each of which takes a minute or two
+in_parts = pytest.mark.parametrize("part", range(PARTS))
+
+
 @pytest.mark.slow
-def test_all_widgets_of_a_scan_with_landmarks(screen: Screen, tmp_path: Path) -> None:
+@in_parts
+def test_all_widgets_of_a_scan_with_landmarks(screen: Screen, tmp_path: Path, part: int) -> None:
     scan = left_open(tmp_path, frames=3, landmarks=4, measures=2)
     with running_app(screen, tmp_path, scan) as app:
-        check(app, app.walk(), 150)
+        check(app, app.walk(part=(part, PARTS)), 20)
 
 
 @pytest.mark.slow
-def test_all_widgets_of_a_range_scan(screen: Screen, tmp_path: Path) -> None:
+@in_parts
+def test_all_widgets_of_a_range_scan(screen: Screen, tmp_path: Path, part: int) -> None:
     views = sphere_view((0.3, 0, 4)), sphere_view((3, -1, 4), name="right")
     formats.write(tmp_path / "rig.exr", merge(views), views)
     with running_app(screen, tmp_path, tmp_path / "rig.exr") as app:
-        check(app, app.walk(), 100)
+        check(app, app.walk(part=(part, PARTS)), 20)
 
 
 @pytest.mark.slow
@@ -84,9 +91,10 @@ def test_all_widgets_while_no_frame_is_there(screen: Screen, tmp_path: Path, bal
 
 
 @pytest.mark.slow
-def test_all_widgets_in_large_text(screen: Screen, tmp_path: Path, ball: Path) -> None:
+@in_parts
+def test_all_widgets_in_large_text(screen: Screen, tmp_path: Path, ball: Path, part: int) -> None:
     folder = tmp_path / "config" / "scan4d"
     folder.mkdir(parents=True)
     (folder / "settings.json").write_text(json.dumps({"format": 1, "text_scale": 2.0}))
     with running_app(screen, tmp_path, ball) as app:
-        check(app, app.walk(), 80)
+        check(app, app.walk(part=(part, PARTS)), 20)

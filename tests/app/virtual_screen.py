@@ -14,11 +14,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
@@ -36,6 +36,16 @@ import glfw, sys
 glfw.init()
 glfw.window_hint(glfw.VISIBLE, False)
 sys.stdout.buffer.write(glfw.get_clipboard_string(glfw.create_window(8, 8, "", None, None)))
+"""
+
+_SLOW_PICTURES = """
+import time
+from viewer.app.window import Window
+end = Window.end
+def end_late(self):
+    time.sleep({})
+    end(self)
+Window.end = end_late
 """
 
 Found = TypeVar("Found")
@@ -124,7 +134,7 @@ class RunningApp:
     """The app as a process of its own. It tells what it shows by states, one after each turn of its loop."""
 
     def __init__(self, screen: Screen, process: subprocess.Popen[bytes], states: int, log: Path) -> None:
-        self.screen, self.process = screen, process
+        self.screen, self.process, self.folder = screen, process, log.parent
         self.states: list[State] = []
         self.notes: list[str] = []  # all that it has told its user
         self._log = log
@@ -181,43 +191,56 @@ class RunningApp:
 
         return self._wait(find, pattern)
 
+    def take_in(self) -> State:
+        """Wait until all events so far were taken in, whatever goes on; the state then."""
+        return self._ask()
+
     def settle(self) -> State:
         """Wait until all events so far were taken in, and nothing goes on any longer."""
-        self._ask()
+        self.take_in()
         return self.see(lambda state: state.is_idle)
 
-    def drag(self, *places: tuple[float, float]) -> State:
-        """Press the left button at the first place of the screen, go from place to place, let go at the last.
+    def do(self, *commands: Sequence[object]) -> None:
+        """Command lines of xdotool, each of which the window takes in before the next begins.
 
-        Each is taken in before the next: a window that is slow would see several as one.
+        A window that is slow would see several as one.
         """
-        for number, (x, y) in enumerate(places):
-            self.screen.do("mousemove", round(x), round(y))
-            self._ask()
-            if number == 0:
-                self.screen.do("mousedown", 1)
-                self._ask()
-        self.screen.do("mouseup", 1)
+        for number, command in enumerate(commands):
+            if number > 0:
+                self.take_in()
+            self.screen.do(*command)
+
+    def drag(self, *places: tuple[float, float], button: int = 1) -> State:
+        """Press a button at the first place of the screen, go from place to place, let go at the last."""
+        start, *moves = [("mousemove", round(x), round(y)) for x, y in places]
+        self.do(start, ("mousedown", button), *moves, ("mouseup", button))
         return self.settle()
 
-    def act(self, window: str, *actions: tuple[object, ...]) -> None:
+    def act(self, window: str, *actions: tuple[object, ...], ends: bool = False) -> None:
         """Act on a window's widgets by their names, when all events so far were taken in.
 
         window: its name; a part of it that scrolls by itself has its own below that. actions: methods of
         TestContext of ImGui's test engine and their arguments, as ("item_click", "Time each pass"). Sections
-        of the panel are opened before.
+        of the panel are opened before. ends: whether the app ends by that, which is not waited for.
         """
         if window == PANEL:
             actions = (("item_open_all", ""), *actions)
+        if ends:
+            self._send(window, *actions)
+            return
         problem = self._ask(window, *actions).problem
         assert not problem, f"{window}: {actions}: {problem}"
 
-    def walk(self, windows: Collection[str] = (), *, presses: bool = True) -> Report:
+    def walk(
+        self, windows: Collection[str] = (), *, presses: bool = True, part: tuple[int, int] = (0, 1)
+    ) -> Report:
         """Go through the widgets of these windows, or of all, and through what they open (see walking.py).
 
         Those that end or hide the window are only hovered. presses: whether to drag and click the others.
+        part: its number, and how many there are that share the widgets.
         """
-        self._send("toolbar", ("walk", list(windows), presses, ["quit", "full_screen", "panels"]))
+        skipped = ["quit", "full_screen", "panels"]
+        self._send("toolbar", ("walk", list(windows), presses, skipped, part))
         end = self._wait(
             lambda: self.state if self.state.answered == self._asked else None, "a walk", math.inf
         )
@@ -308,7 +331,36 @@ class RunningApp:
 
 def kept_of(home: Path, scan: object) -> SavedSession:
     """What is kept of a scan for the next start, in the home that `running_app` was given."""
-    return SavedSession.load(home / "config" / "scan4d" / "scans" / kept_file(str(scan)).name)
+    return SavedSession.load(_kept_path(home, scan))
+
+
+def _kept_path(home: Path, scan: object) -> Path:
+    return home / "config" / "scan4d" / "scans" / kept_file(str(scan)).name
+
+
+def wait_until(holds: Callable[[], object]) -> None:
+    """Wait for what no state of the app says, such as a file."""
+    end = time.monotonic() + PATIENCE
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def wait_until_kept(home: Path, scan: object, state: State) -> None:
+    """Wait until what this state shows is kept of a scan for the next start."""
+
+    def is_kept() -> bool:
+        if not _kept_path(home, scan).exists():
+            return False
+        kept: dict[str, Any] = json.loads(json.dumps(kept_of(home, scan).to_json()))
+        return kept["document"] == state.document
+
+    wait_until(is_kept)
+
+
+def slow_pictures(seconds: float) -> str:
+    """Python for `running_app`: the window takes at least so long over each picture."""
+    return f"exec({_SLOW_PICTURES.format(seconds)!r}); "
 
 
 @contextmanager

@@ -30,12 +30,16 @@ class Walk:
         windows: Collection[str] = (),
         presses: bool = True,
         skipped: Collection[str] = (),
+        part: tuple[int, int] = (0, 1),
     ) -> None:
         """windows: the names of those that it begins with; none: all. presses: whether each widget is dragged
-        and clicked as well. skipped: the names after "###" of those that are only hovered."""
+        and clicked as well. skipped: the names after "###" of those that are only hovered. part: its number
+        and how many there are: each takes its share of the widgets that are there at first, and all that
+        these bring."""
         self._seen: dict[int, str] = {}
         self._problems: list[str] = []
-        self._windows, self._presses, self._skipped = windows, presses, skipped
+        self._windows, self._presses, self._skipped, self._part = windows, presses, skipped, part
+        self._of_other_parts: set[int] = set()
         self._context = context
         self._ui = imgui.get_current_context()
         self._opened: dict[Path, int] = {}  # the popup that each opens
@@ -46,6 +50,9 @@ class Walk:
         before = [getattr(style, name) for name in _DELAYS]
         for name in _DELAYS:
             setattr(style, name, 0.0)  # a frame on a widget is as long as any rest
+        number, count = self._part
+        there = [item for item in self._reachable(self._windows)] if count > 1 else []
+        self._of_other_parts = {item for place, item in enumerate(there) if place % count != number}
         self._go_through(())
         for name, delay in zip(_DELAYS, before, strict=True):
             setattr(style, name, delay)
@@ -74,7 +81,7 @@ class Walk:
         found = []
         self._context.yield_(2)  # in which a popup that was opened appears
         for item in self._reachable(() if path else self._windows):
-            if item not in self._seen:
+            if item not in self._seen and item not in self._of_other_parts:
                 words = self._seen[item] = self._words(item)
                 alike = sum(other == words for other in self._seen.values())
                 if alike <= _MOST_ALIKE or words.endswith(": "):

@@ -6,6 +6,7 @@ import csv
 import json
 import math
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -264,10 +265,16 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
 
 @pytest.mark.parametrize(
     "words",
-    [("--numbers", "numbers.csv"), ("--repeats", "repeats.csv"), ("--plot", "a.svg")],
+    [("--numbers", "n.csv"), ("--repeats", "r.csv"), ("--plot", "a.svg"), ("--against", "way")],
 )
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
     assert done.code == 2
-    assert f"{words[0]}: is of measures, and there are none. Tell them by --measures" in done.err
+    assert f"{words[0]}: is of measures, and there are none. Name them by --measures" in done.err
+    assert not Path("out.csv").exists()
+
+
+def test_smoothing_without_measures_or_speeds_is_refused(refused: Callable[..., str]) -> None:
+    words = ("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", "--smoothing", "0.5")
+    assert "--smoothing: smooths nothing that is asked for. Use it with --measures" in refused(*words)
     assert not Path("out.csv").exists()

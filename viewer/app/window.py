@@ -83,8 +83,9 @@ class Window(GlfwWindow):
         self._is_alt_alone = self._was_alt = False  # pressed without anything else; and released so
         self._frames_due = _SETTLE_FRAMES
         self._tooltips_at: float | None = None
-        self._began = 0.0  # when the last frame began, by the clock
-        self._took: deque[float] = deque(maxlen=2)  # seconds of the last frames
+        self._began = time.monotonic()  # when the last frame did
+        self._waited = 0.0  # seconds of sleep since
+        self._took: deque[float] = deque(maxlen=2)  # seconds from one frame to the next, without sleep
         self._start_imgui()
         self._take_events()
 
@@ -206,6 +207,7 @@ class Window(GlfwWindow):
         if self.due or seconds <= 0:
             seconds = 0.0
         self._handle_events(seconds)
+        self._waited += time.monotonic() - start
         late = max(0.0, time.monotonic() - start - seconds)
         if self._tooltips_at is not None and time.monotonic() >= self._tooltips_at:
             self._tooltips_at = None
@@ -223,7 +225,9 @@ class Window(GlfwWindow):
 
     def begin(self) -> None:
         """Begin a frame: widgets may be declared from here on."""
-        self._began = time.monotonic()
+        now = time.monotonic()
+        self._took.append(now - self._began - self._waited)
+        self._began, self._waited = now, 0.0
         if imgui.get_current_context().within_frame_scope:  # the one before did not come to its end
             imgui.end_frame()
         self._set_scale()
@@ -255,7 +259,6 @@ class Window(GlfwWindow):
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
         gl.reverse_depth()
         glfw.swap_buffers(self._window)
-        self._took.append(time.monotonic() - self._began)
 
     def fill(self, color: int) -> None:
         """Paint all of it. color: 0xRRGGBB."""

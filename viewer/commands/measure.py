@@ -252,7 +252,7 @@ def _outputs(args: Namespace) -> list[Path]:
     is_of_speeds = args.order != ORDERS[0]
     lacking = [flag for flag in asked if flag != "--plot" or not is_of_speeds]
     if lacking and args.measures is None:
-        raise InputError("is of measures, and there are none", lacking[0], "Tell them by --measures")
+        raise InputError("is of measures, and there are none", lacking[0], "Name them by --measures")
     if args.traced is not None and not is_of_speeds:
         raise InputError("is of speeds, and none are asked for", "--traced", "Add --order speed")
     if args.against is not None and args.measures is None:
@@ -290,7 +290,7 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
         if name is not None and name not in names:
             raise unknown_name("measure", name, names)
     if args.against is not None and len(kept) == 1:
-        raise InputError("nothing goes against the only measure", "--against", "Tell others by --measures")
+        raise InputError("nothing goes against the only measure", "--against", "Name others by --measures")
     return kept
 
 
