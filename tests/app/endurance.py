@@ -43,7 +43,13 @@ def playing_app(folder: Path) -> Iterator[RunningApp]:
 
 
 def endure(app: RunningApp, seconds: float) -> Iterator[tuple[float, int]]:
-    """After each round of playing and scrubbing, of about ten seconds: when it ended, and `own_megabytes`."""
+    """After each round of playing and scrubbing, of about ten seconds: when it ended, and `own_megabytes`.
+
+    All frames are shown before, so that the cache is full.
+    """
+    app.screen.do("key", "e", "key", "space")
+    app.see(lambda _: set(app.frames()) == set(range(FRAMES)))
+    app.screen.do("key", "space", "key", "e")
     start = time.monotonic()
     for round_ in itertools.count():
         _play(app, seconds=2.5)
@@ -108,7 +114,7 @@ if __name__ == "__main__":
         for seconds, megabytes in endure(app, float(sys.argv[1])):
             sizes.append(megabytes)
             print(f"{seconds:.0f} s: {megabytes} MB", flush=True)
-        full = sizes[len(sizes) // 10 :]  # once the cache is
-        first, last = median(full[: len(full) // 2]), median(full[len(full) // 2 :])
+        half = len(sizes) // 2
+        first, last = median(sizes[:half]), median(sizes[half:])
         print(f"first half {first} MB, second half {last} MB: {last / first - 1:+.1%}")
         print("\n".join(problems(before, sizes) + trouble(app)) or "no trouble")

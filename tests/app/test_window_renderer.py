@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scenes import sphere
-from virtual_screen import PANEL, RunningApp, Screen, running_app
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app
 
 from viewer.backends import backends
 from viewer.scan import formats
@@ -53,7 +53,7 @@ def test_a_renderer_is_chosen_for_one_scan_unless_the_user_says_for_all(
         assert go_to(app, smooth, "Next") == "points"
         assert go_to(app, bare, "Next") == own, "which was open before"
         screen.do("key", "ctrl+q")
-        app.process.wait(60)
+        app.process.wait(PATIENCE)
     fourth = tmp_path / "d.npz"
     formats.write(fourth, ball)
     with running_app(screen, tmp_path / "second", fourth, home=home) as app:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_window_changes import points
-from virtual_screen import RunningApp, kept_of, running_app, virtual_screen, wait_until_kept
+from virtual_screen import PATIENCE, RunningApp, kept_of, running_app, virtual_screen, wait_until_kept
 
 from viewer.document.saved_session import SavedSession
 
@@ -43,9 +43,9 @@ def test_what_is_made_in_two_windows_is_kept_of_both(tmp_path: Path) -> None:
         add_bookmark(one, 2, 40)
         one.told(CHANGED)
         first.do("key", "ctrl+q")
-        assert one.process.wait(60) == 0
+        assert one.process.wait(PATIENCE) == 0
         second.do("key", "ctrl+q")
-        assert two.process.wait(60) == 0
+        assert two.process.wait(PATIENCE) == 0
         for log in (one.log(), two.log()):
             assert CHANGED in log
             assert "Traceback" not in log
