@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,6 +126,21 @@ def test_a_preview_is_drawn_in_full_at_rest_and_on_demand(viewport: Viewport) ->
     viewport.finish()
     for before, after in zip(full, shown(viewport), strict=True):
         np.testing.assert_array_equal(after, before)
+
+
+def test_the_time_that_showing_a_picture_takes_is_no_rest(
+    viewport: Viewport, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = 0.0
+    monkeypatch.setattr(viewport_module, "time", SimpleNamespace(monotonic=lambda: now))
+    for seconds, is_preview in ((1.0, True), (0.0, True), (-1.0, False)):
+        viewport.draw(REQUEST)
+        now += max(seconds, 0.0)
+        viewport.took(1000.0, goal_ms=10.0)
+        now += max(-seconds, 0.0)
+        viewport.draw(turned(REQUEST))
+        assert viewport.is_preview is is_preview, f"shown for {seconds} s"
+        now += 1.0
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ class Motion:
         self.ends = now + REST if held or now < self._shown + REST else -math.inf
 
     def show(self, now: float) -> None:
-        """The picture that was asked for is there. What it took is not rest."""
+        """The picture that was asked for is there, or the window shows it. What that took is not rest."""
         self._shown = now
         if self.ends > -math.inf:
             self.ends = now + REST

@@ -244,6 +244,7 @@ class Viewport:
 
     def took(self, ms: float, goal_ms: float) -> None:
         """Say how long the window took to show what was drawn last, and how long it may take."""
+        self._motion.show(time.monotonic())
         surface, request = self.surface, self.request
         if self.problem is not None or surface is None or request is None or "draw" in surface.stats.skipped:
             return
