@@ -266,8 +266,8 @@ class RunningApp:
         with self._came:
             while (found := find()) is None:
                 seconds = deadline - time.monotonic()
-                assert self._reader.is_alive(), f"the app has ended without {wanted}:\n{self.log()}"
-                assert seconds > 0, f"no {wanted} in time:\n{self.states[-1:]}\n{self.log()}"
+                assert self._reader.is_alive(), f"the app has ended without {wanted}:\n{self.log()[-5000:]}"
+                assert seconds > 0, f"no {wanted} in time:\n{self.states[-1:]}\n{self.log()[-5000:]}"
                 self._came.wait(min(seconds, PATIENCE))
             return found
 
