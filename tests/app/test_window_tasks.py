@@ -72,6 +72,10 @@ def test_opening_is_cancelled_replaced_and_done(app: RunningApp, folder: Path) -
     app.screen.do("key", "p")
     assert Path(app.told(r"Saved (.+)")[1]).exists(), "the scan before is still there"
 
+    held.unlink()
+    app.screen.do("key", "Prior")  # to the first one, from the one that was cancelled
+    app.settle()
+    held.touch()
     app.screen.do("key", "Next", "key", "Next")  # the second instead of the first
     app.see(lambda state: "Opening 2_bare.npz" in state.works)
     held.unlink()
