@@ -74,11 +74,11 @@ def read_measurement(path: Path) -> measurement.Measurement:
 def tables(measurements: Sequence[measurement.Measurement]) -> dict[str, str]:
     """The part of the page: "choices", a line for each bound on one machine."""
     head = [
-        "bound",
+        "limit",
         "views",
-        "some way keeps it",
-        "kept, %",
-        "as good as the best within 1.2, %",
+        "possible",
+        "met, %",
+        "at most 1.2 times the best, %",
         "median ratio",
     ]
     lines = []
@@ -88,4 +88,4 @@ def tables(measurements: Sequence[measurement.Measurement]) -> dict[str, str]:
         ratio = "" if row["ratio"] is None else three_digits(row["ratio"])
         shares = [f"{kept:.1f}", f"{near:.1f}"] if row["kept"] else ["", ""]
         lines.append([row["goal"], str(row["views"]), str(row["possible"]), *shares, ratio])
-    return {"choices": markdown_table(head, lines, left=("bound",))}
+    return {"choices": markdown_table(head, lines, left=("limit",))}

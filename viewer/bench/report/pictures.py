@@ -19,7 +19,7 @@ PANELS = (
     "backend",
     "signed depth difference in pixel footprints (holes magenta, spill yellow)",
     "angle between the normals",
-    "difference of colour, the largest of the channels",
+    "largest colour difference of the channels",
 )
 
 Image = NDArray[np.uint8]  # (H, W, 3)

@@ -89,20 +89,25 @@ class Metric:
 
 COSTS = [
     Metric("gpu_ms", "ms", "time of one picture on the GPU, median over the views"),
-    Metric("cpu_ms", "ms", "time of the call that draws one picture, median over the views"),
+    Metric("cpu_ms", "ms", "wall time of the call that draws one picture, median over the views"),
     Metric("busy_ms", "ms", "processor time of all threads for that call, median over the views"),
     Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
-    Metric("derive_ms", "ms", "data derived from a pose on the CPU"),
-    Metric("upload_ms", "ms", "a pose and its derived data brought to the GPU"),
-    Metric("bytes_gpu", "bytes", "what lies on the GPU for one pose and its picture"),
-    Metric("peak_rss", "bytes", "the most memory that the process held"),
+    Metric("derive_ms", "ms", "time to derive data from a pose on the CPU"),
+    Metric("upload_ms", "ms", "time to upload a pose and its derived data to the GPU"),
+    Metric("bytes_gpu", "bytes", "memory on the GPU for one pose and its picture"),
+    Metric("peak_rss", "bytes", "peak memory of the process"),
 ]
 _ERRORS = [
-    Metric("hole_percent", "%", "true silhouette that is left empty"),
-    Metric("through_percent", "%", "true silhouette where a farther sheet shows through"),
-    Metric("closed_percent", "%", "true silhouette that is neither empty nor seen through", "high"),
-    Metric("hole_scanned_percent", "%", "what is seen and was scanned that is left empty"),
-    Metric("spill_percent", "%", "covered pixels outside the true silhouette, in parts of it"),
+    Metric("hole_percent", "%", "empty share of the true silhouette"),
+    Metric("through_percent", "%", "share of the true silhouette that shows a farther layer"),
+    Metric(
+        "closed_percent",
+        "%",
+        "share of the true silhouette that is neither empty nor shows a farther layer",
+        "high",
+    ),
+    Metric("hole_scanned_percent", "%", "empty share of the visible, scanned surface"),
+    Metric("spill_percent", "%", "covered pixels outside the true silhouette, relative to its area"),
     Metric("spill_p95", "px", "distance of such pixels to the true silhouette, 95th percentile"),
     Metric("boundary_mean", "px", "distance between drawn and true outline, mean"),
     Metric("boundary_p95", "px", "distance between drawn and true outline, 95th percentile"),
@@ -116,7 +121,7 @@ _ERRORS = [
             ("p95", "95th percentile of the size of the depth error", "low"),
         )
     ),
-    Metric("wrong_layer_percent", "%", "pixels more than four point spacings off in depth"),
+    Metric("wrong_layer_percent", "%", "share of the pixels more than four point spacings off in depth"),
     *(
         Metric(f"normal{suffix}_{name}", "°", f"angle to the true normal, {text}{sign}")
         for suffix, sign in (("", ", sign ignored"), ("_signed", ""))
@@ -128,18 +133,18 @@ _ERRORS = [
         for name, unit, text, best in (
             ("psnr", "dB", "peak signal-to-noise ratio of the shaded picture", "high"),
             ("ssim", "", "structural similarity of the shaded picture, 1 is equal", "high"),
-            ("flip", "", "difference that an eye sees when pictures alternate, 0 to 1", "low"),
+            ("flip", "", "visible difference when pictures alternate, 0 to 1", "low"),
         )
     ),
     Metric(
-        "psnr_scanned", "dB", "PSNR of the shaded picture where the scan has measured what is seen", "high"
+        "psnr_scanned", "dB", "PSNR of the shaded picture where the scan measured the visible surface", "high"
     ),
-    Metric("false_positives", "points", "points found visible that are hidden"),
-    Metric("false_negatives", "points", "points found hidden that are visible"),
-    Metric("correct", "points", "points whose visibility was found right", "high"),
-    Metric("visibility_error_percent", "%", "false positives and negatives, in parts of the correct"),
+    Metric("false_positives", "points", "hidden points found visible"),
+    Metric("false_negatives", "points", "visible points found hidden"),
+    Metric("correct", "points", "points with the right visibility", "high"),
+    Metric("visibility_error_percent", "%", "false positives and negatives, relative to the correct points"),
     *(
-        Metric(f"flicker_{kind}_{name}", unit, f"change of {text} {between} that the truth has not", "zero")
+        Metric(f"flicker_{kind}_{name}", unit, f"change of {text} {between} beyond that of the truth", "zero")
         for kind, between in (("orbit", "along a camera orbit"), ("pose", "from pose to pose"))
         for name, unit, text in (("color", "", "colour"), ("normal", "°", "normal"))
     ),
