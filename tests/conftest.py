@@ -18,10 +18,10 @@ from hypothesis import HealthCheck, settings
 
 from viewer import cli
 from viewer.backends import backends
-from viewer.backends.surfels import lists
 from viewer.camera import Camera
 from viewer.look import Look
 from viewer.scan.pose import Pose, Scanned
+from viewer.splatting import lists
 
 if TYPE_CHECKING:
     from viewer.backends import Backend

@@ -12,11 +12,11 @@ from scipy.spatial import cKDTree
 from viewer.backends import Backend, FrameView
 from viewer.camera import Camera
 from viewer.gpu import gl
-from viewer.gpu.amplify import Points
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
+from viewer.splatting.amplify import Points
 from viewer.srgb import roots_from_bytes
 from viewer.view import View
 

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from viewer.backends import Backend, backends
 from viewer.camera import Camera
-from viewer.gpu.amplify import FEEDS
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting.amplify import FEEDS
 from viewer.view import View
 
 NOTHING = 0xFFFFFFFF

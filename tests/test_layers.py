@@ -23,6 +23,7 @@ LAYERS = (
     {"scan"},
     {"mesh", "codewords"},
     {"simulate", "gpu"},
+    {"splatting"},
     {"backends"},
     {"renderer", "frame", "timing", "choice"},
     {"analysis"},

@@ -85,7 +85,7 @@ def test_what_fails_because_of_a_mutant_kills_it(
     [
         ("viewer/analysis/curves.py", "tests/analysis/test_curves.py"),
         ("viewer/scan/formats/npz.py", "tests/scan/formats/test_npz.py"),
-        ("viewer/gpu/culling.py", "tests/gpu/test_culling.py"),
+        ("viewer/splatting/culling.py", "tests/gpu/test_culling.py"),
         ("shaders/chunks/cull.comp", "tests/gpu/test_culling.py"),
     ],
 )

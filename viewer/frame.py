@@ -13,7 +13,7 @@ from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
 from .gpu.context import Gpu
-from .gpu.kept import Before
+from .gpu.frame_view import Before
 from .gpu.mean import PictureMean
 from .gpu.pose import GpuPose, drawn_bounds
 from .gpu.shade import shade

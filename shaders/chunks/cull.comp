@@ -1,4 +1,4 @@
-// Which chunks of points the picture may show (viewer/gpu/culling.py). A chunk is hidden where all that it can cover has
+// Which chunks of points the picture may show (viewer/splatting/culling.py). A chunk is hidden where all that it can cover has
 // nearer depths already, from the points that were drawn before: what is seen is 0 of chunks that no picture showed.
 // STEP 0: finds those in view that are drawn first. 1: finds out of all whether this picture may show them, and those that
 // it may and that were not drawn first. 2: finds all that this one may show. LISTS: these are listed.

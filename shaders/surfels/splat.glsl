@@ -2,7 +2,7 @@
 #include "common/view.glsl"
 #include "common/tangent.glsl"
 #include "amplify/point.glsl"
-// backends/surfels/splats.py.
+// splatting/splats.py.
 #include <params>
 
 // Scan units. Below the least one a splat can fall between pixel centres, and a far scan would flicker away.

@@ -21,9 +21,9 @@ from test_instancing import (
 )
 
 from viewer.camera import Camera
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.scan.points import PointCloud
+from viewer.splatting.amplify import FEEDS
 from viewer.view import View
 
 pytestmark = pytest.mark.backend("surfels")

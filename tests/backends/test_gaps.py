@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from scenes import rarely, sphere
 
 from viewer.backends import backend
-from viewer.backends.surfels.gaps import GapRadii
 from viewer.bench import metrics
 from viewer.bench.judge import Judge
 from viewer.bench.scenes import catalog
@@ -27,6 +26,7 @@ from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting.gaps import GapRadii
 
 pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]

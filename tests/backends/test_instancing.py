@@ -14,17 +14,17 @@ from scenes import BUFFERS, NOTHING, rarely, sphere
 
 from viewer.backends import backend
 from viewer.backends import surfels as surfels_backend
-from viewer.backends.surfels import tiles
-from viewer.backends.surfels.lists import TileLists
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu import gl
-from viewer.gpu.amplify import FEEDS, Points
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting import tiles
+from viewer.splatting.amplify import FEEDS, Points
+from viewer.splatting.lists import TileLists
 from viewer.view import View
 
 pytestmark = pytest.mark.backend("surfels")

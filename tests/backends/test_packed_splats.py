@@ -13,12 +13,12 @@ from scenes import NOTHING
 from test_elliptical import ELLIPSES
 from test_instancing import CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
 
-from viewer.backends.surfels.packed import WAYS
-from viewer.backends.surfels.packed import draw_splats as draw_all
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.scan.points import PointCloud
+from viewer.splatting.packed import WAYS
+from viewer.splatting.packed import draw_splats as draw_all
 
 # As the surfels backend draws them, which makes none smaller.
 draw_splats = partial(draw_all, refine=False)

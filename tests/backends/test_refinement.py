@@ -13,7 +13,6 @@ from packed import Packed
 from scenes import NOTHING, looking_down_z, rarely, sphere
 from test_instancing import CAMERAS, CLOUD, assert_agree, assert_equal
 
-from viewer.backends.surfels.packed import WAYS, _ByRow, draw_splats
 from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
@@ -22,6 +21,7 @@ from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
+from viewer.splatting.packed import WAYS, _ByRow, draw_splats
 
 Draw = Callable[..., Surface]
 SIZE = (320, 240)

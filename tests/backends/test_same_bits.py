@@ -12,11 +12,11 @@ from scenes import BUFFERS, sphere
 from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting.amplify import FEEDS
 
 FEED = "instancing"  # the parameter is called alike wherever there are feeds
 SIZE = (160, 120)

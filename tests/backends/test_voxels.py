@@ -20,7 +20,6 @@ from viewer.backends.voxels import Params
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.mesh.reference import trace
@@ -28,6 +27,7 @@ from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.spacing import typical_spacing
+from viewer.splatting.amplify import FEEDS
 
 pytestmark = pytest.mark.backend("voxels")
 Draw = Callable[..., Surface]

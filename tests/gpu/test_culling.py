@@ -13,12 +13,13 @@ from scenes import rarely
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu import chunks, culling
+from viewer.gpu import chunks
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting import culling
 
 COUNT, SIZE = 60_000, (120, 80)
 MIDDLE = np.array([1e6, 0, -1e6])

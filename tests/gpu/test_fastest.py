@@ -15,13 +15,13 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.errors import Scan4DError
 from viewer.frame import Request, render_frame
-from viewer.gpu import fastest as module
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.context import headless
-from viewer.gpu.fastest import fastest
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
+from viewer.splatting import fastest as module
+from viewer.splatting.amplify import FEEDS
+from viewer.splatting.fastest import fastest
 
 NAMES = ("slow", "quick", "broken")
 

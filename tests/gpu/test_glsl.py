@@ -26,13 +26,11 @@ from test_pyramid import FILTERS, chain, picture
 from test_range_samples import held, probe, seen_by, stepped_view
 
 from viewer.backends import Backend, backend, backends
-from viewer.backends.surfels.packed import WAYS, draw_splats
 from viewer.bench import baselines
 from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame, supersample
 from viewer.gpu import chunks
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
 from viewer.gpu.present import Presenter
@@ -45,6 +43,8 @@ from viewer.renderer import Renderer
 from viewer.resources import resource_path
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting.amplify import FEEDS
+from viewer.splatting.packed import WAYS, draw_splats
 
 TESTS_OWN = str(Path(__file__).resolve().parents[1])  # where tests have shaders of their own
 SIZE = (96, 64)

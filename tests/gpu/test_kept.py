@@ -12,12 +12,12 @@ from scenes import NOTHING, sphere
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.kept import ClosedGaps, KeptPoints, stride_of
-from viewer.gpu.squares import _STEP, _reach
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting.kept import ClosedGaps, KeptPoints, stride_of
+from viewer.splatting.squares import _STEP, _reach
 
 SIZE = (120, 80)
 SHARE = 0.2

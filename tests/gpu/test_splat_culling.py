@@ -16,13 +16,14 @@ from hypothesis import strategies as st
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu import chunks, culling, gl, splat_culling
-from viewer.gpu.amplify import Points
+from viewer.gpu import chunks, gl
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting import culling, splat_culling
+from viewer.splatting.amplify import Points
 from viewer.view import View
 
 SIZE = (120, 80)

@@ -11,7 +11,7 @@ from scenes import DRAWS_POINTS, NOTHING, rarely, sphere
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
-from viewer.gpu import gl, squares
+from viewer.gpu import gl
 from viewer.gpu.context import headless
 from viewer.gpu.surface import Surface
 from viewer.look import Look, color_table
@@ -19,6 +19,7 @@ from viewer.renderer import Renderer
 from viewer.scan.estimate import fake_color
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting import squares
 
 Draw = Callable[..., Surface]
 CLOUD = sphere(3000)

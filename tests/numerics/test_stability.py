@@ -18,10 +18,10 @@ from viewer.bench.shots import RgbdImage, picture
 from viewer.bench.stability import Difference, Row, difference
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
+from viewer.splatting.amplify import FEEDS
 
 ROWS = list(rows())
 MOST = 7  # principles that keep rows from holding

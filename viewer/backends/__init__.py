@@ -20,7 +20,8 @@ from typing import Any, NamedTuple, Protocol
 
 from ..errors import InputError, unknown_name
 from ..gpu.context import Gpu
-from ..gpu.kept import Before
+from ..gpu.frame_view import CHANGES as CHANGES
+from ..gpu.frame_view import FrameView
 from ..gpu.pose import GpuPose
 from ..gpu.surface import Surface
 from ..look import COLOR_BY, ValueKind
@@ -31,7 +32,6 @@ from ..view import View
 ROWS = ("points", "octants", "samples")
 SHARES = (0.5, 0.25, 0.1)  # levels of detail that the automatic choice may take
 _MANY = 200_000  # least number of points of a scan for these levels
-CHANGES = ("pose", "camera", "parameters", "size", "values")  # what can differ from the last picture
 
 
 class Suited(NamedTuple):
@@ -101,30 +101,6 @@ class Derived(Protocol):
 
     def release(self) -> None:
         """Delete it."""
-
-
-@dataclass(frozen=True, eq=False)
-class FrameView:
-    """Order for one frame, as a backend gets it: a view, its own parameters, and its derived data.
-
-    share: share of the points to draw, less than 1 while the picture moves and all points take too long.
-    A backend that leaves points out returns True and counts them (`Points.of` does). A fast backend may draw
-    all points. budget_ms: time after which a backend draws something coarser, if it can, and returns True;
-    None: no limit. changed: the members of `CHANGES` that differ from the last call for this surface; all of
-    them in the first call and after a failed one. "values" stands for the results of `Surface.row_values` and
-    `Surface.resolve`. moving: whether other pictures follow at once. A backend that then draws something
-    simpler sets `surface.stats.simplified`; it is called again at rest. before: the last picture of this pose
-    with these parameters; a moving picture of a share may draw its points again (gpu/kept.py).
-    """
-
-    view: View
-    params: Any
-    derived: Any = None
-    share: float = 1.0
-    budget_ms: float | None = None
-    changed: frozenset[str] = frozenset(CHANGES)
-    moving: bool = False
-    before: Before | None = None
 
 
 class Derives(Enum):

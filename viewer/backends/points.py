@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..gpu.pose import GpuPose
-from ..gpu.squares import LARGEST_SQUARE, draw_squares
 from ..gpu.surface import Surface
 from ..params import param
 from ..scan.pose import Pose
+from ..splatting.squares import LARGEST_SQUARE, draw_squares
 from . import Backend, FrameView, Suited, share_param, with_levels
 from .hpr import mark_visible
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..backends import Backend, Limit
-from ..gpu.amplify import FEEDS
 from ..renderer import Renderer
+from ..splatting.amplify import FEEDS
 from .rounding import IN_SOFTWARE, Rounding
 from .shots import PointView, RgbdImage, picture
 

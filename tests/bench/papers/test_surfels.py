@@ -16,11 +16,11 @@ from viewer.bench.run import BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.amplify import FEEDS
 from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
+from viewer.splatting.amplify import FEEDS
 
 COUNTS = {
     "baseball": 88_315,

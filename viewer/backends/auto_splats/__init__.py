@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...gpu.amplify import Points
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
 from ...scan.pose import Pose
+from ...splatting.amplify import Points
+from ...splatting.packed import WAYS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
-from ..surfels.packed import WAYS, draw_depths, draw_splats
 from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .values import VALUES, give_value

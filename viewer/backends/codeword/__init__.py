@@ -17,7 +17,6 @@ from ...codewords import settings
 from ...codewords.lighting import Materials
 from ...codewords.settings import uniform_radius, word_look, words_of
 from ...codewords.stream import WordStream
-from ...gpu.amplify import Points
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
@@ -26,6 +25,7 @@ from ...params import param
 from ...scan.layers import Layers
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
+from ...splatting.amplify import Points
 from .. import Backend, FrameView, Limit, Suited
 from .encoder import encode_points
 from .engine import Sheet, WordBuffers, draw_bands

@@ -21,12 +21,12 @@ from ...codewords.tables import Steps, shape_table
 from ...codewords.words import DEPTHS
 from ...errors import InputError
 from ...gpu import gl
-from ...gpu.amplify import Points
 from ...gpu.bindings import Storage, Texture
 from ...gpu.blocks import Vec4
 from ...gpu.compact import prefix_sums
 from ...gpu.constants import LEAST_RADIUS, NOTHING
 from ...gpu.context import Gpu
+from ...splatting.amplify import Points
 from ...view import View
 from .engine import Sheet, WordBuffers
 

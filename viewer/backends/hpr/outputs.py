@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from ...gpu.amplify import Points
 from ...gpu.pose import GpuPose
-from ...gpu.squares import draw_squares
 from ...gpu.surface import Surface
 from ...look import wants_normals
+from ...splatting.amplify import Points
+from ...splatting.packed import draw_splats, take_normals
+from ...splatting.squares import draw_squares
 from .. import FrameView
-from ..surfels.packed import draw_splats, take_normals
 from .calibration import EyeCalibration
 from .candidates import Candidates
 from .covering import Covering

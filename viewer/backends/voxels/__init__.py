@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu.amplify import Points
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...gpu.stats import Stats
@@ -25,9 +24,10 @@ from ...scan.octree.discs import usual_radius
 from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
+from ...splatting.amplify import Points
+from ...splatting.passes import blends
 from ...view import View
 from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, Backend, Derives, FrameView, Limit
-from ..surfels.passes import blends
 from .cubes import draw_cubes, shade_flat
 from .discs import WAYS, draw_discs
 

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...gpu import gl
-from ...gpu.amplify import FEEDS, Points, Shape, amplify
 from ...gpu.bindings import Texture
-from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
 from ...gpu.surface import Surface
+from ...splatting.amplify import FEEDS, Points, Shape, amplify
+from ...splatting.fastest import instancing_for
 
 CUBE = Shape("voxels/cube.glsl", corners=9)
 _FRAGMENT = "voxels/cube.frag"

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from ...gpu.amplify import FEEDS, Points, amplify
 from ...gpu.constants import LEAST_RADIUS
-from ...gpu.fastest import instancing_for
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
-from ..surfels.passes import tiled_two_passes, two_passes
-from ..surfels.splats import FRAGMENT, SURFEL, Splats
-from ..surfels.subpixel import average, splat_subpixel, subpixel_share
-from ..surfels.tiles import splat
+from ...splatting.amplify import FEEDS, Points, amplify
+from ...splatting.fastest import instancing_for
+from ...splatting.passes import tiled_two_passes, two_passes
+from ...splatting.splats import FRAGMENT, SURFEL, Splats
+from ...splatting.subpixel import average, splat_subpixel, subpixel_share
+from ...splatting.tiles import splat
 
 TILES = "tiles"
 WAYS = (TILES, *FEEDS)

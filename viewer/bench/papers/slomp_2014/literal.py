@@ -15,9 +15,7 @@ import moderngl
 import numpy as np
 
 from ....backends import Backend, FrameView
-from ....backends.surfels.splats import SURFEL, Splats
 from ....gpu import gl
-from ....gpu.amplify import FEEDS, Points, draw_shapes
 from ....gpu.bindings import Texture
 from ....gpu.constants import LEAST_RADIUS
 from ....gpu.context import Gpu
@@ -27,6 +25,8 @@ from ....params import param
 from ....scan.points import PointCloud
 from ....scan.pose import Pose
 from ....scan.spacing import typical_spacing
+from ....splatting.amplify import FEEDS, Points, draw_shapes
+from ....splatting.splats import SURFEL, Splats
 
 NAME = "surfels-2014"
 _ENLARGE, _FALLOFF = 2.0, 4.0

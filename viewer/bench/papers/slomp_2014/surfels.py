@@ -13,8 +13,8 @@ from functools import cache
 from typing import Any
 
 from ....backends import backend
-from ....gpu.amplify import FEEDS
 from ....resources import resource_path
+from ....splatting.amplify import FEEDS
 from ...baselines import FLOOR
 from ...plan import Contender, Group
 from . import literal

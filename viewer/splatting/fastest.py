@@ -18,12 +18,12 @@ from ..camera import Camera
 from ..errors import InputError, Scan4DError
 from ..files import whole_file
 from ..folders import cache_folder
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..view import View
-from .context import Gpu
-from .pose import GpuPose
-from .surface import Surface
 
 _TURNS = 3
 _TRIAL_POINTS, _TRIAL_SIZE = 100_000, (1920, 1280)

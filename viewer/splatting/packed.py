@@ -9,14 +9,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from ...gpu import gl
-from ...gpu.amplify import Points, amplify
-from ...gpu.bindings import Storage, Texture
-from ...gpu.constants import LEAST_RADIUS
-from ...gpu.context import Gpu
-from ...gpu.fastest import instancing_for
-from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.constants import LEAST_RADIUS
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
+from .amplify import Points, amplify
+from .fastest import instancing_for
 from .lists import TileLists
 from .passes import blend, blend_by_tiles
 from .splats import FRAGMENT, SURFEL, Splats

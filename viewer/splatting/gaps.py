@@ -19,15 +19,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
-from ...gpu.bins import Bins
-from ...gpu.compact import IndexList, list_flagged
-from ...gpu.constants import UNKNOWN
-from ...gpu.context import Gpu, Program
-from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits
-from ...scan.points import PointCloud
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.bins import Bins
+from ..gpu.compact import IndexList, list_flagged
+from ..gpu.constants import UNKNOWN
+from ..gpu.context import Gpu, Program
+from ..gpu.pose import GpuPose
+from ..gpu.scatter import Visits
+from ..scan.points import PointCloud
 
 _LEAST, _WANTED, _MOST = 4.0, 6.0, 9.0  # points that share a point's cell, itself included
 _TRIALS = 12  # of a size of cells

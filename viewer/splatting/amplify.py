@@ -10,13 +10,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ..gpu import gl
+from ..gpu.bindings import Texture, UniformBlock
+from ..gpu.blocks import Values
+from ..gpu.context import Program
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
 from ..scan.points import PointCloud
-from . import gl
-from .bindings import Texture, UniformBlock
-from .blocks import Values
-from .context import Program
-from .pose import GpuPose
-from .surface import Surface
 
 _STAGES = ("amplify/corner.vert",)
 # Feed -> the stages that bring points to a shape, and the part of them that fetches points.

@@ -17,13 +17,15 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.chunks import Chunks, chunk_size
+from ..gpu.compact import IndexList, list_flagged
+from ..gpu.context import Gpu, Program
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
 from ..view import View
-from . import gl
 from .amplify import ListedRows, Points
-from .bindings import Storage, Texture
-from .chunks import Chunks, chunk_size
-from .compact import IndexList, list_flagged
-from .context import Gpu, Program
 from .culling import (
     FACES_AWAY,
     FIND,
@@ -38,8 +40,6 @@ from .culling import (
     counts_of,
     find_farthest,
 )
-from .pose import GpuPose
-from .surface import Surface
 
 _CHUNKS, _CHUNK = 1 << 15, 1 << 5  # about as many, and points of one at least
 # Pixels by which what a chunk covers is larger where it is left out of the next picture at first: so many,

@@ -15,14 +15,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.chunks import Chunks
+from ..gpu.compact import IndexList
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.target import RenderTarget
 from ..view import View
-from . import gl
-from .bindings import Storage, Texture
-from .chunks import Chunks
-from .compact import IndexList
-from .context import Gpu
-from .pose import GpuPose
-from .target import RenderTarget
 
 _TILE = 16  # pixels along an edge, whose farthest depth hides chunks
 _MOST_TILES = 1024  # that are looked at for one chunk; one that is larger in the picture counts as shown

@@ -8,23 +8,14 @@ of all points, to the bit, once each was in its turn, but for gaps that are clos
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-from . import gl
-from .bindings import Texture
-from .compact import IndexList
-from .context import Gpu
-from .pose import GpuPose
-from .target import RenderTarget
+from ..gpu import gl
+from ..gpu.bindings import Texture
+from ..gpu.compact import IndexList
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..gpu.target import RenderTarget
 
 _RUN = 8  # pixels that an invocation of points/kept.comp looks at
-
-
-class Before(NamedTuple):
-    """A picture whose points are drawn again. known: see `Stats`."""
-
-    target: RenderTarget
-    known: float
 
 
 class ClosedGaps:

@@ -1,4 +1,4 @@
-"""Lists: which discs reach each tile of a picture, as surfels/tiles.py draws them."""
+"""Lists: which discs reach each tile of a picture, as splatting/tiles.py draws them."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import dataclass, replace
 import moderngl
 import numpy as np
 
-from ...gpu import gl
-from ...gpu.amplify import Points
-from ...gpu.bindings import Storage, Texture
-from ...gpu.bins import Bins
-from ...gpu.compact import scan_words
-from ...gpu.constants import NOTHING
-from ...gpu.context import Gpu, Program
-from ...gpu.scatter import Visits, take_items
-from ...gpu.surface import Surface
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.bins import Bins
+from ..gpu.compact import scan_words
+from ..gpu.constants import NOTHING
+from ..gpu.context import Gpu, Program
+from ..gpu.scatter import Visits, take_items
+from ..gpu.surface import Surface
+from .amplify import Points
 from .looks import looks_of
 from .splats import Splats
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from ...gpu.amplify import Points, Shape
-from ...gpu.context import Program
+from ..gpu.context import Program
+from .amplify import Points, Shape
 
 SURFEL = Shape("surfels/surfel.glsl", corners=4)
 FRAGMENT = "surfels/splat.frag"

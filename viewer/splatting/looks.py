@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu import gl
-from ...gpu.amplify import Points
-from ...scan.points import PointCloud
-from ...srgb import roots_from_bytes
+from ..gpu import gl
+from ..scan.points import PointCloud
+from ..srgb import roots_from_bytes
+from .amplify import Points
 
 _CHUNK = 1 << 15  # points packed at a time, so that they stay near the processor
 

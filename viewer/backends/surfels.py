@@ -15,23 +15,23 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu import gl
-from ...gpu.amplify import FEEDS, Points, amplify
-from ...gpu.constants import LEAST_RADIUS, UNKNOWN
-from ...gpu.fastest import instancing_for
-from ...gpu.pose import GpuPose
-from ...gpu.splat_culling import SplatLimits, draw_unhidden, may_cull
-from ...gpu.surface import Surface
-from ...params import param
-from ...scan.points import PointCloud
-from ...scan.pose import Pose
-from ...scan.spacing import typical_spacing
-from .. import Backend, FrameView, Limit, Suited, share_param, with_levels
-from . import passes
-from .gaps import GapRadii
-from .splats import FRAGMENT, SURFEL, Splats
-from .subpixel import average, splat_subpixel, subpixel_share
-from .tiles import FALLBACK, most_listed, splat
+from ..gpu import gl
+from ..gpu.constants import LEAST_RADIUS, UNKNOWN
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
+from ..params import param
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from ..scan.spacing import typical_spacing
+from ..splatting import passes
+from ..splatting.amplify import FEEDS, Points, amplify
+from ..splatting.fastest import instancing_for
+from ..splatting.gaps import GapRadii
+from ..splatting.splat_culling import SplatLimits, draw_unhidden, may_cull
+from ..splatting.splats import FRAGMENT, SURFEL, Splats
+from ..splatting.subpixel import average, splat_subpixel, subpixel_share
+from ..splatting.tiles import FALLBACK, most_listed, splat
+from . import Backend, FrameView, Limit, Suited, share_param, with_levels
 
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (

@@ -10,14 +10,14 @@ import math
 
 import numpy as np
 
-from ...gpu.amplify import Points
-from ...gpu.bindings import Storage
-from ...gpu.constants import LEAST_RADIUS
-from ...gpu.context import Gpu, Program
-from ...gpu.scatter import CellSums, FixedPoint, Visits, scatter
-from ...gpu.surface import Surface
-from ...scan.points import PointCloud
-from ...srgb import LIGHT_STEPS
+from ..gpu.bindings import Storage
+from ..gpu.constants import LEAST_RADIUS
+from ..gpu.context import Gpu, Program
+from ..gpu.scatter import CellSums, FixedPoint, Visits, scatter
+from ..gpu.surface import Surface
+from ..scan.points import PointCloud
+from ..srgb import LIGHT_STEPS
+from .amplify import Points
 from .gaps import GapRadii
 from .passes import bind_looks
 from .splats import Splats, bind_visible

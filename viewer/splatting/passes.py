@@ -14,27 +14,18 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 
-from ...gpu import gl
-from ...gpu.amplify import Points, draw_shapes, told_feed
-from ...gpu.bindings import Texture
-from ...gpu.constants import BEHIND
-from ...gpu.context import Gpu
-from ...gpu.surface import Surface
-from ...scan.ranges import robust_range
-from .. import FrameView
+from ..gpu import gl
+from ..gpu.bindings import Texture
+from ..gpu.constants import BEHIND
+from ..gpu.context import Gpu
+from ..gpu.frame_view import FrameView
+from ..gpu.surface import Surface
+from ..scan.ranges import robust_range
+from .amplify import Points, draw_shapes, told_feed
 from .lists import ALL, NOT_HIDDEN, TOWARDS, TileLists
 from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
-from .tiles import (
-    FALLBACK,
-    LIMIT,
-    fill_away,
-    run,
-    show,
-    show_all,
-    splat_first,
-    tile_lists,
-)
+from .tiles import FALLBACK, LIMIT, fill_away, run, show, show_all, splat_first, tile_lists
 
 FIRST, SECOND = 1, 2  # of which lists the nearest are found as they are blended: TAKE of blend.comp
 

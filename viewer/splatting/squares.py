@@ -11,18 +11,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..gpu import gl
+from ..gpu.bindings import Texture
+from ..gpu.compact import IndexList
+from ..gpu.context import Program
+from ..gpu.frame_view import Before
+from ..gpu.pose import GpuPose
+from ..gpu.scatter import HitCells, Visits, scatter, take_items, take_keys
+from ..gpu.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import sparse_spacing, typical_spacing
 from ..view import View
-from . import gl
-from .bindings import Texture
-from .compact import IndexList
-from .context import Program
 from .culling import CulledChunks, culled_chunks
-from .kept import Before, ClosedGaps, KeptPoints, stride_of
-from .pose import GpuPose
-from .scatter import HitCells, Visits, scatter, take_items, take_keys
-from .surface import Surface
+from .kept import ClosedGaps, KeptPoints, stride_of
 
 # Points can list the pixels that they hit, in slots that each has; below this share of the pixels that takes
 # less than clearing all of them and looking for those that are covered.
