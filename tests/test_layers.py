@@ -23,7 +23,7 @@ LAYERS = (
     {"scan"},
     {"mesh", "codewords"},
     {"simulate", "gpu"},
-    {"splatting"},
+    {"splatting", "visibility", "projection"},
     {"backends"},
     {"renderer", "frame", "timing", "choice"},
     {"analysis"},
@@ -213,6 +213,33 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
         if name not in seen:
             visit(name, (name,))
     assert circles == []
+
+
+def backend_of(name: str) -> str | None:
+    """The backend that a module belongs to."""
+    package, _, rest = name.partition("viewer.backends.")
+    return rest.partition(".")[0] if not package and rest else None
+
+
+def test_no_backend_imports_another() -> None:
+    """What several of them need stands below them."""
+    crossed = [
+        f"{name_of(path)} imports {name}"
+        for path in modules()
+        if (own := backend_of(name_of(path)))
+        for name in imported_modules(path)
+        if backend_of(name) not in (None, own)
+    ]
+    assert crossed == []
+
+
+def test_the_gpu_layer_serves_no_single_backend() -> None:
+    users: dict[str, set[str]] = {}
+    for path in modules():
+        for name in imported_modules(path):
+            users.setdefault(name, set()).add(backend_of(name_of(path)) or "others")
+    single = {name: found for name, found in users.items() if name.startswith("viewer.gpu.")}
+    assert not {name: found for name, found in single.items() if len(found) == 1 and found != {"others"}}
 
 
 def test_entries_have_no_underscore() -> None:

@@ -1,4 +1,4 @@
-// Sectors around an eye: `Sectors` in viewer/backends/hpr/sectors.py, which is the plain twin and says what is what.
+// Sectors around an eye: `Sectors` in viewer/visibility/sectors.py, which is the plain twin and says what is what.
 // CUBE: six faces; else a grid of one. Several programs compare keys, so that these are `precise`.
 #include "common/split.glsl"
 #include <params>

@@ -11,13 +11,13 @@ from command_line import Run
 from scenes import sphere
 from small_scans import cloud_at, names
 
-from viewer.backends.hpr import visible_points
 from viewer.frame import backend_for
 from viewer.scan import formats
 from viewer.scan.estimate import estimate
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.visibility.search import visible_points
 
 
 @pytest.mark.parametrize("suffix", formats.writable_suffixes())

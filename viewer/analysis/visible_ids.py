@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends.hpr import visible_points
 from ..frame import Request, shared_renderer
 from ..gpu.pose import drawn_bounds
 from ..view import View
+from ..visibility.search import visible_points
 
 _FAR = 1e4  # radii of the scan from which an eye sees it as by parallel rays
 

@@ -12,8 +12,8 @@ from ..gpu.surface import Surface
 from ..params import param
 from ..scan.pose import Pose
 from ..splatting.squares import LARGEST_SQUARE, draw_squares
+from ..visibility.search import mark_visible
 from . import Backend, FrameView, Suited, share_param, with_levels
-from .hpr import mark_visible
 
 
 @dataclass(frozen=True)

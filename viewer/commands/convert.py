@@ -130,7 +130,7 @@ class _Poses:
             yield pose if self.eye is None else self._visible(pose, self.eye)
 
     def _visible(self, pose: Pose, eye: tuple[float, ...]) -> Pose:
-        from ..backends.hpr import visible_points
+        from ..visibility.search import visible_points
 
         cloud = pose.cloud
         ids = visible_points(pose, eye)

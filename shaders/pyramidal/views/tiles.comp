@@ -7,7 +7,7 @@
 #include <params>
 #include "range/tiles.glsl"
 
-layout(std430, binding = STORAGE_TILE_COUNTS) buffer Counts { uint counts[]; };  // as viewer/backends/pyramidal/views.py names them; then those drawn of each view
+layout(std430, binding = STORAGE_TILE_COUNTS) buffer Counts { uint counts[]; };  // as viewer/projection/views.py names them; then those drawn of each view
 
 uniform int capacity;  // of the list
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.backends.hpr.candidates import Candidates
-from viewer.backends.hpr.sectors import Sectors
 from viewer.camera import Camera
 from viewer.gpu.constants import NOTHING
 from viewer.gpu.pose import GpuPose
@@ -17,6 +15,8 @@ from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.view import View
+from viewer.visibility.candidates import Candidates
+from viewer.visibility.sectors import Sectors
 
 STEPS = 3
 

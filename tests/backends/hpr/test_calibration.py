@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scenes import sphere
 
-from viewer.backends.hpr import calibrated
-from viewer.backends.hpr.calibration import body_of, calibrate
-from viewer.backends.hpr.sectors import Sectors
 from viewer.scan.points import NOTHING, PointCloud
+from viewer.visibility.calibration import body_of, calibrate
+from viewer.visibility.search import calibrated
+from viewer.visibility.sectors import Sectors
 
 EYE = np.array([0.0, 0.0, 4.0])
 

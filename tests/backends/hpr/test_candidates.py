@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.backends.hpr.candidates import UNLIMITED, Candidates
-from viewer.backends.hpr.clipping import EVERYWHERE
-from viewer.backends.hpr.sectors import Sectors
 from viewer.errors import InputError
 from viewer.gpu import gl
 from viewer.gpu.context import Gpu
 from viewer.renderer import Renderer
 from viewer.scan.points import NOTHING
+from viewer.visibility.candidates import UNLIMITED, Candidates
+from viewer.visibility.clipping import EVERYWHERE
+from viewer.visibility.sectors import Sectors
 
 STEPS = [(x, y) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
 ZERO = np.zeros(3)

@@ -12,12 +12,6 @@ import pytest
 from numpy.typing import NDArray
 from scenes import rarely, sphere
 
-from viewer.backends.hpr import calibrated, visible_points
-from viewer.backends.hpr.calibration import EyeCalibration, body_of, calibrate
-from viewer.backends.hpr.covering import CLEAR, REACH, STEEP, Covering
-from viewer.backends.hpr.exact import SeenPoints, exact_visible_points, flipping, hull_rows
-from viewer.backends.hpr.sectors import Sectors
-from viewer.backends.hpr.spacing import ENOUGH, Spacings
 from viewer.camera import Camera
 from viewer.frame import Renderer
 from viewer.gpu.pose import GpuPose
@@ -26,6 +20,12 @@ from viewer.mesh.triangles import read_mesh
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.spacing import typical_spacing
+from viewer.visibility.calibration import EyeCalibration, body_of, calibrate
+from viewer.visibility.covering import CLEAR, REACH, STEEP, Covering
+from viewer.visibility.exact import SeenPoints, exact_visible_points, flipping, hull_rows
+from viewer.visibility.search import calibrated, visible_points
+from viewer.visibility.sectors import Sectors
+from viewer.visibility.spacing import ENOUGH, Spacings
 
 COUNT = 3000
 SPACING = np.sqrt(4 * np.pi / COUNT)

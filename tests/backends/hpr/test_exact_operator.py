@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scenes import sphere
 
-from viewer.backends.hpr.exact import as_cloud, exact_visible_points, katz_radius
 from viewer.errors import InputError
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.visibility.exact import as_cloud, exact_visible_points, katz_radius
 
 COUNT = 4000
 SPACING = np.sqrt(4 * np.pi / COUNT)

@@ -10,11 +10,11 @@ import pytest
 from scenes import NOTHING, sphere
 
 from viewer.analysis.pick import pick
-from viewer.backends.hpr import visible_points
 from viewer.camera import Camera
 from viewer.gpu.surface import Surface
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
+from viewer.visibility.search import visible_points
 
 Draw = Callable[..., Surface]
 SIZE = (160, 120)

@@ -10,13 +10,13 @@ import pytest
 from numpy.typing import NDArray
 from scenes import sphere
 
-from viewer.backends.hpr import visible_points
-from viewer.backends.hpr.exact import SeenPoints, flipping, hull_rows
-from viewer.backends.hpr.noise import Noise, noise_of, steady_positions
 from viewer.camera import Camera
 from viewer.mesh.reference import visible
 from viewer.mesh.triangles import read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
+from viewer.visibility.exact import SeenPoints, flipping, hull_rows
+from viewer.visibility.noise import Noise, noise_of, steady_positions
+from viewer.visibility.search import visible_points
 
 COUNT = 20_000
 SPACING = np.sqrt(4 * np.pi / COUNT)

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.backends.hpr.candidates import Candidates
-from viewer.backends.hpr.sectors import Sectors
 from viewer.gpu import gl
 from viewer.gpu.bindings import Storage
 from viewer.renderer import Renderer
 from viewer.scan.points import NOTHING
+from viewer.visibility.candidates import Candidates
+from viewer.visibility.sectors import Sectors
 
 PROBE = str(Path(__file__).with_name("probe.comp"))
 STEPS = [(x, y) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]

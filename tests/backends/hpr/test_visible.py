@@ -11,8 +11,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 from scenes import rarely, sphere
 
-from viewer.backends.hpr import HULL, MODES, Params, calibrated, visible_points
-from viewer.backends.hpr.exact import exact_visible_points
+from viewer.backends.hpr import Params
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
@@ -21,6 +20,8 @@ from viewer.look import Look
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.visibility.exact import exact_visible_points
+from viewer.visibility.search import HULL, MODES, calibrated, visible_points
 
 EYE = np.array([0.0, 0.0, 4.0])
 SIZE = (64, 48)

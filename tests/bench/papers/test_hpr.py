@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from scenes import sphere
 
-from viewer.backends.hpr import MODES
-from viewer.backends.hpr.exact import SeenPoints, flipping, hull_rows
 from viewer.bench.papers.machado_2014 import accuracy, growth, hpr, peers, pictures, speed, verdicts
 from viewer.bench.papers.machado_2014.verdicts import (
     AUTOMATIC,
@@ -32,6 +30,8 @@ from viewer.mesh.triangles import Mesh
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.visibility.exact import SeenPoints, flipping, hull_rows
+from viewer.visibility.search import MODES
 
 COUNT = 3000
 SPACING = np.sqrt(4 * np.pi / COUNT)

@@ -10,7 +10,6 @@ from hashlib import blake2b
 import numpy as np
 from numpy.typing import NDArray
 
-from ...backends.hpr.noise import noise_of
 from ...mesh.cutting import length_over
 from ...mesh.geodesic import Geodesics, Line, length_of
 from ...mesh.openings import bridged, detour, inner_holes, without_pockets
@@ -20,6 +19,7 @@ from ...scan.estimate import cloud_normals
 from ...scan.faces import Triangles
 from ...scan.pose import Pose
 from ...scan.range_view import merged_normals
+from ...visibility.noise import noise_of
 from .outlines import Prism
 from .regions import NO_PLANE, Refused, Region, region_within
 

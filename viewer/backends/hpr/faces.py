@@ -12,7 +12,7 @@ from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, take_items, take_keys
 from ...gpu.surface import Surface
-from .candidates import Candidates
+from ...visibility.candidates import Candidates
 from .splats import SectorSplats
 
 _LARGE = 1 << 12  # pixels around a face from which on many invocations draw it

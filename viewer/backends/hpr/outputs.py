@@ -8,10 +8,10 @@ from ...look import wants_normals
 from ...splatting.amplify import Points
 from ...splatting.packed import draw_splats, take_normals
 from ...splatting.squares import draw_squares
+from ...visibility.calibration import EyeCalibration
+from ...visibility.candidates import Candidates
+from ...visibility.covering import Covering
 from .. import FrameView
-from .calibration import EyeCalibration
-from .candidates import Candidates
-from .covering import Covering
 from .faces import draw_faces
 from .reconstruction import fill_between
 from .splats import SectorSplats

@@ -14,9 +14,9 @@ from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import CellSums, FixedPoint, Visits, take_keys
 from ...gpu.surface import Surface
-from .calibration import EyeCalibration, body_of
-from .candidates import Candidates
-from .covering import Covering
+from ...visibility.calibration import EyeCalibration, body_of
+from ...visibility.candidates import Candidates
+from ...visibility.covering import Covering
 
 _INFINITE = 1e12  # weight, from which on nearness alone counts but for ties
 _MOST_SECTORS = 1 << 22  # of which 24 bytes are kept

@@ -14,9 +14,11 @@ from dataclasses import dataclass
 from ...gpu.pose import GpuPose
 from ...gpu.surface import Surface
 from ...params import param
+from ...projection.filled import draw_filled
+from ...projection.settings import ProjectionParams
+from ...projection.views import ViewSource
 from ...scan.pose import Pose
-from .. import Backend, FrameView, pyramidal
-from ..pyramidal.views import ViewSource
+from .. import Backend, FrameView
 from .spline import FILTERS, Bands, spline_views
 
 _CAPTURES = {"5x5": "binomial", "3x3": "gaussian"}  # filters of range images that make the levels of pictures
@@ -94,9 +96,9 @@ class Params:
     )
 
     @property
-    def surface(self) -> pyramidal.Params:
+    def surface(self) -> ProjectionParams:
         """How the surface is drawn that the views are looked up on."""
-        return pyramidal.Params(
+        return ProjectionParams(
             fill=self.fill,
             tolerance=self.tolerance,
             blend="nearest",
@@ -129,7 +131,7 @@ class Laplacian(Backend):
         preview = frame.share < 1
         if preview:
             surface.stats.skipped["bands"] = "a preview shows the nearest view"
-        return pyramidal.draw_filled(pose, params.surface, frame.share, surface, None if preview else merge)
+        return draw_filled(pose, params.surface, frame.share, surface, None if preview else merge)
 
 
 def _bands(params: Params) -> Bands:

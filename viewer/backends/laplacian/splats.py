@@ -26,7 +26,7 @@ from ...gpu.context import Gpu, Program
 from ...gpu.pyramid import sizes
 from ...gpu.scatter import CellSums, FixedPoint, Visits
 from ...gpu.surface import Surface
-from ..pyramidal.views import ViewSource
+from ...projection.views import ViewSource
 
 _LIMIT = 4.0  # of light or of its logarithm
 _FINEST = 2.0**-16

@@ -22,8 +22,8 @@ from ...gpu.context import Gpu, Program
 from ...gpu.pyramid import BINOMIAL, GAUSSIAN, Filter, sizes
 from ...gpu.scatter import FixedPoint
 from ...gpu.surface import Surface
-from ..pyramidal.sources import CHANNELS
-from ..pyramidal.views import DrawnTiles, ViewSource
+from ...projection.sources import CHANNELS
+from ...projection.views import DrawnTiles, ViewSource
 from .splats import CapturedLevels, add_splats, levels_that_fit
 
 _MOST = 6  # levels

@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from ....backends.hpr import MODES, calibrated, visible_points
-from ....backends.hpr.exact import Kernel, flipping, katz_radius, searched_decades
 from ....gpu.context import Gpu
 from ....scan.pose import Pose
+from ....visibility.exact import Kernel, flipping, katz_radius, searched_decades
+from ....visibility.search import MODES, calibrated, visible_points
 from ...report.results import Row
 from ...run import Bench
 from . import peers

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ....backends.hpr import calibrated, chosen_search, visible_points
-from ....backends.hpr.candidates import Candidates
-from ....backends.hpr.exact import flipping
 from ....scan.pose import Pose
+from ....visibility.candidates import Candidates
+from ....visibility.exact import flipping
+from ....visibility.search import calibrated, chosen_search, visible_points
 from ...report.results import Row
 from ...run import Bench
 from .pictures import SECTOR_PICTURE, save_picture, sector_row

@@ -19,8 +19,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ....backends.hpr.exact import Floats, Kernel, LowerSide, SeenPoints, flipped_triangles, gnomonic
 from ....errors import InputError
+from ....visibility.exact import Floats, Kernel, LowerSide, SeenPoints, flipped_triangles, gnomonic
 from .verdicts import Mask
 
 NEIGHBORS = 50  # Biasutti 2019

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....backends import backend
-from ....backends.hpr import MODES, calibrated, visible_points
-from ....backends.hpr.exact import exact_visible_points
 from ....camera import Camera
 from ....files import output_folder, whole_file
 from ....frame import Request
@@ -20,6 +18,8 @@ from ....renderer import Renderer
 from ....scan.points import PointCloud
 from ....scan.pose import Pose
 from ....timing import draw
+from ....visibility.exact import exact_visible_points
+from ....visibility.search import MODES, calibrated, visible_points
 from ...report.pictures import Image, titled_row
 from ...scenes.subjects import with_rows
 from .verdicts import EXACT, HULL, JudgedView

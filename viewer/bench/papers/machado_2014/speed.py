@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from ....backends import backend
-from ....backends.hpr import MODES, calibrated, chosen_search, visible_points
 from ....frame import Request
 from ....gpu.surface import Surface
 from ....resources import resource_path
 from ....scan.pose import Pose
 from ....timing import draw
+from ....visibility.search import MODES, calibrated, chosen_search, visible_points
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed
 from .verdicts import EXACT, HULL, SCENES, JudgedView, moments, row_of, views

@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ....backends.hpr.exact import Kernel, SeenPoints, hull_rows
 from ....camera import Camera
 from ....errors import InputError
 from ....mesh.reference import visible
 from ....scan.points import PointCloud
+from ....visibility.exact import Kernel, SeenPoints, hull_rows
 from ...plan import Group
 from ...report.results import Row
 from ...run import Bench

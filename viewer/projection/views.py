@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
-from ...gpu.compact import IndexList
-from ...gpu.constants import RANGE_TILE
-from ...gpu.context import Gpu, Program
-from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits
-from ...gpu.surface import Surface
-from ...look import is_lit
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.compact import IndexList
+from ..gpu.constants import RANGE_TILE
+from ..gpu.context import Gpu, Program
+from ..gpu.pose import GpuPose
+from ..gpu.scatter import Visits
+from ..gpu.surface import Surface
+from ..look import is_lit
 
 MODES = ("nearest", "linear", "best")  # as of_views.glsl numbers them
 _SPARE = 1 << 16  # entries of a list for the parts of large tiles

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu.blocks import Vec4
-from ...view import View
+from ..gpu.blocks import Vec4
+from ..view import View
 from .calibration import Body
 
 Planes = tuple[Vec4, Vec4, Vec4, Vec4, Vec4]  # near, left, right, top, bottom; points below one are left out

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
-from ...gpu.bins import Bins
-from ...gpu.compact import IndexList
-from ...gpu.context import Program
-from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits
-from ...scan.points import NOTHING, PointCloud
-from ...scan.spacing import typical_spacing
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.bins import Bins
+from ..gpu.compact import IndexList
+from ..gpu.context import Program
+from ..gpu.pose import GpuPose
+from ..gpu.scatter import Visits
+from ..scan.points import NOTHING, PointCloud
+from ..scan.spacing import typical_spacing
 from .calibration import body_of, copies
 from .noise import noise_of, steady_positions
 

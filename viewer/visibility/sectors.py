@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu.blocks import Mat4
-from ...scan.points import NOTHING
+from ..gpu.blocks import Mat4
+from ..scan.points import NOTHING
 
 # Tangent of half a face, 45 degrees: there a sector is 0.71 times as large as in the middle.
 _WIDEST = 1.0

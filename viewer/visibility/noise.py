@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scan.points import NOTHING, PointCloud
-from ...scan.spacing import nearest_rows
+from ..scan.points import NOTHING, PointCloud
+from ..scan.spacing import nearest_rows
 from .calibration import body_of, copies
 
 _LOOKED_AT = 8_000_000  # distances from point to point that tell of noise

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
-from ...gpu.blocks import Values
-from ...gpu.compact import IndexList
-from ...gpu.context import Gpu
-from ...gpu.pyramid import sizes
-from ...gpu.surface import Surface
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.blocks import Values
+from ..gpu.compact import IndexList
+from ..gpu.context import Gpu
+from ..gpu.pyramid import sizes
+from ..gpu.surface import Surface
 from .sources import SampleSource
 
 LEVELS = 5  # of targets, the picture among them (Farooq 2013, 4.3.1)

@@ -15,15 +15,15 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
-from ...gpu.bins import Bins
-from ...gpu.compact import IndexList
-from ...gpu.constants import NO_DEPTH
-from ...gpu.context import Gpu, Program
-from ...gpu.scatter import Visits, take_keys
-from ...scan.points import NOTHING
+from ..errors import InputError
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.bins import Bins
+from ..gpu.compact import IndexList
+from ..gpu.constants import NO_DEPTH
+from ..gpu.context import Gpu, Program
+from ..gpu.scatter import Visits, take_keys
+from ..scan.points import NOTHING
 from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 

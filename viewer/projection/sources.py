@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, Protocol
 
-from ...gpu import gl
-from ...gpu.bindings import Texture
-from ...gpu.context import Program
-from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits
-from ...gpu.surface import Surface
+from ..gpu import gl
+from ..gpu.bindings import Texture
+from ..gpu.context import Program
+from ..gpu.pose import GpuPose
+from ..gpu.scatter import Visits
+from ..gpu.surface import Surface
 
 CHANNELS = {"color": Texture.COLORS, "normal": Texture.NORMALS, "value": Texture.VALUES}
 

@@ -25,9 +25,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...errors import InputError
-from ...scan.points import PointCloud
-from ...scan.pose import Pose
+from ..errors import InputError
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
 
 Floats = NDArray[np.float64]
 Kernel = Callable[[Floats, Floats, float], Floats]  # see `hull_rows`

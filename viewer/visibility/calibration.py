@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...gpu.sample import lots
-from ...scan.points import NOTHING, PointCloud, strided
+from ..gpu.sample import lots
+from ..scan.points import NOTHING, PointCloud, strided
 from .sectors import Sectors
 
 _OCCUPIED = 0.5  # of the sectors inside the object's outline: a of eq. 5

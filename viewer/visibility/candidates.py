@@ -11,13 +11,13 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
-from ...gpu.compact import IndexList
-from ...gpu.constants import NOTHING
-from ...gpu.context import Gpu, Program
-from ...gpu.scatter import Visits, scatter
+from ..errors import InputError
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.compact import IndexList
+from ..gpu.constants import NOTHING
+from ..gpu.context import Gpu, Program
+from ..gpu.scatter import Visits, scatter
 from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 

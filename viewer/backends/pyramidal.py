@@ -1,0 +1,52 @@
+"""A filled surface: holes between samples are filled from pictures of smaller size.
+
+Pyramidal projection, Farooq 2013, chapters 4 to 6. The renderer scatters samples into the picture and
+reduces it to targets of half, a quarter, ... of its size. A hole shows the finest target that covers it.
+"""
+
+from __future__ import annotations
+
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
+from ..projection.filled import draw_filled
+from ..projection.settings import ProjectionParams
+from ..scan.pose import Pose
+from . import NO_SPACING, Backend, FrameView, Limit, Suited
+
+_BY_CELLS = (
+    "whole cells fill a pixel; at their edges the last bit decides which cells, and what encloses the pixel"
+)
+
+
+class Pyramidal(Backend):
+    """The backend `pyramidal`."""
+
+    title = "Filled surface"
+    good_for = "Range images; fills holes"
+    params_class = ProjectionParams
+    blends = True
+    fills = True
+    limits = {
+        "eye inside the cloud": Limit(0.01, _BY_CELLS),
+        "coplanar points": Limit(0.008, _BY_CELLS),
+        "collinear points": Limit(0.035, _BY_CELLS),
+        "collinear points end on, perspective": Limit(0.08, NO_SPACING),
+        "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
+    }
+    default_reasons = {"fill": "point clouds have holes to fill; the polygons of dense range views leave few"}
+
+    def needs(self, pose: Pose, params: ProjectionParams) -> tuple[str, ...]:
+        """The samples of range views where there are such, else nothing but positions."""
+        return ("views",) if pose.views else ()
+
+    def suits(self, pose: Pose) -> Suited | None:
+        """Range views: nothing is estimated or merged, and nothing lies nearer to what was measured."""
+        return Suited(2) if pose.views else None
+
+    def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
+        """Polygons, and points, of range views; clouds are drawn by splats faster and better."""
+        return ({}, {"primitive": "points"}) if pose.views else ()
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        """Scatter, show, hide, fill; complete where all samples shall be drawn."""
+        return draw_filled(pose, frame.params, frame.share, surface)

@@ -1,0 +1,174 @@
+"""Settings of pyramidal projection."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..gpu.pyramid import BINOMIAL, BOX, GAUSSIAN, NEAREST, Filter
+from ..params import param
+from .spreading import FUNCTIONS, KERNELS
+from .targets import LEVELS
+from .views import MODES
+
+_FILTERS = {"box": BOX, "gaussian": GAUSSIAN, "binomial": BINOMIAL, "nearest": NEAREST}
+_FILLING = {"fill": (True,)}
+_LEVELS, _HIDDEN, _VIEWS, _SMOOTHING = "Levels", "Hidden points", "Range images", "Anti-aliasing"
+
+
+@dataclass(frozen=True)
+class ProjectionParams:
+    """Parameters of pyramidal projection."""
+
+    fill: bool = param(
+        True,
+        "Fill holes from coarser levels",
+        key="H",
+        group=_LEVELS,
+        sweep=(True, False),
+        title="Fill holes",
+        basic=True,
+    )
+    level_0: bool = param(True, "Show the measured samples", key="0", group=_LEVELS)
+    level_1: bool = param(
+        True, "Fill holes from the picture of half the size", key="1", group=_LEVELS, when=_FILLING
+    )
+    level_2: bool = param(
+        True, "Fill holes from the picture of a quarter of the size", key="2", group=_LEVELS, when=_FILLING
+    )
+    level_3: bool = param(
+        True, "Fill holes from the picture of an eighth of the size", key="3", group=_LEVELS, when=_FILLING
+    )
+    level_4: bool = param(
+        True, "Fill holes from the picture of a sixteenth of the size", key="4", group=_LEVELS, when=_FILLING
+    )
+    upsampling: str = param(
+        "bilinear",
+        "How a filled pixel is interpolated from samples of a coarser level",
+        choices=("nearest", "bilinear", "bicubic"),
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    step: float = param(
+        6.0,
+        "Depth step up to which neighbours belong to one surface, in cells of their level",
+        low=0.1,
+        high=100,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    margin: float | None = param(
+        None,
+        "How far filling extends beyond the samples of a surface, in distances between samples; auto: "
+        "0.15 for samples that polygons join, 0.4 for others",
+        type=float,
+        low=0,
+        high=1,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    reach: float = param(
+        2.25,
+        "Largest distance of a filled pixel from the samples that fill it, in distances between samples",
+        low=0.1,
+        high=100,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    widest: float = param(
+        1.0,
+        "Widest hole that a level fills beyond the gaps between samples, in cells of the level",
+        low=0,
+        high=3,
+        group=_LEVELS,
+        when=_FILLING,
+    )
+    hide: bool = param(
+        True,
+        "Leave out samples seen through the holes of a nearer surface",
+        key="Shift+H",
+        title="Hide what lies behind",
+        basic=True,
+        group=_HIDDEN,
+        sweep=(True, False),
+    )
+    tolerance: float = param(
+        2.0,
+        "How far behind a nearer surface a sample must lie to be hidden, in cells of its level",
+        low=0,
+        high=100,
+        group=_HIDDEN,
+        when={"hide": (True,)},
+    )
+
+    neighbors: int = param(
+        4,
+        "Samples of a range image this close to a sample of the nearer surface stay visible",
+        low=0,
+        high=100,
+        unit="samples",
+        group=_HIDDEN,
+        when={"hide": (True,)},
+    )
+    first_level: int = param(0, "Finest level of range images to draw", low=0, high=5, group=_VIEWS)
+    primitive: str = param(
+        "polygons",
+        "How samples of range images are drawn",
+        choices=("points", "polygons"),
+        group=_VIEWS,
+        sweep=("points", "polygons"),
+    )
+    lod: bool = param(
+        True, "Draw the level of range images whose samples fit the pixels", group=_VIEWS, affects="draw"
+    )
+    detail: float = param(
+        1.0, "Distance between samples, in pixels, above which a finer level is drawn",
+        low=0.25, high=16, unit="px", group=_VIEWS, when={"lod": (True,)},
+    )  # fmt: skip
+    filter: str = param(
+        "box",
+        "Filter that makes the coarser levels of range images",
+        choices=tuple(_FILTERS),
+        group=_VIEWS,
+    )
+    blend: str = param(
+        "linear",
+        "Where several views see one surface. linear: mean of all views; best: the best view; nearest: "
+        "the nearest sample",
+        choices=MODES,
+        group=_VIEWS,
+        sweep=("linear", "best", "nearest"),
+    )
+    cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
+    skip: bool = param(True, "Skip tiles of range images that no pixel shows", group=_VIEWS, affects="speed")
+    antialias: str = param(
+        "off",
+        "Draw points as point spread functions and add up their colours. table: from a table; analytic: "
+        "computed for each point",
+        choices=FUNCTIONS,
+        group=_SMOOTHING,
+        sweep=("off", "table", "analytic"),
+    )
+    kernel: str = param(
+        "3x3",
+        "Size of a point spread function, in pixels",
+        choices=KERNELS,
+        group=_SMOOTHING,
+        unless={"antialias": ("off",)},
+    )
+    fade: bool = param(
+        False,
+        "Fade colours into the next coarser level as samples come closer together than pixels",
+        group=_SMOOTHING,
+        when={"lod": (True,)},
+    )
+
+    @property
+    def reduction(self) -> Filter:
+        """The filter of coarser levels."""
+        return _FILTERS[self.filter]
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """The levels that may show, ascending."""
+        on = [level for level in range(LEVELS) if getattr(self, f"level_{level}")]
+        return tuple(level for level in on if self.fill or level == 0)

@@ -1,0 +1,1 @@
+"""Which points an eye sees, found without normals or faces: hidden point removal (Katz 2007)."""

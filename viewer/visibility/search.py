@@ -1,0 +1,290 @@
+"""Search for the points that an eye sees, in sectors of directions or among discs around points."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError, unknown_name
+from ..gpu import gl
+from ..gpu.context import Gpu, headless
+from ..gpu.frame_view import FrameView
+from ..gpu.pose import GpuPose
+from ..gpu.surface import Surface
+from ..scan.points import PointCloud, checked_viewpoint
+from ..scan.pose import Pose
+from ..view import View
+from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
+from .candidates import Candidates
+from .clipping import EVERYWHERE, Planes, near_plane, side_planes
+from .covering import CLEAR, CLEAR_OF_NOISE, Covering, Sample
+from .exact import SeenPoints, as_cloud, flipping
+from .noise import noise_of
+from .sectors import Sectors
+from .spacing import Spacings, copies_in, steady_points
+
+HULL = "hull"
+MODES = ("combined", HULL)
+DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, igea and dragon each
+QUALITY = 0.5
+MOST_SECTORS = 1 << 24
+_MOVING = 0.5  # of the quality while the picture moves
+_EYE_BITS = 36  # of its place
+
+
+@dataclass(frozen=True)
+class SearchSettings:
+    """Settings of a search; all but `mode` count for the hull alone."""
+
+    mode: str = MODES[0]  # one of `MODES`
+    quality: float = QUALITY  # sectors, relative to the number of which half would hold a point
+    depth: float = DEPTH  # how far behind a surface points count as hidden, distances between points
+    radius: float | None = None  # R of the flip, distances from the eye to the farthest point; None: found
+    sectors: int | None = None  # their number, k; None: by the quality
+    steps: int | None = None  # sectors that a candidate reaches beyond its own; None: found
+
+
+def mark_visible(pose: GpuPose, frame: FrameView, surface: Surface) -> gl.BufferTexture:
+    """Mark points, R32UI, a texel a row: 1 where the eye sees one, by the default settings.
+
+    The pose has points.
+    """
+    return surface.keep(SeenPicture).look(pose, frame, surface, SearchSettings()).visible
+
+
+class _Search:
+    """Searches for visible points, with the room that the last one took."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._candidates: Candidates | None = None
+        self._covering: Covering | None = None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes held on the GPU."""
+        return sum(each.nbytes for each in (self._candidates, self._covering) if each)
+
+    def hull(
+        self, pose: GpuPose, search: SectorSearch, sample: Sample | None = None, clip: Planes = EVERYWHERE
+    ) -> Candidates:
+        """Find the points on the hull of the flipped ones."""
+        count = len(pose.cloud)
+        if self._candidates is None or not self._candidates.fits(search.sectors, count):
+            self._gpu.discard(self._candidates)
+            self._candidates = None
+            self._candidates = Candidates(self._gpu, search.sectors, count)
+        self._candidates.find(pose.array("positions"), *search, sample=sample, clip=clip)
+        return self._candidates
+
+    def uncovered(
+        self,
+        pose: GpuPose,
+        found: EyeCalibration,
+        sample: Sample | None = None,
+        share: float = 1.0,
+        clip: Planes = EVERYWHERE,
+    ) -> Covering:
+        """Find the points that no others cover. share: of all points, that the sample is of."""
+        if self._covering is None or self._covering.points != len(pose.cloud):
+            self._gpu.discard(self._covering)
+            self._covering = None
+            self._covering = Covering(self._gpu, len(pose.cloud))
+        self._covering.find(
+            steady_points(pose),
+            pose.keep(Spacings).texels,
+            found.sectors,
+            found.spacing / found.sectors.edge,
+            _clearance(pose),
+            repeated=copies_in(pose),
+            sample=sample,
+            share=share,
+            clip=clip,
+        )
+        return self._covering
+
+    def release(self) -> None:
+        """Delete what it holds on the GPU."""
+        for each in (self._candidates, self._covering):
+            if each is not None:
+                each.release()
+
+
+class SeenPicture(_Search):
+    """The visible points that a surface showed last, and what for."""
+
+    def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
+        super().__init__(gpu)
+        self._found: Candidates | Covering | None = None
+        self._pose: weakref.ref[GpuPose] | None = None
+        self._sought: tuple[object, ...] = ()
+        self._chosen: dict[str, str] = {}
+        self.calibration: EyeCalibration | None = None  # for what was found
+
+    def look(
+        self, pose: GpuPose, frame: FrameView, surface: Surface, settings: SearchSettings
+    ) -> Candidates | Covering:
+        """Find the visible points of a picture, unless they are known."""
+        directions, body = _directions(pose, frame.view)
+        near, sample = near_plane(frame.view, body), surface.take_sample(frame.share)
+        hull = (settings.quality, settings.depth, settings.radius, settings.sectors, settings.steps)
+        sought = (sample[1], directions, near, *(hull if settings.mode == HULL else ()))
+        # What is found at rest is in all directions, and stays while the camera turns.
+        sides = side_planes(frame.view, body) if frame.moving else None
+        if settings.mode != HULL and sides == EVERYWHERE[1:]:
+            sides = None  # nothing else is coarser
+        stats = surface.stats
+        known = self._found is not None and self._pose is not None and self._pose() is pose
+        if known and self._sought in ((sought, None), (sought, sides)):
+            stats.skipped["visible"] = "pose and eye stand still"
+        else:
+            clip = (near, *(sides or EVERYWHERE[1:]))
+            self._find(pose, directions, clip, (settings, frame.moving), sample, surface.stats.share)
+            self._pose, self._sought = weakref.ref(pose), (sought, sides)
+        assert self._found is not None
+        stats.chosen.update(self._chosen)
+        stats.counted["points"] = self._found.count
+        stats.simplified = self._sought[1] is not None
+        return self._found
+
+    def _find(
+        self,
+        pose: GpuPose,
+        directions: Sectors,
+        clip: Planes,
+        asked: tuple[SearchSettings, bool],
+        sample: tuple[gl.BufferTexture | None, int],
+        share: float,
+    ) -> None:
+        settings, is_moving = asked
+        radius = None if settings.radius is None else settings.radius * directions.farthest
+        rows, count = sample
+        drawn = count / len(pose.cloud)
+        found = calibrate(pose.stored, directions, pose.origin, settings.depth, radius, drawn)
+        self.calibration = found
+        only = None if rows is None else (rows, count)
+        if settings.mode != HULL:
+            self._found, self._chosen = self.uncovered(pose, found, only, share, clip), {}
+            return
+        quality = settings.quality * (_MOVING if is_moving else 1.0)
+        search = chosen_search(found, settings.sectors, settings.steps, quality)
+        self._found = self.hull(pose, search, only, clip)
+        self._chosen = {
+            "radius": "parallel rays" if math.isinf(found.radius) else f"{found.radius:.4g}",
+            "sectors": f"{search.sectors.count:,} ({search.sectors.mapping})",
+            "steps": str(search.steps),
+        }
+
+
+class _Asked(_Search):
+    """Searches of `visible_points`: the cloud that was asked for last stays on the GPU, so that it is
+    uploaded once for all eyes."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        super().__init__(gpu)
+        self._pose: GpuPose | None = None
+
+    def pose_of(self, cloud: PointCloud) -> GpuPose:
+        """The cloud on the GPU."""
+        if self._pose is None or self._pose.stored is not cloud:
+            self._pose = None
+            self._gpu.collect()
+            self._pose = GpuPose(self._gpu, Pose(0, 0.0, "", cloud))
+        return self._pose
+
+
+def _directions(pose: GpuPose, view: View) -> tuple[Sectors, Body]:
+    """How directions from a view's eye are divided, and the body that it sees."""
+    body = body_of(pose.stored)
+    if view.perspective:
+        eye = _snapped(view.origin - view.rotation.T @ view.translation, body)
+        return Sectors.around(body.center, body.radius, eye, pose.origin), body
+    return Sectors.along(body.center, body.radius, -view.rotation[2], pose.origin), body
+
+
+def _snapped(eye: NDArray[np.float64], body: Body) -> NDArray[np.float64]:
+    """The eye without what rounding makes of it when the camera turns."""
+    away = eye - body.center
+    step = 2.0 ** (math.ceil(math.log2(max(float(np.abs(away).max()), body.radius))) - _EYE_BITS)
+    return body.center + np.round(away / step) * step
+
+
+def chosen_search(
+    found: EyeCalibration, count: int | None, steps: int | None, quality: float = QUALITY
+) -> SectorSearch:
+    """The search in so many sectors with so many steps of propagation, None: by the quality."""
+    faces = found.sectors.count / found.sectors.edge**2
+    wanted = quality * found.sectors.count if count is None else count
+    edge = math.sqrt(min(wanted, MOST_SECTORS) / faces)
+    search = found.with_sectors(max(round(edge), 1))
+    return search if steps is None else search._replace(steps=steps)
+
+
+def calibrated(
+    points: Pose | PointCloud | ArrayLike, eye: ArrayLike, radius: float | None = None
+) -> EyeCalibration:
+    """Calibrate `visible_points` for points as an eye sees them, where nobody says more.
+
+    points: a pose, a cloud, or (N, 3) absolute. eye: (3,), absolute. radius: R, scan units; None: found too.
+    Raises InputError, also where there are no points, or not all within the radius.
+    """
+    cloud, at = as_cloud(points), checked_viewpoint(eye)
+    if not len(cloud):
+        raise InputError("no points to calibrate by")
+    if radius is not None:
+        flipping(SeenPoints.of(cloud, at), radius)  # refuses one that is too small
+    body = body_of(cloud)
+    sectors = Sectors.around(body.center, body.radius, at, cloud.origin)
+    return calibrate(cloud, sectors, cloud.origin, DEPTH, radius)
+
+
+def visible_points(
+    points: Pose | ArrayLike,
+    eye: ArrayLike,
+    *,
+    radius: float | None = None,
+    sectors: int | None = None,
+    steps: int | None = None,
+    mode: str = "combined",
+    gpu: Gpu | None = None,
+) -> NDArray[np.uint32]:
+    """The points that an eye sees: ids (M,) uint32, ascending.
+
+    points: a pose, or (N, 3) absolute; ids count the points that it came with, also those that are
+    left out because a coordinate is not finite. eye: (3,), absolute. radius: R of the flip, scan units, not
+    less than the distance to the farthest point; sectors: how many, k; steps: of propagation at most; None:
+    as `calibrated` says; the hull alone goes by these. mode: "hull" takes the points on the hull of the
+    flipped ones, as the sectors find it; "combined" those that no others cover (`Covering`). Of points in one
+    place one is visible, and so is a point in the eye itself. gpu: None takes a context of its own, which is
+    kept. What was found of a pose is kept until another is asked for, so that further eyes take less. Raises
+    InputError, NoOpenGLError.
+    """
+    if mode not in MODES:
+        raise unknown_name("mode", mode, MODES)
+    cloud, gpu = as_cloud(points), gpu or _gpu()
+    if not len(cloud):
+        return np.empty(0, np.uint32)
+    found = calibrated(cloud, eye, radius)
+    search = chosen_search(found, sectors, steps)
+    gpu.activate()
+    gpu.collect()
+    asked = gpu.keep(_Asked)
+    pose = asked.pose_of(cloud)
+    rows = (asked.hull(pose, search) if mode == HULL else asked.uncovered(pose, found)).visible_rows()
+    return rows if cloud.ids is None else cloud.ids[rows]
+
+
+def _clearance(pose: GpuPose) -> float:
+    noise = noise_of(pose.stored)
+    return max(CLEAR, CLEAR_OF_NOISE * noise.deviation / noise.spacing) if noise.stands_out else CLEAR
+
+
+@cache
+def _gpu() -> Gpu:
+    """The context that `visible_points` uses where none is given."""
+    return headless()
