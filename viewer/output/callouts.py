@@ -12,7 +12,7 @@ from ..look import rgba
 from .image_painter import ImagePainter
 from .labels import Box, Callout, LabelGround, LabelPlaces, forms_of, said_once
 from .legend import Legend, MeasuredLine
-from .marks import MARGIN, PAD, PLATE, MarkPainter, shortened
+from .marks import MARGIN, PAD, PLATE, MarkPainter, fitted_text
 from .overlays import (
     DIM_LINE,
     LABEL_EDGE,
@@ -60,7 +60,7 @@ def _draw_labels(
     em = painter.em
     room = ground.size[0] - 2 * (MARGIN + PAD) * em
     forms = [
-        [[shortened(painter, line, room) for line in form] for form in forms_of([one.text])] for one in told
+        [[fitted_text(painter, line, room) for line in form] for form in forms_of([one.text])] for one in told
     ]
     labels = [
         Callout(one.text.partition(":")[0], tuple(_plate_size(painter, form) for form in own), one.places)

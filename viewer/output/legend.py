@@ -120,13 +120,13 @@ def scale_bar(camera: Camera, size: tuple[float, float], factor: float = 1.0) ->
 def quantity(look: Look, unit: str, kind: ValueKind | None = None) -> str:
     """The number that the look colours by, with its unit where it is a length. kind: of what a backend
     finds."""
-    if kind is not None or is_length(look, kind):
-        unit_words = f" ({unit})" if is_length(look, kind) else ""
+    if kind is not None or shows_length(look, kind):
+        unit_words = f" ({unit})" if shows_length(look, kind) else ""
         return look.color_by.replace("_", " ").capitalize() + unit_words
     return "Value" if look.color_by.startswith("#") else look.color_by
 
 
-def is_length(look: Look, kind: ValueKind | None) -> bool:
+def shows_length(look: Look, kind: ValueKind | None) -> bool:
     """Whether the number that the look colours by is one in the scan's unit. kind: as for `quantity`."""
     return look.color_by in ("depth", "height") if kind is None else kind.is_length
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..look import ValueKind, color_table
 from .labels import Box
-from .legend import Color, Legend, is_length, quantity, range_note, scale_bar, stamp, swatches, ticks
+from .legend import Color, Legend, quantity, range_note, scale_bar, shows_length, stamp, swatches, ticks
 
 INK: Color = (245, 245, 245, 255)
 PLATE: Color = (0, 0, 0, 170)  # light on dark, so that it is read on any picture
@@ -92,7 +92,7 @@ def scale_bar_box(painter: MarkPainter, size: tuple[float, float], legend: Legen
 
 def _scale_text(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> str:
     length, _ = scale_bar(legend.camera, size, legend.factor)
-    return shortened(painter, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
+    return fitted_text(painter, f"{length:,.6g} {legend.unit}", _TEXT_SHARE * size[0])
 
 
 def _draw_scale_bar(painter: MarkPainter, size: tuple[float, float], legend: Legend) -> Box:
@@ -118,9 +118,9 @@ def _draw_color_bar(
 ) -> Box:
     """Draw it lower right; returns where it is."""
     em = painter.em
-    title = shortened(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
-    note = shortened(painter, range_note(legend), _TEXT_SHARE * size[0])
-    factor = legend.factor if is_length(legend.look, kind) else 1.0
+    title = fitted_text(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
+    note = fitted_text(painter, range_note(legend), _TEXT_SHARE * size[0])
+    factor = legend.factor if shows_length(legend.look, kind) else 1.0
     told = ticks(factor * values[0], factor * values[1], kind)
     widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in told)
     widest = max(widest, painter.width(title), painter.width(note))
@@ -146,7 +146,7 @@ def _draw_swatches(
     painter: MarkPainter, size: tuple[float, float], told: list[tuple[Color, str]], bottom: float
 ) -> Box:
     em, line = painter.em, round(_SWATCH_LINE * painter.em)
-    texts = [shortened(painter, text, _TEXT_SHARE * size[0]) for _, text in told]
+    texts = [fitted_text(painter, text, _TEXT_SHARE * size[0]) for _, text in told]
     right = round(size[0] - MARGIN * em)
     left = round(right - max(map(painter.width, texts)) - (_MAP_WIDTH + _GAP + 2 * PAD) * em)
     top = round(bottom - PAD * em) - len(told) * line
@@ -164,14 +164,14 @@ def _draw_plates(painter: MarkPainter, size: tuple[float, float], texts: Sequenc
     boxes: list[Box] = []
     height = round((1 + 2 * PAD) * em)
     for number, line in enumerate(texts):
-        text, top = shortened(painter, line, size[0] - 2 * (MARGIN + PAD) * em), left + number * height
+        text, top = fitted_text(painter, line, size[0] - 2 * (MARGIN + PAD) * em), left + number * height
         boxes.append((left, top, left + painter.width(text) + 2 * PAD * em, top + height))
         painter.box(boxes[-1], PLATE)
         painter.text(left + PAD * em, top + PAD * em, text)
     return boxes
 
 
-def shortened(painter: MarkPainter, text: str, room: float) -> str:
+def fitted_text(painter: MarkPainter, text: str, room: float) -> str:
     """Shorten a text that is wider than this room, pixels: it ends in an ellipsis then."""
     if painter.width(text) <= room:
         return text

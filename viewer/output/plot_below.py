@@ -14,7 +14,7 @@ from ..look import rgba
 from .image_painter import ImagePainter
 from .labels import Box
 from .legend import round_length
-from .marks import INK, MARGIN, PAD, PLATE, shortened
+from .marks import INK, MARGIN, PAD, PLATE, fitted_text
 from .overlays import BAND_OPACITY, LINE_THICK, DrawnCurve, DrawnPlot
 
 PLOT_HEIGHT = 0.3  # of a plot, in shares of the picture, which becomes smaller by that above it
@@ -100,7 +100,7 @@ def _draw_legend(
     for number, line in enumerate(lines):
         curve, now = line.curve, line.values[pose] if pose < len(line.values) else np.nan
         words = f"{now:.4g} {curve.unit}" if np.isfinite(now) else "-"
-        text = shortened(painter, f"{curve.name}: {words}" if curve.name else words, stop - left - em)
+        text = fitted_text(painter, f"{curve.name}: {words}" if curve.name else words, stop - left - em)
         is_last = row == most_rows - 1 and number < len(lines) - 1
         more = f"and {len(lines) - number} more"
         if at > left and at + em + painter.width(text) + is_last * painter.width(more) > stop:
@@ -150,7 +150,7 @@ def _draw_abscissa(painter: ImagePainter, inner: Box, label: str, x: NDArray[np.
         painter.box((round(place), low, round(place) + 1, low + _TICK * em), INK)
         at = min(max(place - painter.width(text) / 2, left - em), right + em - painter.width(text))
         painter.text(at, low + _TICK * em, text)
-    label = shortened(painter, label, right - left)
+    label = fitted_text(painter, label, right - left)
     painter.text((left + right - painter.width(label)) / 2, low + (_TICK + _ROW) * em, label)
 
 

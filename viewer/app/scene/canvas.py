@@ -108,7 +108,7 @@ class Label:
 
     @property
     def text(self) -> str:
-        """Its first line."""
+        """The first line."""
         return self._forms[0][0]
 
     @property
