@@ -76,7 +76,7 @@ class Params:
         group=_VISIBLE,
     )
     quality: float = param(
-        _QUALITY,
+        QUALITY,
         "Number of sectors, relative to the number at which half of them would hold a point",
         title="Sector density",
         low=0.05,
