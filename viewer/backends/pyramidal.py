@@ -1,7 +1,7 @@
 """A filled surface: holes between samples are filled from pictures of smaller size.
 
 Pyramidal projection, Farooq 2013, chapters 4 to 6. The renderer scatters samples into the picture and
-reduces it to targets of half, a quarter, ... of its size. A hole shows the finest target that covers it.
+reduces it to targets of half, a quarter, ... of its size. The finest target that covers a hole fills it.
 """
 
 from __future__ import annotations
