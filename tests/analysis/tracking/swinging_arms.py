@@ -1,4 +1,4 @@
-"""A trunk with two arms that swing past each other, sampled at other places in each frame."""
+"""A trunk with two arms that swing past each other, sampled at the same or at other places in each frame."""
 
 from __future__ import annotations
 
@@ -15,9 +15,12 @@ def angle(frame: int, side: int) -> float:
     return side * SWING * np.cos(0.6 * frame)
 
 
-def arms(frame: int) -> NDArray[np.float64]:
-    """Points of the trunk, along y, and of both arms, that hang from it and swing in x and z, (P, 3)."""
-    chance = np.random.default_rng(frame)
+def arms(frame: int, points: int | None = None) -> NDArray[np.float64]:
+    """Points of the trunk, along y, and of both arms, that hang from it and swing in x and z, (P, 3).
+
+    points: which ones, by number; None: others in each frame.
+    """
+    chance = np.random.default_rng(frame if points is None else points)
     parts = [_tube(30.0, 6.0, chance)[:, [0, 2, 1]] - (0, -15, 0)]
     parts += [on_arm(frame, side, _tube(LONG, THICK, chance)) for side in (-1, 1)]
     return np.concatenate(parts)

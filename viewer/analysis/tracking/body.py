@@ -10,12 +10,16 @@ long ways and stiffly, then closely and softly.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .registration import rotations
 from .surface import MomentSurface
+
+if TYPE_CHECKING:
+    from .pattern import RecurringPoints
 
 Float = NDArray[np.float64]
 
@@ -108,11 +112,12 @@ class DeformableBody:
         self._surface = MomentSurface(some, reach)
         self._normals = normals_at(self._surface.held, rows)
         self.slips = np.zeros(count)
-        self._rest = rest
         self.pose = self._before = BodyPose(rest, np.tile(np.eye(3), (count, 1, 1)))
 
-    def move_to(self, points: Float) -> None:
+    def move_to(self, points: Float, recurring: RecurringPoints | None = None) -> None:
         """Move it onto the points (P, 3) of the next frame; where there are none it stays.
+
+        recurring: points that the frame it is in and the next one have in common; nodes beside them go along.
 
         It begins both from where it is and from where its speed takes it: the better fit counts.
         """
@@ -122,7 +127,8 @@ class DeformableBody:
         some = _some(points)
         surface = MomentSurface(some, self._spacing_of(points, some))
         targets = some[_spread(some, _TARGETS)[0]]
-        found = [self._drawn(start, surface) for start in (self._predicted(before), self.pose)]
+        known = None if recurring is None else recurring.moved(self.pose.places, self._spacing)
+        found = [self._drawn(start, surface, known) for start in (self._predicted(before), self.pose)]
         now = min(found, key=lambda pose: self._misfit(pose, targets))
         returned = self._drawn(now, self._surface).places - self.pose.places
         self.slips = np.maximum(self.slips, np.linalg.norm(returned, axis=1))
@@ -141,21 +147,16 @@ class DeformableBody:
         turns = self.pose.turns[nodes]
         return Grip(nodes, weights, np.einsum("...ji,...j->...i", turns, arms), _mean(weights, turns))
 
-    def carried(self, grip: Grip) -> tuple[Float, Float]:
-        """The places that are held now, (..., 3), and how each has been turned since it was gripped,
-        (..., 3, 3)."""
-        turns = self.pose.turns[grip.nodes]
-        places = np.einsum("...ij,...j->...i", turns, grip.offsets) + self.pose.places[grip.nodes]
+    def carried(self, grip: Grip, pose: BodyPose | None = None) -> tuple[Float, Float]:
+        """The places that are held, (..., 3), and how each has been turned from when it was gripped, (..., 3,
+        3). pose: in which; None: the body's now."""
+        pose = pose or self.pose
+        turns = pose.turns[grip.nodes]
+        places = np.einsum("...ij,...j->...i", turns, grip.offsets) + pose.places[grip.nodes]
         return (
             np.einsum("...k,...ki->...i", grip.weights, places),
             _mean(grip.weights, turns) @ np.swapaxes(grip.turns, -1, -2),
         )
-
-    def at_rest(self, grip: Grip) -> tuple[Float, Float]:
-        """The places of a grip, (..., 3), when the body was at rest, and how each has been turned
-        from when it was gripped to there, (..., 3, 3)."""
-        places = grip.offsets + self._rest[grip.nodes]
-        return np.einsum("...k,...ki->...i", grip.weights, places), np.swapaxes(grip.turns, -1, -2)
 
     def _predicted(self, before: BodyPose) -> BodyPose:
         """The pose that follows if all parts move and turn on as from the pose before to the one now."""
@@ -167,14 +168,18 @@ class DeformableBody:
             pose = self._settled(pose, 1.0, pulls, wanted)
         return pose
 
-    def _drawn(self, pose: BodyPose, surface: MomentSurface) -> BodyPose:
-        """A pose drawn onto a surface."""
+    def _drawn(
+        self, pose: BodyPose, surface: MomentSurface, known: tuple[Float, NDArray[np.bool_]] | None = None
+    ) -> BodyPose:
+        """A pose drawn onto a surface. known: places (N, 3) of nodes, and of which they are known, (N,)."""
         from .body_kernels import pull_across
 
         pulls, wanted = np.empty_like(pose.turns), np.empty_like(pose.places)
         for share in np.linspace(0, 1, _ROUNDS):
             reach = surface.spacing * _REACH[0] ** (1 - share) * _REACH[1] ** share
             pull_across(surface.held, pose.places, pose.turns, self._normals, reach, pulls, wanted)
+            if known is not None:
+                pulls[known[1]], wanted[known[1]] = np.eye(3), known[0][known[1]]
             stiffness = _STIFF[0] ** (1 - share) * _STIFF[1] ** share
             pose = self._settled(pose, stiffness, pulls, wanted, yields=share > _YIELDS)
         return pose
@@ -209,7 +214,7 @@ class DeformableBody:
             self._firsts, self._others, self._edges, pose.turns, stiffness, pulls, wanted, holds, _STEPS,
             places, products,
         )  # fmt: skip
-        return BodyPose(places, _rotations(products))
+        return BodyPose(places, rotations(products))
 
     def _holds(self, pose: BodyPose) -> Float:
         """How much of its stiffness each edge keeps, (E,): those that are stretched, as at joints, less."""
@@ -237,13 +242,6 @@ def _spread(points: Float, count: int) -> tuple[NDArray[np.int64], float]:
     return chosen, spread_out(points, chosen)
 
 
-def _rotations(matrices: Float) -> Float:
-    """The rotations nearest to matrices (..., 3, 3) (Kabsch 1976)."""
-    left, _, right = np.linalg.svd(matrices)
-    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
-    return left @ right
-
-
 def _mean(weights: Float, turns: Float) -> Float:
     """The means of rotations (..., k, 3, 3) with weights (..., k)."""
-    return _rotations(np.einsum("...k,...kij->...ij", weights, turns))
+    return rotations(np.einsum("...k,...kij->...ij", weights, turns))

@@ -1,8 +1,8 @@
 """One landmark, followed from the frame in which it was set through the frames after or before it.
 
-In each frame the patch around it as it was when it was set is registered, so that errors do not add up; the
-patch as it was in the frame before only tells where to begin. Registered back, the patch found shows how
-sure the way is.
+Where the points around it recur in each frame, they tell the place (`pattern`). Elsewhere, in each frame the
+patch around it as it was when it was set is registered, so that errors do not add up; the patch as it was in
+the frame before only tells where to begin. Registered back, the patch found shows how sure the way is.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from ..spot import Spot
 from .body import DeformableBody, Grip
 from .hold import Hold
-from .registration import WAYS, PatchLevel, Placement, best_registered, patch_of, registered
+from .pattern import FoundPattern, PointPattern, RecurringPoints
+from .registration import WAYS, PatchLevel, Placement, best_registered, patch_of, registered, rotations
 from .settings import TrackingSettings
 from .surface import MomentSurface
 
@@ -100,11 +101,18 @@ class Follower:
         self._is_lost = False
         self._hold: Hold | None = None
         self._grips: tuple[Grip, Grip] | None = None
+        self._pattern = PointPattern.around(surface, self._place)
+        self._recurring = None if self._pattern is None else FoundPattern.itself(self._pattern)
 
     @property
     def place(self) -> Float | None:
         """The place where it was found last, (3,) relative to the origin; None while it is lost."""
         return None if self._is_lost else self._found.place
+
+    @property
+    def velocity(self) -> Float:
+        """How far it has come in the last step, (3,), scan units."""
+        return self._velocity
 
     def hold_on(self, body: DeformableBody) -> None:
         """Go along with a body, which is in the frame that was looked at last, from where it is found."""
@@ -115,15 +123,56 @@ class Follower:
             self._hold = Hold.at(body, self._found)
             self._grips = self._hold.gripped(self._wide), self._hold.gripped(self._fine)
 
+    def go_along(self, points: RecurringPoints, surface: MomentSurface) -> Sighting | None:
+        """The place in the next frame as points around it tell it that recur there; None where too few do."""
+        if self._pattern is None or self._recurring is None:
+            return None
+        rows, linear = points.carried(self._recurring.rows, self._recurring.linear)
+        found = self._pattern.followed(surface, rows, linear)
+        if found is None or np.linalg.eigvalsh(found.covariance)[-1] > (_UNSURE * self.spacing) ** 2:
+            return None
+        return self._go_to(found)
+
     def step(self, surface: MomentSurface, before: MomentSurface) -> Sighting:
-        """Look for it in the next frame. before: the surface of the frame that it was looked for in
-        last. A body that it holds on to has been moved on."""
+        """Look for it in the next frame, where points do not carry it.
+
+        before: the surface of the frame that it was looked for in last. A body that it holds on to has been
+        moved on.
+        """
+        self._recurring = None
+        was, carried = self._found, None if self._hold is None else self._hold.carried()
+        sighting = self._by_patches(surface, before, carried)
+        if self._pattern is None:
+            return sighting
+        if not self._is_lost:
+            start = self._found
+        elif carried is not None:
+            start = carried
+        else:
+            return sighting
+        found = self._pattern.found(surface, start.place, start.turn)
+        if found is None:
+            return sighting
+        self._found = was
+        return self._go_to(found)
+
+    def _go_to(self, found: FoundPattern) -> Sighting:
+        """Be where the pattern of points around it is found."""
+        turn = rotations(found.linear)
+        self._velocity = np.zeros(3) if self._is_lost else found.place - self._found.place
+        self._recurring, self._hold, self._is_lost = found, None, False
+        self._found = self._fine_found = self._region = Placement(found.place, turn)
+        return Sighting(found.place + self._origin, found.covariance + turn @ self._spread @ turn.T)
+
+    def _by_patches(
+        self, surface: MomentSurface, before: MomentSurface, carried: Placement | None
+    ) -> Sighting:
+        """Look for it in the next frame by the surface around it. carried: where a body has carried it."""
         if self._wide is None or self._fine is None:
             return Sighting.gap("there is no surface where it was set")
-        hold, carried, is_held = self._hold, None, self._hold is not None
+        hold, is_held = self._hold, self._hold is not None
         wide_patch, fine_patch = self._wide, self._fine
         if hold is not None and self._grips is not None:
-            carried = hold.carried()
             wide_patch, fine_patch = (
                 hold.bent(patch, grip)
                 for patch, grip in zip((self._wide, self._fine), self._grips, strict=True)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .body import DeformableBody, Grip
+from .body import BodyPose, DeformableBody, Grip
 from .registration import Placement, placed_points
 
 if TYPE_CHECKING:
@@ -21,17 +21,18 @@ Float = NDArray[np.float64]
 class Hold:
     """A landmark that a body carries from a frame on.
 
-    begun: its placement in that frame, in which the body is at rest, from where it was set.
+    begun: its placement in that frame, from where it was set. pose: of the body there.
     """
 
     body: DeformableBody
     begun: Placement
     grip: Grip
+    pose: BodyPose
 
     @classmethod
     def at(cls, body: DeformableBody, begun: Placement) -> Hold:
         """The hold on a body as it is now, of a landmark as it is placed now."""
-        return cls(body, begun, body.gripped(begun.place))
+        return cls(body, begun, body.gripped(begun.place), body.pose)
 
     def carried(self) -> Placement:
         """The placement to which the body has carried the landmark."""
@@ -61,7 +62,7 @@ class Hold:
         still = Placement(patch.center)
         grip = self.body.gripped(placed_points(patch, still))
         (places, turns), (middle, _) = (
-            self.body.at_rest(each) for each in (grip, self.body.gripped(patch.center))
+            self.body.carried(each, self.pose) for each in (grip, self.body.gripped(patch.center))
         )
         axes = patch.axes @ turn @ self.begun.turn.T
         return _moved(patch, (places - middle) @ axes.T, axes @ turns @ patch.axes.T)

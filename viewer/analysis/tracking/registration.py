@@ -68,6 +68,13 @@ class Placement:
         return replace(self, place=place)
 
 
+def rotations(matrices: Float) -> Float:
+    """The rotations nearest to matrices (..., 3, 3) (Kabsch 1976)."""
+    left, _, right = np.linalg.svd(matrices)
+    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
+    return left @ right
+
+
 def patch_of(surface: MomentSurface, place: Float, radius: float, points: int) -> SurfacePatch | None:
     """The patch of a surface around a place, of so many points at most; None where it has no surface
     there."""

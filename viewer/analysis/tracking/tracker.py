@@ -22,6 +22,7 @@ from ..track import Track
 from .blending import track_of
 from .body import DeformableBody
 from .follower import Follower, Sighting
+from .pattern import RecurringPoints
 from .settings import TrackingSettings
 from .surface import MomentSurface
 
@@ -223,7 +224,7 @@ class Tracker:
             part.at = frame
 
     def _follow(self, parts: Sequence[_Followed], frame: int, pool: ThreadPoolExecutor) -> None:
-        """Have passes that are at one frame look at the next one, along with a body where they need it."""
+        """Have passes that are at one frame look at the next one."""
         shares = [parts[thread::_THREADS] for thread in range(_THREADS)]
         for thread, share in enumerate(shares):  # made here: what a thread makes, another one must not
             for _, *moments in share:
@@ -232,24 +233,56 @@ class Tracker:
                         each.surface(thread)
         for done in [pool.submit(self._begin, share, thread) for thread, share in enumerate(shares)]:
             done.result()
+        _, _, before, moment = parts[0]
+        here, there = before.surface(0), moment.surface(0)
         followers = [part.follower for part, *_ in parts if part.follower is not None]
+        unmoved = [copy(follower) for follower in followers]
+        points = RecurringPoints(here, there, *_starts(followers))
+        left = []
+        for one in parts:
+            part = one[0]
+            assert part.follower is not None
+            sighting = part.follower.go_along(points, there)
+            if sighting is None:
+                left.append(one)
+            else:
+                part.seen[frame] = sighting
+        if left:
+            self._follow_surface(left, frame, pool, followers, unmoved, points)
+
+    def _follow_surface(
+        self,
+        parts: Sequence[_Followed],
+        frame: int,
+        pool: ThreadPoolExecutor,
+        followers: Sequence[Follower],
+        unmoved: Sequence[Follower],
+        points: RecurringPoints,
+    ) -> None:
+        """Have passes that no points carry look at the next frame, along with a body where they need it.
+
+        followers: of all passes. unmoved: as they were in the frame before. points: that recur.
+        """
+        shares = [parts[thread::_THREADS] for thread in range(_THREADS)]
         first, _, before, moment = parts[0]
         here, there = before.surface(0), moment.surface(0)
+        own = [part.follower for part, *_ in parts]
         where, body = self._bodies.get(first.direction, (first.at, None))
         body = body if where == first.at else None
-        unmoved = [copy(follower) for follower in followers]
         while True:
             if body is not None:
-                for follower in followers:
-                    follower.hold_on(body)
-                body.move_to(there.held.points)
+                for follower in own:
+                    if follower is not None:
+                        follower.hold_on(body)
+                body.move_to(there.held.points, points)
             for done in [pool.submit(_step, share, thread, frame) for thread, share in enumerate(shares)]:
                 done.result()
             if body is not None or not (_move_apart(unmoved, followers, there) or _lose(unmoved, followers)):
                 break
             body = DeformableBody(here.held.points, here.spacing)
             for follower, was in zip(followers, unmoved, strict=True):
-                vars(follower).update(vars(was))
+                if follower in own:
+                    vars(follower).update(vars(was))
         if body is not None:
             self._bodies[first.direction] = frame, body
 
@@ -315,6 +348,13 @@ def _step(share: Sequence[_Followed], thread: int, frame: int) -> None:
     for part, _, before, moment in share:
         assert part.follower is not None
         part.seen[frame] = part.follower.step(moment.surface(thread), before.surface(thread))
+
+
+def _starts(followers: Sequence[Follower]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where landmarks are and how they move, (n, 3) each; those that are not lost."""
+    found = [follower for follower in followers if follower.place is not None]
+    places = np.array([follower.place for follower in found]).reshape(-1, 3)
+    return places, np.array([follower.velocity for follower in found]).reshape(-1, 3)
 
 
 def _move_apart(before: Sequence[Follower], after: Sequence[Follower], surface: MomentSurface) -> bool:

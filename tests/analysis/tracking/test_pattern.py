@@ -1,0 +1,154 @@
+"""Points that recur from frame to frame are found again, and nothing that only looks like them is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from swinging_arms import LONG, SPACING, THICK, arms, on_arm
+
+from viewer.analysis.landmarks import Landmark
+from viewer.analysis.spot import Spot
+from viewer.analysis.track import Known, Track
+from viewer.analysis.tracking import track_landmarks
+from viewer.analysis.tracking.pattern import PointPattern, RecurringPoints
+from viewer.analysis.tracking.surface import MomentSurface
+from viewer.bench.tracking.known import KeptFrames
+from viewer.geometry import vector
+from viewer.scan.points import PointCloud
+from viewer.scan.timeline import Timeline
+
+Float = NDArray[np.float64]
+
+WIDE = 26.0  # of the sheet, spacings
+NOWHERE = np.empty((0, 3))
+
+
+def scattered(seed: int) -> Float:
+    """Places of a sheet (N, 2) at random, one for each unit of its area."""
+    return np.random.default_rng(seed).uniform(0, WIDE, (int(WIDE**2), 2))
+
+
+def lattice(slide: float = 0.0) -> Float:
+    """The places of a grid (N, 2) that slides along the sheet."""
+    steps = np.arange(WIDE) + slide
+    return np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+
+
+def sheet(places: Float, bend: float, motion: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Float:
+    """Places (N, 2) of a sheet that is bent, and moved, as points (N, 3)."""
+    u, v = places.T
+    return np.stack([u, v, bend * ((u - 13) ** 2 - 0.5 * (v - 13) ** 2) / 26], axis=1) + motion
+
+
+def matched(before: Float, now: Float) -> NDArray[np.int64]:
+    surfaces = MomentSurface(before, 1.0), MomentSurface(now, 1.0)
+    return RecurringPoints(*surfaces, NOWHERE, NOWHERE).matches
+
+
+@pytest.mark.parametrize(("missing", "least"), [(0.0, 0.97), (0.1, 0.9)])
+def test_points_in_another_order_are_matched_although_some_are_missing(missing: float, least: float) -> None:
+    chance, places = np.random.default_rng(1), scattered(0)
+    before = np.flatnonzero(chance.random(len(places)) >= missing)
+    now = chance.permutation(np.flatnonzero(chance.random(len(places)) >= missing))
+    found = matched(sheet(places[before], 0.3), sheet(places[now], 0.6, (2.0, 1.0, 0.5)))
+    is_found = found >= 0
+    assert (now[found[is_found]] == before[is_found]).mean() > 0.99
+    assert is_found[np.isin(before, now)].mean() > least
+
+
+def test_a_part_of_the_surface_is_matched_where_the_other_frame_has_it() -> None:
+    places = scattered(0)
+    kept = np.flatnonzero(places[:, 0] > 10)
+    found = matched(sheet(places, 0.3), sheet(places[kept], 0.5))
+    is_found = found >= 0
+    assert (kept[found[is_found]] == np.flatnonzero(is_found)).mean() > 0.99
+    assert is_found[kept].mean() > 0.9
+
+
+def test_noise_takes_matches_and_makes_few_wrong_ones() -> None:
+    places, shares = scattered(0), []
+    for noise in (0.0, 0.05, 0.1, 0.3):
+        chance = np.random.default_rng(2)
+        one, other = (sheet(places, bend) + chance.normal(0, noise, (len(places), 3)) for bend in (0.3, 0.5))
+        found = matched(one, other)
+        right = found == np.arange(len(places))
+        assert (~right & (found >= 0)).mean() < 0.05
+        shares.append(right.mean())
+    assert shares[0] > 0.97
+    assert shares[3] < 0.02
+    assert (np.diff(shares) <= 0).all()
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.05])
+@pytest.mark.parametrize("slide", [0.0, 0.3, 1.0])
+def test_a_grid_that_slides_over_the_surface_is_not_taken_for_matter(slide: float, jitter: float) -> None:
+    chance = np.random.default_rng(3)
+    one, other = (
+        sheet(places + chance.normal(0, jitter, places.shape), 0.4) for places in (lattice(), lattice(slide))
+    )
+    assert (matched(one, other) < 0).all()
+
+
+def test_points_at_other_places_are_not_taken_for_the_same() -> None:
+    assert (matched(sheet(scattered(0), 0.3), sheet(scattered(1), 0.3)) < 0).all()
+
+
+def test_the_pattern_of_points_at_random_is_hardly_ever_found_elsewhere() -> None:
+    surface, other = (MomentSurface(sheet(scattered(seed), 0.3), 1.0) for seed in (5, 6))
+    for place in sheet(np.random.default_rng(7).uniform(4, WIDE - 4, (150, 2)), 0.3):
+        pattern = PointPattern.around(surface, place)
+        assert pattern is not None
+        assert pattern.found(other, place, np.eye(3)) is None
+
+
+FRAMES = 4
+AROUND = np.random.default_rng(8).uniform(0, 2 * np.pi, 4)
+RINGS = np.stack([THICK * np.cos(AROUND), THICK * np.sin(AROUND), np.linspace(-10, 4 - LONG, 4)], axis=1)
+PATHS = np.array([[*on_arm(n, -1, RINGS), *on_arm(n, 1, RINGS)] for n in range(FRAMES)])
+
+
+def tracks_of_arms(noise: float, kept: float = 1.0) -> Mapping[str, Track]:
+    """Tracks of landmarks of both arms, whose points come back in another order in each frame.
+
+    noise: of each point in each frame, standard deviation. kept: share of the points that a frame has.
+    """
+    clouds = []
+    for frame in range(FRAMES):
+        chance, points = np.random.default_rng(frame), arms(frame, 0)
+        points = points[chance.permutation(len(points))[: int(kept * len(points))]]
+        clouds.append(PointCloud.from_arrays(points + chance.normal(0, noise, points.shape)))
+    landmarks = [
+        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), "surface", None, SPACING, 0, (0.0,) * 6))
+        for n, place in enumerate(PATHS[0])
+    ]
+    source = KeptFrames("arms", clouds, np.arange(float(FRAMES)))
+    with Timeline(source, source.times(), "mm") as scan:
+        return track_landmarks(scan, landmarks)
+
+
+def judged(tracks: Mapping[str, Track]) -> tuple[Float, Float]:
+    """The errors of what is tracked and their standard deviations, (n,) each."""
+    off, sigmas = [], []
+    for n, track in enumerate(tracks.values()):
+        told = track.known == Known.TRACKED
+        off.append(np.linalg.norm(track.positions - PATHS[:, n], axis=1)[told])
+        sigmas.append(track.sigmas[told])
+    return np.concatenate(off), np.concatenate(sigmas)
+
+
+def test_landmarks_go_along_with_points_that_come_back_in_most_frames() -> None:
+    off, sigmas = judged(tracks_of_arms(0.0, 0.9))
+    assert len(off) == len(PATHS[0]) * (FRAMES - 1), "there are gaps"
+    assert off.max() < 0.15 * SPACING
+    assert (off <= 2 * sigmas).mean() > 0.9
+    assert sigmas.max() < 0.3 * SPACING
+
+
+def test_noise_of_the_points_is_told() -> None:
+    off, sigmas = judged(tracks_of_arms(0.05))
+    assert len(off) > 0.9 * len(PATHS[0]) * (FRAMES - 1)
+    assert (off <= 2 * sigmas).mean() >= 0.9
+    assert np.median(sigmas) < 0.15 * SPACING

@@ -1,0 +1,258 @@
+"""Points that recur: material points that several frames hold, each in an order of its own.
+
+Where frames hold the same points, such as the vertices of one mesh, their irregular pattern tells the place
+along the surface exactly. A pattern of points counts as found where points at random would not lie so near to
+it (a contrario, Moisan and Stival 2004), and where it fits no other place nearly as well, in the other frame
+or in its own: so the grid of a range camera, which recurs at each step of a pixel, is never taken for matter.
+From patterns that are found, matches grow over the surface, each point's place predicted by those beside it
+(match propagation, Lhuillier and Quan 2002): thus they reach limbs that are too fast to be looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .surface import MomentSurface
+
+Float = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+_POINTS = 24  # of a pattern
+_CERTAIN = 1e-6  # chance of points at random to fit as well anywhere where a pattern is looked for
+_DISTINCT = np.log(4.0)  # a point, in information: residuals of other places are twice as large at least
+_SEARCH = 5.0  # spacings that a pattern may be from where it is looked for
+_SEED_SEARCH = 12.0  # the same for patterns that matches grow from
+_SEEDS = 24  # patterns that are tried in a round
+_LEAPS = 3  # rounds, each over what is not matched yet
+_FARTHEST = 15.0  # the same in spacings of the pattern
+_BESIDE = 13  # points that tell where one of them goes
+_MATCHED = 0.3  # local spacings that matched points of a pattern are off at most
+_STRAY = 3.0  # times the median, that they may be off where the surface is deformed
+_NEXT = 8  # points next to the place, of which half have to be matched
+_LEAST_FREEDOM = 0.25  # of residuals besides what the map takes of them
+_FLOOR = 0.02  # spacings: what bending leaves at least, standard deviation
+
+
+@dataclass(frozen=True, eq=False)
+class FoundPattern:
+    """A pattern in another frame.
+
+    place: (3,), of its centre. linear: (3, 3), how it is turned and stretched. rows: (n,), the points
+    that are its own, -1 where one has none. covariance: (3, 3), of the place.
+    """
+
+    place: Float
+    linear: Float
+    rows: Rows
+    covariance: Float
+
+    @classmethod
+    def itself(cls, pattern: PointPattern) -> FoundPattern:
+        """A pattern in its own frame."""
+        return cls(pattern.place, np.eye(3), pattern.rows, np.zeros((3, 3)))
+
+
+class PointPattern:
+    """The points nearest to a place of a surface."""
+
+    def __init__(self, surface: MomentSurface, place: Float, frame: Float, rows: Rows) -> None:
+        """frame: (3, 3), tangents and normal. rows: (n,), of its points, the nearest first."""
+        self.rows, self.place, self._frame = rows, place, frame
+        self._offsets = surface.held.points[rows] - place
+        self._area = float(np.pi * (self._offsets[-1] ** 2).sum() / len(rows))
+        self._closeness = 1 / (1 + (self._offsets**2).sum(axis=1) / self._area) ** 2
+        self._spacing = surface.spacing
+        self._own = surface
+        self._alike: float | None = None
+
+    @classmethod
+    def around(cls, surface: MomentSurface, place: Float) -> PointPattern | None:
+        """The pattern around a place; None where there are too few points, or no surface."""
+        from .pattern_kernels import nearest_rows
+
+        rows = np.empty(_POINTS, np.int32)
+        found = nearest_rows(surface.held, place[0], place[1], place[2], rows, np.empty(_POINTS))
+        if found < _POINTS:
+            return None
+        frame = surface.axes_at(place, float(np.linalg.norm(surface.held.points[rows[-1]] - place)))
+        pattern = None if frame is None else cls(surface, place, frame, rows.astype(np.int64))
+        return pattern if pattern is not None and pattern._area > 0 else None
+
+    def found(
+        self, surface: MomentSurface, place: Float, linear: Float, search: float = _SEARCH
+    ) -> FoundPattern | None:
+        """The pattern in another frame, near a place, (3,), and turned about as it is, (3, 3); None where it
+        is not found, or fits several places. search: how far it may be, spacings."""
+        found, rows, off, told = self._fitted(surface, place, linear, search)
+        if told[0] > np.log(_CERTAIN) or not self._is_distinct(told[1], told[2]):
+            return None
+        if self._alike is None:  # elsewhere in its own frame
+            self._alike = float(self._fitted(self._own, self.place, np.eye(3), 2 * search)[3][2])
+        if not self._is_distinct(told[1], self._alike):
+            return None
+        rows = np.where(off <= _MATCHED * np.sqrt(self._area), rows, -1)
+        return self._told(surface, rows, found[1])
+
+    def followed(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
+        """The pattern in another frame, where some of its points are known, (n,), others are -1; None where
+        too few next to the place are. linear: (3, 3), about how it is turned."""
+        from .pattern_kernels import fill_pattern
+
+        if (rows[:_NEXT] >= 0).sum() < _NEXT // 2:
+            return None
+        reach = _MATCHED * np.sqrt(self._area)
+        place, linear = self._weighted(surface, rows, linear)
+        rows = rows.copy()
+        fill_pattern(self._offsets, surface.held, linear, place, reach, rows)
+        return self._told(surface, rows, linear)
+
+    def _fitted(
+        self, surface: MomentSurface, place: Float, linear: Float, search: float
+    ) -> tuple[tuple[Float, Float], Rows, Float, Float]:
+        """Its place and map where it fits best, its rows there, how far each is off, and what
+        `find_pattern` tells."""
+        from .pattern_kernels import find_pattern
+
+        linear, place = np.array(linear, np.float64), np.array(place, np.float64)
+        count = len(self._offsets)
+        rows, off, told = np.full(count, -1), np.full(count, np.inf), np.empty(3)
+        reach = min(search * self._spacing, _FARTHEST * np.sqrt(self._area))
+        find_pattern(
+            self._offsets, self._frame, self._area, surface.held, reach, linear, place, rows, off, told
+        )
+        return (place, linear), rows, off, told
+
+    def _is_distinct(self, information: float, other: float) -> bool:
+        return information - other >= _DISTINCT * len(self._offsets)
+
+    def _weighted(self, surface: MomentSurface, rows: Rows, linear: Float) -> tuple[Float, Float]:
+        """Its place and map by the points that are known, those next to the place above all."""
+        from .pattern_kernels import fit_map
+
+        linear, place = linear.copy(), np.full(3, np.nan)
+        weights = (rows >= 0) * self._closeness
+        fit_map(
+            self._offsets, surface.held.points[rows], weights, self._frame, np.sqrt(self._area), linear, place
+        )
+        return place, linear
+
+    def _told(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
+        """What is found, but for points that are far off, and how sure the others are of the place."""
+        from .pattern_kernels import FREE
+
+        place, linear = self._weighted(surface, rows, linear)
+        targets = surface.held.points[rows]
+        off = np.linalg.norm(place + self._offsets @ linear.T - targets, axis=1)
+        usual = np.median(off[rows >= 0]) if (rows >= 0).any() else 0.0
+        rows = np.where(off <= max(_MATCHED * np.sqrt(self._area), _STRAY * usual), rows, -1)
+        if (rows[:_NEXT] >= 0).sum() < _NEXT // 2:
+            return None
+        place, linear = self._weighted(surface, rows, linear)
+        weights = (rows >= 0) * self._closeness
+        left = ((place + self._offsets @ linear.T - targets) ** 2).sum(axis=1)
+        share = (weights**2).sum() / weights.sum() ** 2  # one over as many points as count
+        freedom = max(1 - FREE * share, _LEAST_FREEDOM)
+        variance = weights @ left / weights.sum() / 2 / freedom  # along two axes of the surface
+        covariance = (variance * share + (_FLOOR * self._spacing) ** 2) * np.eye(3)
+        return FoundPattern(place, linear, rows, covariance)
+
+
+class RecurringPoints:
+    """The points of a frame that recur in the next one.
+
+    matches: (N,), the row of each in the next frame, -1 for those that do not. maps: (N, 3, 3), how the
+    surface there is turned and stretched.
+    """
+
+    def __init__(self, before: MomentSurface, now: MomentSurface, starts: Float, motions: Float) -> None:
+        """starts: (n, 3), places near which patterns are tried first; motions: (n, 3), where these are
+        expected to go."""
+        count = len(before.held.points)
+        self._before, self._now = before, now
+        self.matches, self.maps = np.full(count, -1), np.zeros((count, 3, 3))
+        self._grown, self._taken = self.matches.copy(), np.full(len(now.held.points), -1)
+        self._queue, self._queued = np.empty(count, np.int64), 0
+        self._around: NDArray[np.int32] | None = None
+        for place, motion in zip(starts, motions, strict=True):
+            self._grow_from(place, place + motion, np.eye(3))
+        for _ in range(_LEAPS):
+            left = before.held.points[self._grown < 0]
+            if not len(left):
+                break
+            for place in _spread(left):
+                self._grow_from(place, *self._expected(place))
+            if self._around is None:
+                break
+        if self._around is not None:
+            from .pattern_kernels import prove_matches
+
+            prove_matches(before.held, now.held, self._around, self._grown, self.maps, self.matches)
+
+    def carried(self, rows: Rows, linear: Float) -> tuple[Rows, Float]:
+        """Rows (n,) of the frame, or -1, in the next one, and a map to the frame, (3, 3), as one to the next,
+        by that of the first of the rows."""
+        there = np.where(rows >= 0, self.matches[rows], -1)
+        known = np.flatnonzero(there >= 0)
+        return there, self.maps[rows[known[0]]] @ linear if len(known) else linear
+
+    def moved(self, places: Float, reach: float) -> tuple[Float, NDArray[np.bool_]]:
+        """Where places (n, 3) go, and which are known, (n,): those within reach of a point that recurs."""
+        from scipy.spatial import cKDTree
+
+        known = np.flatnonzero(self.matches >= 0)
+        if not len(known):
+            return places, np.zeros(len(places), bool)
+        points = self._before.held.points[known]
+        away, nearest = cKDTree(points).query(places)
+        rows = known[nearest]
+        arms = np.einsum("nij,nj->ni", self.maps[rows], places - points[nearest])
+        return self._now.held.points[self.matches[rows]] + arms, away <= reach
+
+    def _expected(self, place: Float) -> tuple[Float, Float]:
+        """Where a place is expected to go, (3,), and how it turns, (3, 3): as the nearest points that are
+        matched."""
+        known = self._queue[: self._queued]
+        if not len(known):
+            return place, np.eye(3)
+        away = place - self._before.held.points[known]
+        nearest = np.argmin((away**2).sum(axis=1))
+        row = known[nearest]
+        return self._now.held.points[self._grown[row]] + self.maps[row] @ away[nearest], self.maps[row]
+
+    def _grow_from(self, place: Float, expected: Float, linear: Float) -> None:
+        """Grow matches from the pattern around a place, where it is found near another one."""
+        from scipy.spatial import cKDTree
+
+        from .pattern_kernels import grow_matches
+
+        pattern = PointPattern.around(self._before, place)
+        if pattern is None or self._grown[pattern.rows[0]] >= 0:
+            return
+        found = pattern.found(self._now, expected, linear, _SEED_SEARCH)
+        if found is None:
+            return
+        for row, match in zip(pattern.rows.tolist(), found.rows.tolist(), strict=True):
+            if match >= 0 and self._grown[row] < 0 and self._taken[match] < 0:
+                self._grown[row], self._taken[match], self.maps[row] = match, row, found.linear
+                self._queue[self._queued] = row
+                self._queued += 1
+        here, there = self._before.held, self._now.held
+        if self._around is None:
+            nearest = cKDTree(here.points).query(here.points, min(_BESIDE, len(here.points)))[1]
+            self._around = nearest.astype(np.int32)
+        self._queued = grow_matches(
+            here, there, self._around, self._grown, self._taken, self.maps, self._queue, self._queued
+        )
+
+
+def _spread(points: Float) -> Float:
+    """Some of the points, spread over them, (n, 3)."""
+    from .body_kernels import spread_out
+
+    some = np.ascontiguousarray(points[:: max(1, len(points) // 10_000)])
+    chosen = np.empty(min(_SEEDS, len(some)), np.int64)
+    spread_out(some, chosen)
+    return some[chosen]
