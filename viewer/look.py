@@ -70,8 +70,8 @@ class Look:
     )  # fmt: skip
     color_by: str = param(
         "auto",
-        f"What gives the colour: {', '.join(COLOR_BY)}, a scalar's name, #N for scalar N, or a number "
-        "that the backend finds",
+        f"Source of the colour: {', '.join(COLOR_BY)}, a scalar's name, #N for scalar N, or a number "
+        "that the renderer computes",
         title="Colour by",
         words=COLOR_WORDS,
         group="Colour",
@@ -112,7 +112,7 @@ class Look:
     background: str = param("#1a1c20", "Background colour, #rrggbb or #rrggbbaa", group="Colour", basic=True)
     holes: bool = param(
         False,
-        f"Paint holes red: gaps of up to {2 * HOLE_REACH} pixels between what is shown",
+        f"Paint holes red: empty places of up to {2 * HOLE_REACH} pixels inside the subject",
         title="Show holes",
         group="Colour",
         key="G",

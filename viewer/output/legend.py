@@ -29,19 +29,19 @@ class Marks:
     """A choice of what is drawn over a picture."""
 
     scale_bar: bool = param(
-        False, "A bar of a round length in scan units; in perspective at the depth of the camera's target"
+        False, "Scale bar of a round length. In perspective it is right at the depth of the camera's target"
     )
     color_bar: bool = param(
         False,
-        "The colour map and its numbers, where the look colours by a number; colours of levels and holes",
+        "Colour bar, if the look colours by a number or by level, or paints holes",
     )
-    stamp: bool = param(False, "Number of the frame, and its time")
-    measurements: bool = param(False, "Measured distances, as they stand in the frame")
-    notes: bool = param(False, "Notes that are pinned to places and to the frame")
-    landmarks: bool = param(False, "Landmarks, as they stand in the frame")
-    trajectories: bool = param(False, "Ways of landmarks through all frames, those that the view shows")
-    measure_lines: bool = param(False, "What measures measure in the frame, with their values")
-    plot: bool = param(False, "The plot of measures, where it is shown, with a line at the frame")
+    stamp: bool = param(False, "Number and time of the frame")
+    measurements: bool = param(False, "Measured distances of the frame")
+    notes: bool = param(False, "Notes on positions and on the frame")
+    landmarks: bool = param(False, "Landmarks of the frame")
+    trajectories: bool = param(False, "Paths of landmarks through all frames, as shown in the view")
+    measure_lines: bool = param(False, "Lines of the measures in the frame, with their values")
+    plot: bool = param(False, "Plot of the measures, if the view shows it, with a line at the frame")
 
     def __bool__(self) -> bool:
         return any(getattr(self, field.name) for field in fields(self))

@@ -27,7 +27,7 @@ class Stop:
 
     rule: str = param(
         "delta",
-        "Ends subdivision: few positions that share a leaf, a level, or few points in an octant",
+        "When division ends: few positions share a leaf, a level is reached, or an octant holds few points",
         choices=STOPS,
         affects="derive",
     )
@@ -35,7 +35,9 @@ class Stop:
         0.05, "Share of the positions that may lack a leaf of their own", low=0, high=1, affects="derive"
     )
     depth: int = param(10, "Level of the leaves", low=0, high=DEEPEST, affects="derive")
-    occupancy: int = param(8, "Points that are not divided any more", low=1, affects="derive")
+    occupancy: int = param(
+        8, "Number of points up to which an octant is not divided", low=1, affects="derive"
+    )
 
     def __post_init__(self) -> None:
         for parameter in describe(type(self)):
