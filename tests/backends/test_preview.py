@@ -120,7 +120,7 @@ def test_of_few_points_none_is_left_out(preview: Preview, name: str) -> None:
 
 @every_backend_of_points
 def test_ties_go_to_the_lowest_row_of_the_sample(preview: Preview, name: str) -> None:
-    count = 4000
+    count = 2000
     cloud = PointCloud.from_arrays(
         np.zeros((count, 3)), normals=np.tile([0.0, 0, 1], (count, 1)), radii=np.ones(count)
     )

@@ -50,7 +50,10 @@ BETWEEN = {
     "zoomed in on 10^-3 of the scan", "zoomed in on 10^-3 of a splat", "zoomed out x10^6",
     "normals within 10^-4 of y", "points x1000, all over again",
 }  # fmt: skip
-LONG = {("8192x1 pixels", "hpr"), ("points of a body x1000", "surfels instancing=tiles")}
+LONG = {
+    ("8192x1 pixels", "hpr"),
+    *(("points of a body x1000", name) for name in variants() if name.startswith("surfels")),
+}
 
 
 def is_slow(row: Row, name: str) -> bool:
