@@ -268,3 +268,61 @@ def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
     assert across.warning == f"openings in 1 of 2 frames: as little as {told}"
     assert "no value in 1 of 3 frames: c3 is a gap; openings in 1 of 3 frames" in area.warning
     assert way.in_frames([1, 2]).note(0) == way.note(1)
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_limb_that_sticks_out_is_part_of_a_region(order: int) -> None:
+    """A region may have any number of times the area of a circle as long as its outline."""
+    limb = [*((radius, 0.0) for radius in np.linspace(30, 4, 27)), *((4.0, float(z)) for z in range(1, 41))]
+    surface = turned([*limb, *arc(4, 88, 2, 40)])
+    area, outline = (found(surface, kind, ring(10)[::order]) for kind in ("area", "perimeter"))
+    assert area.value == pytest.approx(polygon(10) - 16 * np.pi + 320 * np.pi + 32 * np.pi, rel=0.02)
+    assert area.value > 4 * outline.value**2 / (4 * np.pi)
+
+
+@pytest.mark.parametrize("is_body", [False, True])
+def test_through_an_opening_there_is_less_surface(is_body: bool) -> None:
+    """A sheet with a hole; and a body of that and a whole sheet behind, which does not fill the hole."""
+    places = sheet(44, 44)
+    above = np.pad(places[np.linalg.norm(places, axis=1) > 6], ((0, 0), (0, 1)))
+    points, normals = above, np.tile(UP, (len(above), 1))
+    if is_body:
+        below = np.pad(sheet(44, 44, seed=1), ((0, 0), (0, 1))) - 30 * UP
+        points = np.concatenate([above, below])
+        normals = np.concatenate([normals, np.tile(-UP, (len(below), 1))])
+    surface = PoseSurface(pose_of(points, normals=normals))
+    ring_area = polygon(13) - np.pi * 36
+    area = found(surface, "area", ring(13), depth="through")
+    assert area.value == pytest.approx(ring_area + is_body * polygon(13), rel=0.03)
+    assert area.share == pytest.approx(ring_area / polygon(13), abs=0.03)
+    assert found(surface, "perimeter", ring(13), depth="through").share == pytest.approx(1)
+    across = np.array([[-10.0, 0, 0], [10, 0, 0], [0, 12, 0]])
+    outline = found(surface, "perimeter", across, depth="through")
+    assert outline.share == pytest.approx(1 - 12 / (20 + 2 * np.hypot(10, 12)), abs=0.05)
+
+
+def test_a_section_that_ends_at_an_opening_is_refused() -> None:
+    """Around a tube with a window, and along a sheet with a hole; a line from border to border is whole."""
+    radius, places = 20.0, sheet(125, 60)
+    turn = (places[:, 0] + 62.5) / 126 * 2 * np.pi
+    normals = np.stack([np.sin(turn), 0 * turn, np.cos(turn)], axis=1)
+    points = radius * normals + places[:, [1]] * [0, 1, 0]
+    is_window = np.hypot(radius * (turn - np.pi), places[:, 1]) < 6
+    tube = PoseSurface(pose_of(points[~is_window], normals=normals[~is_window]))
+
+    def around(height: float) -> np.ndarray:
+        return np.array([[radius, height, 0], [0, height, radius], [-radius, height, 0]])
+
+    assert found(tube, "section", around(15)).value == pytest.approx(2 * np.pi * radius, rel=0.01)
+    assert refused(tube, "section", around(0)).startswith("its line ends at an opening")
+    both = found(tube, "section", around(0), lines="all")
+    assert both.value == pytest.approx(2 * np.pi * radius - 12, abs=2)
+    places = sheet(44, 44)
+    bent = np.column_stack([places, -(places[:, 0] ** 2) / 60])
+    holed = PoseSurface(pose_of(bent[np.linalg.norm(places, axis=1) > 6]))
+    upright = np.array([[-15.0, 0, -15 * 15 / 60], [15, 0, -15 * 15 / 60], [10, 0, -40]])
+    assert refused(holed, "section", upright).startswith("its line ends at an opening")
+    beside = found(holed, "section", upright + np.array([0, 12, 0]))
+    steps = np.linspace(-22, 22, 400)
+    expected = np.hypot(np.diff(steps), np.diff(-(steps**2) / 60)).sum()
+    assert beside.value == pytest.approx(expected, rel=0.02)

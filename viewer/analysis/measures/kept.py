@@ -24,7 +24,7 @@ from . import Measure
 from .regions import Refused
 from .surface import Found
 
-VERSION = 2  # of how measures are found: raise it where any value changes
+VERSION = 3  # of how measures are found: raise it where any value changes
 _MOST_BYTES = 48 * 2**20  # of a file; of more frames nothing is kept
 _MOST_IN_ALL = 256 * 2**20
 

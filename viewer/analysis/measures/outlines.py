@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from ...mesh.smoothing import Points
 from .planes import THROUGH, plane_of
 
+_GRID = 48
+
 Outline = NDArray[np.float64]  # (P, 2)
 
 
@@ -47,6 +49,19 @@ class Prism:
     def has(self, flat: Outline) -> NDArray[np.bool_]:
         """Whether places in the plane, (..., 2), are in the polygon, (...)."""
         return is_within(flat.reshape(-1, 2), self.corners).reshape(flat.shape[:-1])
+
+    def within(self) -> Outline:
+        """Places of a grid of 48 x 48 over the polygon that are in it, (N, 2)."""
+        low, high = self.corners.min(axis=0), self.corners.max(axis=0)
+        steps = (np.stack(np.meshgrid(*2 * [np.arange(_GRID)]), axis=-1).reshape(-1, 2) + 0.5) / _GRID
+        places = low + steps * (high - low)
+        return places[is_within(places, self.corners)]
+
+    def around(self) -> Outline:
+        """Places along the sides of the polygon, 48 on each, (48 K, 2)."""
+        shares = (np.arange(_GRID)[:, None] + 0.5) / _GRID
+        sides = zip(self.corners, np.roll(self.corners, -1, axis=0), strict=True)
+        return np.concatenate([start + shares * (end - start) for start, end in sides])
 
     def beyond(self, points: Points) -> NDArray[np.float64]:
         """How far points (N, 3) are outside the prism, negative within, (N,)."""

@@ -34,6 +34,27 @@ def area_through(patch: Patch, prism: Prism) -> NDArray[np.float64]:
     return areas
 
 
+def share_through(patch: Patch, prism: Prism, flat: NDArray[np.float64]) -> float:
+    """How much of some places in the plane of a prism, (N, 2), has a surface before or behind it, 0 to 1; NaN
+    without places. Where surfaces face both ways, as those of a body do, the share is that of the side that
+    has less, unless it has less than half as much as the other.
+    """
+    import open3d
+
+    if not len(flat):
+        return float("nan")
+    reach = np.abs((patch.vertices - prism.center) @ prism.normal).max() + 1
+    starts = prism.center + flat @ prism.axes - reach * prism.normal
+    rays = np.concatenate([starts, np.broadcast_to(prism.normal, starts.shape)], axis=1, dtype=np.float32)
+    scene, tensor = open3d.t.geometry.RaycastingScene(), open3d.core.Tensor.from_numpy
+    scene.add_triangles(tensor(patch.vertices.astype(np.float32)), tensor(patch.faces.astype(np.uint32)))
+    met = scene.list_intersections(tensor(rays))
+    places, faces = met["ray_ids"].numpy(), met["primitive_ids"].numpy()
+    faces_up = patch.doubled[faces] @ prism.normal > 0
+    sides = [len(np.unique(places[faces_up == side])) / len(flat) for side in (True, False)]
+    return min(share for share in sides if 2 * share >= max(sides))
+
+
 def middles_of(patch: Patch, faces: NDArray[np.intp]) -> NDArray[np.float64]:
     """The middles of the 64 parts of equal area of faces by number, (F', 64, 3)."""
     return np.tensordot(patch.corners[:, faces], _MIDDLES, (0, 1)).transpose(0, 2, 1)

@@ -35,6 +35,7 @@ _AROUND = 0.3  # times the same: how far around their outline
 _GROWS = 1.6  # by which what is looked at grows where no path is found
 _DETOUR = 0.05  # of its length, or a spacing: how much longer a path may be as it goes around openings
 _TRIES = 8
+_LOOKS = 3  # of these, how often an opening is looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +164,27 @@ class PoseSurface:
         patch = self.patch(lambda points: np.linalg.norm(points - local, axis=1) - 2 * reach)
         place = patch.nearest(local) if len(patch.faces) else None
         return place.position + self.origin if place is not None and place.away <= reach else None
+
+    def has_opening(self, one: NDArray[np.float64], other: NDArray[np.float64]) -> bool:
+        """Whether two places (3,), relative to the origin, are on the rim of one opening of the surface."""
+        from scipy.spatial import cKDTree
+
+        middle, reach = (one + other) / 2, float(np.linalg.norm(other - one)) / 2
+        for _ in range(_LOOKS):
+            reach = _GROWS * reach + _RIM * self.spacing
+
+            def beyond(points: Points, reach: float = reach) -> NDArray[np.float64]:
+                return np.linalg.norm(points - middle, axis=1) - reach
+
+            patch = self.patch(beyond)
+            start, _ = patch.border
+            if not len(start):
+                return False
+            _, nearest = cKDTree(patch.vertices[start]).query([one, other])
+            holes = inner_holes(patch, lambda points, beyond=beyond: beyond(points) > 0)
+            if patch.holes[nearest[0]] == patch.holes[nearest[1]] and patch.holes[nearest[0]] in holes:
+                return True
+        return False
 
     def path(self, start: NDArray[np.float64], end: NDArray[np.float64]) -> Circuit | Refused:
         """The shortest path over the surface from one place to another; a reason where they are not on it,

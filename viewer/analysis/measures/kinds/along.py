@@ -67,6 +67,10 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     lines = _contours(patch, center, normal, local[0], options)
     if not lines:
         return Refused("the plane of its landmarks meets no surface")
+    if options.get("lines") != "all" and _ends_at_opening(
+        surface, lines[0], plane_section(patch, center, normal)
+    ):
+        return Refused("its line ends at an opening: close it, or take all lines")
     gradient = np.zeros_like(positions)
     step = _STEP * surface.spacing
     for number in range(len(local)):
@@ -93,6 +97,28 @@ def _contours(
     if options.get("lines") == "all" or not lines:
         return lines
     return [min(lines, key=lambda line: float(np.linalg.norm(line - first, axis=1).min()))]
+
+
+def _ends_at_opening(surface: PoseSurface, line: Line, lines: Sequence[Line]) -> bool:
+    """Whether a line, of these lines in one plane, goes on across an opening that is narrower than half of
+    the line and what follows; where none is, the surface ends."""
+    if (line[0] == line[-1]).all():
+        return False
+    for end in (line[0], line[-1]):
+        ends = [
+            (
+                float(np.linalg.norm(other - end)),
+                length_of(line) + length_of(each) * (not np.array_equal(each, line)),
+                other,
+            )
+            for each in lines
+            for other in (each[0], each[-1])
+            if (other != end).any()
+        ]
+        away, whole, other = min(ends, key=lambda found: found[0])
+        if away < whole / 2 and surface.has_opening(end, other):
+            return True
+    return False
 
 
 KINDS = (

@@ -9,7 +9,7 @@ from ....mesh.geodesic import Line, length_of, steps_along
 from ....mesh.patch import Patch
 from .. import WHOLE
 from ..outlines import Prism, crosses_itself
-from ..prism import area_through, near_rim, patch_through, rim_through
+from ..prism import area_through, near_rim, patch_through, rim_through, share_through
 from ..regions import CROSSES, NO_PLANE, across, below, plane_facing
 from ..surface import Circuit, Found, PoseSurface, Refused
 from . import MeasureKind, Options
@@ -69,7 +69,8 @@ def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bo
     gradient = _gradient_through(
         near_rim(patch, prism, _RIM * surface.spacing), prism, surface.spacing, is_rim
     )
-    return Found(value, gradient, deviation, tuple(line + surface.origin for line in lines))
+    share = share_through(patch, prism, prism.around() if is_rim else prism.within())
+    return Found(value, gradient, deviation, tuple(line + surface.origin for line in lines), share)
 
 
 def _gradient_through(rim: Patch, prism: Prism, spacing: float, is_rim: bool) -> NDArray[np.float64]:
