@@ -174,15 +174,18 @@ class PoseSurface:
             reach = _GROWS * reach + _RIM * self.spacing
 
             def beyond(points: Points, reach: float = reach) -> NDArray[np.float64]:
-                return np.linalg.norm(points - middle, axis=1) - reach
+                away: NDArray[np.float64] = np.linalg.norm(points - middle, axis=1) - reach
+                return away
+
+            def is_cut(points: Points, beyond: Beyond = beyond) -> NDArray[np.bool_]:
+                return beyond(points) > 0
 
             patch = self.patch(beyond)
             start, _ = patch.border
             if not len(start):
                 return False
-            _, nearest = cKDTree(patch.vertices[start]).query([one, other])
-            holes = inner_holes(patch, lambda points, beyond=beyond: beyond(points) > 0)
-            if patch.holes[nearest[0]] == patch.holes[nearest[1]] and patch.holes[nearest[0]] in holes:
+            holes = patch.holes[cKDTree(patch.vertices[start]).query([one, other])[1]]
+            if holes[0] == holes[1] and holes[0] in inner_holes(patch, is_cut):
                 return True
         return False
 
