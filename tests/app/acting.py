@@ -15,7 +15,11 @@ from typing import Any
 from imgui_bundle import _imgui_bundle, imgui
 from walking import Walk
 
+from viewer.app.tools import tool_names
+
 engine = imgui.test_engine
+PANEL = "panel/settings"
+SECTIONS = ("Scan", *tool_names(), "Appearance", "Views", "Renderer", "Statistics")  # of it
 
 Action = Sequence[Any]  # name of a method of the engine's TestContext, and its arguments
 
@@ -74,7 +78,20 @@ class Actor:
                 self._walked = Walk(context, *arguments)
                 self._walked.begin()
             else:
+                if self._window == PANEL:
+                    arguments = [_found(context, one) for one in arguments]
                 getattr(context, name)(*arguments)
+
+
+def _found(context: engine.TestContext, argument: Any) -> Any:
+    """The argument of an action; a path of a widget begins with the section of the panel that has it."""
+    if not isinstance(argument, str) or not argument or argument.startswith(("//", "**")):
+        return argument
+    there = engine.TestItemList()
+    context.gather_items(there, "", 99)
+    ids = {there.get_by_index(number).id_ for number in range(there.get_size())}
+    paths = (argument, *(f"{section}/{argument}" for section in SECTIONS))
+    return next((path for path in paths if context.get_id(path) in ids), argument)
 
 
 def _let_go_of_the_lock() -> Any:

@@ -101,6 +101,8 @@ class Panel:
         if shows != is_open or name in self._opened:
             self._opened[name] = shows
         if shows:
+            imgui.push_id(name)  # what other sections declare may have the same labels
             declare()
+            imgui.pop_id()
             if is_revealed:
                 imgui.set_scroll_here_y(1.0)
