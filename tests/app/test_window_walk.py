@@ -63,7 +63,9 @@ def test_no_buttons_of_the_bars_share_an_id_but_those_that_do(
         assert "Traceback" not in app.log()
 
 
-PARTS = 6  # of a walk, each of which takes a minute or two
+# Of a walk, each of which takes a minute or two, and has at least its share of the widgets that are there at
+# first: of 110 with landmarks. With what these open, parts had 49 to 180.
+PARTS = 6
 in_parts = pytest.mark.parametrize("part", range(PARTS))
 
 
@@ -72,7 +74,7 @@ in_parts = pytest.mark.parametrize("part", range(PARTS))
 def test_all_widgets_of_a_scan_with_landmarks(screen: Screen, tmp_path: Path, part: int) -> None:
     scan = left_open(tmp_path, frames=3, landmarks=4, measures=2)
     with running_app(screen, tmp_path, scan) as app:
-        check(app, app.walk(part=(part, PARTS)), 20)
+        check(app, app.walk(part=(part, PARTS)), 18)
 
 
 @pytest.mark.slow
@@ -81,13 +83,13 @@ def test_all_widgets_of_a_range_scan(screen: Screen, tmp_path: Path, part: int) 
     views = sphere_view((0.3, 0, 4)), sphere_view((3, -1, 4), name="right")
     formats.write(tmp_path / "rig.exr", merge(views), views)
     with running_app(screen, tmp_path, tmp_path / "rig.exr") as app:
-        check(app, app.walk(part=(part, PARTS)), 20)
+        check(app, app.walk(part=(part, PARTS)), 15)
 
 
 @pytest.mark.slow
 def test_all_widgets_while_no_frame_is_there(screen: Screen, tmp_path: Path, ball: Path) -> None:
     with running_app(screen, tmp_path, ball, before=f"exec({STUCK!r}); ", shows=False) as app:
-        check(app, app.walk(), 40)
+        check(app, app.walk(), 100)
 
 
 @pytest.mark.slow
@@ -97,4 +99,4 @@ def test_all_widgets_in_large_text(screen: Screen, tmp_path: Path, ball: Path, p
     folder.mkdir(parents=True)
     (folder / "settings.json").write_text(json.dumps({"format": 1, "text_scale": 2.0}))
     with running_app(screen, tmp_path, ball) as app:
-        check(app, app.walk(part=(part, PARTS)), 20)
+        check(app, app.walk(part=(part, PARTS)), 10)
