@@ -23,6 +23,7 @@ from .smoothing import Points
 _OFF = 0.5  # spacings above the patch, where rays begin
 _RAYS = 12
 _OPEN = 8  # of these that reach the sky, from which on a vertex is open; by a wall at a right angle half do
+_THIN = 1e-5  # of the longest edge of a lid: the least width of its faces
 _SAME = 1e-6  # of the length of a line, within which its places are on the border
 
 
@@ -79,7 +80,7 @@ def bridged(patch: Patch, holes: Rows) -> Patch:
 
     The face on three vertices in a row with the least circumcircle comes first, again and again: so a lid
     joins the sides of a slit straight across, and has no flat faces. A vertex in the middle closes what is
-    left where two vertices are joined already.
+    left where two vertices are joined already. A crack without width stays open.
     """
     start, end = patch.border
     chosen = np.isin(patch.holes, holes)
@@ -93,12 +94,21 @@ def bridged(patch: Patch, holes: Rows) -> Patch:
             loop.append(before.pop(loop[-1]))
         del before[loop[-1]]
         lid, left = _zipped(loop, places, taken)
-        faces.append(np.array(lid, np.int64).reshape(-1, 3))
+        added = [np.array(lid, np.int64).reshape(-1, 3)]
+        wider = np.vstack([vertices, patch.vertices[left].mean(axis=0)]) if left else vertices
         if left:
-            faces.append(np.array([(a, b, len(vertices)) for a, b in pairwise([*left, left[0]])]))
-            vertices = np.vstack([vertices, patch.vertices[left].mean(axis=0)])
-    added = np.full(len(vertices) - len(patch.vertices), -1)
-    return Patch(vertices, np.concatenate(faces), np.append(patch.sources, added))
+            added.append(np.array([(a, b, len(vertices)) for a, b in pairwise([*left, left[0]])]))
+        if _is_wide(wider[np.concatenate(added)]):
+            faces, vertices = faces + added, wider
+    sources = np.append(patch.sources, np.full(len(vertices) - len(patch.vertices), -1))
+    return Patch(vertices, np.concatenate(faces), sources)
+
+
+def _is_wide(corners: NDArray[np.float64]) -> bool:
+    """Whether all faces with corners (F, 3, 3) are wider than rounding: paths over others cannot be found."""
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    doubled = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return bool((doubled > _THIN * edges.max() * edges.max(axis=1)).all())
 
 
 def _edges_among(patch: Patch, vertices: Rows) -> set[tuple[int, int]]:

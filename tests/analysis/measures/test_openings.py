@@ -326,3 +326,26 @@ def test_a_section_that_ends_at_an_opening_is_refused() -> None:
     steps = np.linspace(-22, 22, 400)
     expected = np.hypot(np.diff(steps), np.diff(-(steps**2) / 60)).sum()
     assert beside.value == pytest.approx(expected, rel=0.02)
+
+
+def test_an_outline_crosses_a_crack() -> None:
+    """Faces of a sheet part along a line, as at seams of textures; a crack without width is no opening."""
+    x, y = (each.ravel() - 10.0 for each in np.meshgrid(np.arange(21), np.arange(21)))
+    a = (np.arange(20)[:, None] * 21 + np.arange(20)).ravel()
+    faces = np.concatenate([np.stack([a, a + 1, a + 21], axis=1), np.stack([a + 1, a + 22, a + 21], axis=1)])
+    parted = np.flatnonzero((y == 0) & (np.abs(x) < 6))
+    points = np.stack([x, y, 0 * x], axis=1)
+    other = np.arange(len(points))
+    other[parted] = len(points) + np.arange(len(parted))
+    above = y[faces].mean(axis=1) > 0
+    faces[above] = other[faces[above]]
+    corners = np.array([[-4.0, -4, 0], [4, -4, 0], [4, 4, 0], [-4, 4, 0]])
+    for width in (0.0, 1e-12, 0.3):
+        cracked = np.concatenate([points, points[parted] + np.array([0, width, 0])])
+        surface = PoseSurface(pose_of(cracked), faces.astype(np.uint32))
+        outline = found(surface, "perimeter", corners)
+        assert outline.value == pytest.approx(32, abs=0.01 + 2 * outline.deviation)
+        if width > 0.1:
+            area = found(surface, "area", corners)
+            assert area.value == pytest.approx(64 - 8 * width, rel=0.01)
+            assert outline.share == pytest.approx(1 - 2 * width / 32, abs=2e-3)
