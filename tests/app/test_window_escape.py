@@ -10,7 +10,10 @@ import pytest
 from scenes import rarely
 from virtual_screen import PANEL, RunningApp, Screen, running_app
 
+from viewer.app.scene.cube import cube_place
+
 KINDS = ("lists", "pages", "is_export_open", "is_browser_open", "clicking", "shown_notes", "works")
+EM = 16.0  # height of the font, pixels
 VIEW_MENU, LOOK_FROM = (107, 12), (140, 130)  # pixels of the screen
 # What a renderer needs is never found, until its work is cancelled.
 ENDLESS = """
@@ -31,6 +34,25 @@ def running(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     with running_app(screen, tmp_path_factory.mktemp("app"), scan) as app:
         yield app
     assert "Traceback" not in app.log()
+
+
+def test_the_menu_of_up_axes_comes_again_only_with_the_mouse(app: RunningApp) -> None:
+    """It drops while the mouse comes to its button; Escape closes it though the mouse rests there."""
+    left, top, width, height = app.view()
+    x, y, _ = cube_place(width, height, EM) or pytest.fail("there is no cube")
+    button = round(left + x), round(top + 2.02 * y + 0.7 * EM)
+    away = left + width // 2, top + height // 2
+    for _ in range(2):
+        app.screen.do("mousemove", *away)
+        app.settle()
+        app.screen.do("mousemove", *button)
+        app.see(lists=1)
+        app.screen.do("key", "Escape")
+        app.see(lists=0)
+        app.screen.do("mousemove", button[0] + 3, button[1])
+        assert app.settle().lists == 0
+    app.screen.do("click", 1)
+    app.see(lists=1)
 
 
 @pytest.fixture

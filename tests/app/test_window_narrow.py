@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from virtual_screen import PANEL, SIZE, RunningApp, running_app, virtual_screen
 
+from viewer.app.layout import drawer_height
+
 LARGE = 1280, 800
 SHORTEST = 8.0  # the track, in heights of the font
 
@@ -64,6 +66,18 @@ def test_no_text_is_cut_and_the_timeline_has_room(
         assert app.settle().view[3] >= height - 8 * em, "without measures the drawer has a line to say"
         app.screen.do("key", "v")
         assert cut_in_any_state(app) == {}
+
+
+@pytest.mark.parametrize("window", [1400, 1000, 640, 420, 200])
+@pytest.mark.parametrize("em", [16, 32])
+def test_the_view_keeps_its_share_beside_the_drawer(window: float, em: float) -> None:
+    room = window - 3 * em - 4.8 * em  # without toolbar and timeline
+    for wanted in (1.0 * em, 15.0 * em, 60.0 * em):
+        drawer = drawer_height(wanted, window, room)
+        assert drawer <= wanted
+        view = max(room, 0) - drawer
+        assert view >= min(0.35 * window, 0.6 * room)
+        assert drawer == wanted or view == pytest.approx(max(min(0.35 * window, 0.6 * room), 0))
 
 
 @pytest.mark.slow

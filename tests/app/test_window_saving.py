@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from virtual_screen import RunningApp, Screen, running_app
 
+from viewer.app.files.sessions import named_like
 from viewer.app.path_dialog import files_of
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
@@ -25,7 +26,9 @@ def scan(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def app(screen: Screen, tmp_path: Path, scan: Path) -> Iterator[RunningApp]:
-    with running_app(screen, tmp_path / "work", scan, home=tmp_path / "home") as app:
+    other = tmp_path / "other.npy"
+    np.save(other, np.random.default_rng(1).random((300, 3)))
+    with running_app(screen, tmp_path / "work", scan, other, home=tmp_path / "home") as app:
         yield app
     assert "Traceback" not in app.log()
 
@@ -43,7 +46,11 @@ def write(app: RunningApp, text: str) -> None:
 
 def test_ctrl_s_asks_once_and_then_saves_to_that_file(app: RunningApp, tmp_path: Path) -> None:
     file = tmp_path / "work" / "b sub" / "one.scan4d.json"
-    press(app, "ctrl+s", "Up", "Return")  # into the folder, the only row
+    press(app, "p")
+    app.told("Saved .*scan4d_0001.png")
+    press(app, "ctrl+s")
+    assert app.state.fields["##name"] == "scan.scan4d.json", "as the scan is named, not the picture"
+    press(app, "Up", "Return")  # into the folder, the only row
     app.act("Save session", ("item_click", "##name"))
     press(app, "ctrl+a")
     write(app, "one")
@@ -54,6 +61,25 @@ def test_ctrl_s_asks_once_and_then_saves_to_that_file(app: RunningApp, tmp_path:
     assert app.settle().lists == 0, "nothing is asked"
     assert app.told("Saved (.*)")[1] == str(file)
     assert SavedSession.load(file).document.camera != first.document.camera
+    assert app.settle().latest_note.startswith("Saved")
+    press(app, "Next")
+    app.see(lambda state: state.scan.endswith("other.npy"))
+    assert not app.settle().latest_note, "which is about the scan before"
+
+
+@pytest.mark.parametrize(
+    ("scan", "name"),
+    [
+        ("demo", "demo"), ("/a/face.ply", "face"), ("/a/f%04d.ply", "f"), ("/a/*.xyz", "scan"),
+        ("/a/patient 7.v2.ply", "patient 7.v2"), ("/a/b.scan", "b"),
+    ],
+)  # fmt: skip
+def test_a_file_for_the_session_is_named_like_the_scan(scan: str, name: str, tmp_path: Path) -> None:
+    assert named_like(scan, tmp_path, ".x") == tmp_path / f"{name}.x"
+    (tmp_path / f"{name}.x").write_text("")
+    assert named_like(scan, tmp_path, ".x") == tmp_path / f"{name}_2.x"
+    (tmp_path / "set.1").mkdir()
+    assert named_like(str(tmp_path / "set.1"), tmp_path, ".x") == tmp_path / "set.1.x"
 
 
 def test_a_session_that_was_opened_is_saved_to_its_file(screen: Screen, tmp_path: Path, scan: Path) -> None:

@@ -43,7 +43,7 @@ from .files.sessions import Sessions
 from .help import Help
 from .keyboard import Keyboard
 from .menu import MenuBar
-from .notices import Notices, Problem
+from .notices import Notices, Offer, Problem
 from .output.capture import Capture
 from .output.exporting import Exporting
 from .output.replaying import Replayer
@@ -143,7 +143,7 @@ class App:
             self.session, self.note_of_opening, self.refuse, self.open, scans, remembered.recent
         )
         self.sessions: Sessions = Sessions(
-            self.session, self.playback, self.note, self.refuse, self.open, self.take_up,
+            self.session, self.playback, self.note_of_work, self.refuse, self.open, self.take_up,
             lambda at: self.browser.show(at), window.touch,
         )  # fmt: skip
         self._opening = Opening()
@@ -170,13 +170,13 @@ class App:
         self.drawer = Drawer(remembered.drawer, self.tools)
         self.welcome: Welcome = Welcome(self.session, remembered.welcomed)
         self.capture: Capture = Capture(
-            self.session, self.playback, self.viewport, self.note, lambda: self.marks.of_files,
+            self.session, self.playback, self.viewport, self.note_of_work, lambda: self.marks.of_files,
             lambda *film: self.exporting.film(*film), self.ranging.words, self.tools.drawn,
             self.choosing.choice_of, lambda: self.tools.label_places,
         )  # fmt: skip
         self.replayer: Replayer = Replayer(self)
         self.exporting: Exporting = Exporting(
-            self.session, self.playback, self.viewport, self.note, self.capture.shown,
+            self.session, self.playback, self.viewport, self.note_of_work, self.capture.shown,
             remembered.export, remembered.export_marks, window.touch, self.tools.drawn,
         )  # fmt: skip
         self.tasks: Tasks = Tasks(
@@ -204,6 +204,11 @@ class App:
     def note_of_scan(self, text: str) -> None:
         """Tell the user something about the open scan, until another one opens."""
         self.notices.tell(text, "scan")
+
+    def note_of_work(self, text: str) -> None:
+        """Tell the user what came of something that was done with the open scan, until another one opens; a
+        problem or an offer stays."""
+        self.notices.tell(text, "" if isinstance(text, (Problem, Offer)) else "scan")
 
     def note_of_opening(self, text: str) -> None:
         """Tell the user something about what could not be opened, until something else is to be opened."""

@@ -64,13 +64,14 @@ class Listing(Generic[T]):
 @dataclass(frozen=True)
 class Menu(Generic[T]):
     """Groups of entries, with a line between them. is_there: whether it is shown. icon: on the toolbar.
-    title_now: what the toolbar calls it where that changes."""
+    title_now: what the toolbar calls it where that changes, one of `titles`."""
 
     title: str
     groups: tuple[tuple[Command[T] | Listing[T] | Menu[T], ...], ...]
     is_there: Callable[[T], bool] = _always
     icon: str = ""
     title_now: Callable[[T], str] | None = None
+    titles: Callable[[], Iterable[str]] = tuple
 
 
 Entry = Command[T] | Listing[T] | Menu[T]
@@ -185,9 +186,12 @@ def _renderers(app: App) -> Iterator[Item]:
         yield words, partial(app.rendering.choose, name), name == app.rendering.backend
 
 
+_NO_RENDERER = "Renderer"  # is known yet
+
+
 def _renderer_name(app: App) -> str:
     """The name of the renderer that draws."""
-    return "Renderer" if app.rendering.backend is None else backends()[app.rendering.backend].title
+    return _NO_RENDERER if app.rendering.backend is None else backends()[app.rendering.backend].title
 
 
 def _themes(app: App) -> Iterator[Item]:
@@ -198,14 +202,13 @@ def _themes(app: App) -> Iterator[Item]:
 _FILE: Menu[App] = Menu("File", (
     (
         Command(
-            "open", "Open...", lambda app: app.browser.show(), "Ctrl+O", short="Open",
+            "open", "Open a scan...", lambda app: app.browser.show(), "Ctrl+O Q", short="Open",
             icon=icons.ICON_FA_FOLDER_OPEN,
         ),
         Listing("Open recent", lambda app: app.scans.items(app.scans.lately)),
         Listing("Scans", lambda app: app.scans.items(app.scans.listed)),
         Command("next_scan", "Next scan", lambda app: app.scans.step(1), "PageDown", can=_has_scans),
         Command("previous_scan", "Previous scan", lambda app: app.scans.step(-1), "PageUp", can=_has_scans),
-        Command("scans", "Scan list...", lambda app: app.browser.show(), "Q"),
     ),
     (
         Command(
@@ -424,7 +427,13 @@ _TOOLBAR_BEGIN: Toolbar = (
         "open",
         "fit",
         Menu("View", ((_OPENING_VIEW,), *_FROM.groups, (_TURNTABLE, _BOOKMARKS)), icon=icons.ICON_FA_EYE),
-        Menu("Renderer", _RENDERER.groups, icon=icons.ICON_FA_CUBE, title_now=_renderer_name),
+        Menu(
+            "Renderer",
+            _RENDERER.groups,
+            icon=icons.ICON_FA_CUBE,
+            title_now=_renderer_name,
+            titles=lambda: [_NO_RENDERER, *(one.title for one in backends().values())],
+        ),
     ),
 )
 _TOOLBAR_END: Toolbar = (("screenshot", "export", "record"), ("undo", "redo"))

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
 _GRIP = 0.4  # width of what resizes the panel and the drawer, in heights of the font
 _BAR_HEIGHT = 4.8
-_DRAWER_SHARE = 0.6  # of what the view and it have together, at most
+# The least height of the view, in shares of the window, and of what it and the drawer have together:
+_VIEW_SHARE, _VIEW_PART = 0.35, 0.6
 # No background: the window is filled with the panels' colour before.
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -74,7 +75,7 @@ def _draw_parts(app: App) -> Place:
     width = max(1, int(whole.x - min(app.panel.width * em, 0.5 * whole.x)))
     grip = int(_GRIP * em)
     bar = min(_BAR_HEIGHT * em, 0.5 * whole.y)
-    drawer = min(grip + app.drawer.shown_height * em, _DRAWER_SHARE * max(whole.y - top - bar, 0))
+    drawer = drawer_height(grip + app.drawer.shown_height * em, whole.y, whole.y - top - bar)
     below = whole.y - drawer if app.drawer.is_open else whole.y
     bottom = int(below - bar)
     height = max(1, bottom - top)
@@ -100,6 +101,13 @@ def _draw_parts(app: App) -> Place:
             app.drawer.draw(app.keyboard, Ui(app.keys))
             imgui.end()
     return place
+
+
+def drawer_height(wanted: float, window: float, room: float) -> float:
+    """The height of the drawer, which leaves enough of the window to the view. wanted: by the user's choice.
+    room: for both. All in pixels."""
+    room = max(room, 0.0)
+    return min(wanted, room - min(_VIEW_SHARE * window, _VIEW_PART * room))
 
 
 def _draw_view(app: App, top: int, width: int, height: int) -> Place:

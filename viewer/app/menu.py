@@ -107,13 +107,13 @@ def draw_toolbar(app: App) -> None:
             _draw_line()
         for item in group:
             text = _text(app, item, has_words)
-            wide = widgets.button_width(text) + (more if len(left) > 1 else 0)
+            wide = _button_width(app, item, has_words) + (more if len(left) > 1 else 0)
             if imgui.get_cursor_pos_x() + wide > room:
                 _draw_more(app, left)
                 return
             left.remove(item)
             if isinstance(item, Menu):
-                _draw_drop(app, item, text)
+                _draw_drop(app, item, text, _button_width(app, item, has_words))
             else:
                 _draw_button(app, app.commands.of[item], text)
             imgui.same_line()
@@ -139,23 +139,35 @@ def _width(app: App, groups: Toolbar, worded: int) -> float:
     """The width of a toolbar with words in so many of its groups."""
     gap = imgui.get_style().item_spacing.x
     widths = [
-        widgets.button_width(_text(app, item, number < worded)) + gap
+        _button_width(app, item, number < worded) + gap
         for number, group in enumerate(groups)
         for item in group
     ]
     return sum(widths) + gap * len(groups)
 
 
+def _button_width(app: App, item: str | Menu[App], has_words: bool) -> float:
+    """The width of a button, the same whatever it is called now: buttons behind it stay where they are."""
+    texts = [_text(app, item, has_words)]
+    if isinstance(item, Menu):
+        texts += [_drop_text(item, title, has_words) for title in item.titles()]
+    return max(map(widgets.button_width, texts))
+
+
 def _text(app: App, item: str | Menu[App], has_words: bool) -> str:
     """The text of a button, and its name after "###"."""
-    if isinstance(item, str):
-        command = app.commands.of[item]
-        icon, words = command.icon, command.short
-    else:
-        title = item.title_now(app) if item.title_now else item.title
-        icon, words = item.icon, f"{title} {icons.ICON_FA_CARET_DOWN}".lstrip()
-        has_words = has_words or item.title_now is not None
+    if isinstance(item, Menu):
+        return _drop_text(item, item.title_now(app) if item.title_now else item.title, has_words)
+    command = app.commands.of[item]
+    icon, words = command.icon, command.short
     return f"{f'{icon}  {words}' if has_words and icon else icon or words}###{_name(item)}"
+
+
+def _drop_text(menu: Menu[App], title: str, has_words: bool) -> str:
+    """The same of a button that a menu drops from, which has a title now."""
+    words = f"{title} {icons.ICON_FA_CARET_DOWN}".lstrip()
+    has_words = has_words or menu.title_now is not None
+    return f"{f'{menu.icon}  {words}' if has_words and menu.icon else menu.icon or words}###{_name(menu)}"
 
 
 def _name(item: str | Menu[App]) -> str:
@@ -186,12 +198,12 @@ def _draw_button(app: App, command: Command[App], text: str) -> None:
     widgets.tooltip(app.keys.hint(command.name))
 
 
-def _draw_drop(app: App, menu: Menu[App], text: str) -> None:
+def _draw_drop(app: App, menu: Menu[App], text: str, width: float) -> None:
     """A button that a menu drops from; one without a title stands close to the button before it."""
     if not menu.title:
         imgui.same_line(0, 1)
     popup = f"##drop {_name(menu)}"
-    if imgui.button(text):
+    if imgui.button(text, ImVec2(width, 0)):
         imgui.open_popup(popup)
     imgui.set_next_window_pos(ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y))
     if imgui.begin_popup(popup):

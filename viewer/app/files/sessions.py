@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable
+from itertools import chain, count
 from pathlib import Path
 
 from ...document.recording import place_of
 from ...document.saved_session import SUFFIX, SavedSession
 from ...errors import InputError
-from ...files import free_file, printable, working_folder
+from ...files import printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
 from ..notices import Problem
@@ -57,8 +60,8 @@ class Sessions:
             self._note(Problem(f"The session is not saved: {error}"))
 
     def ask_to_save(self) -> None:
-        """Open the dialog that saves, with the session's file, or a name that is free."""
-        self.saving.ask(self._file or free_file(working_folder(), SUFFIX))
+        """Open the dialog that saves, with the session's file, or one that is named like the scan."""
+        self.saving.ask(self._file or named_like(self._session.scan, working_folder(), SUFFIX))
 
     @property
     def _file(self) -> Path | None:
@@ -94,3 +97,13 @@ class Sessions:
             self._take_up(session)
         else:
             self._open(scan, session)
+
+
+def named_like(scan: str, folder: Path, suffix: str) -> Path:
+    """A file in a folder that is named like a scan and is not there yet: "face.scan4d.json", then
+    "face_2.scan4d.json"."""
+    path = Path(known_as(scan))
+    name = path.name if os.path.isdir(path) else path.stem
+    stem = re.sub(r"%0?[0-9]*d|[^\w .-]+", "_", name).strip(" ._-")
+    paths = (folder / f"{stem or 'scan'}{more}{suffix}" for more in chain([""], map("_{}".format, count(2))))
+    return next(path for path in paths if not os.path.exists(path))

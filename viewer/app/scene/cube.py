@@ -33,13 +33,13 @@ SHADE = 0.24  # how much darker a face is that is seen from the side
 class OrientationCube:
     """The state of the cube: what the mouse does with it.
 
-    is_shown: by the user's choice. is_held: the button went down on it. is_dragged: the
-    camera follows the mouse.
+    is_shown: by the user's choice. is_held: the button went down on it. is_dragged: the camera follows the
+    mouse. on_up: the mouse is on the button below it.
     """
 
     def __init__(self, is_shown: bool) -> None:
         self.is_shown: bool = is_shown
-        self.is_held = self.is_dragged = False
+        self.is_held = self.is_dragged = self.on_up = False
         self.under_mouse: Direction | None = None
 
     def toggle(self) -> None:

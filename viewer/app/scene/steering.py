@@ -90,8 +90,14 @@ class Steering:
     def fit(self) -> None:
         """Show the subject from the same side: all of the scan, or of one depth camera's what it looks at."""
         pose, camera = self._playback.pose, self._session.document.camera
-        if pose and camera:
-            self._session.change("Fit", camera=self._framing(camera, pose), pivot=None)
+        if not (pose and camera):
+            return
+        framed = self._framing(camera, pose)
+        place = self._session.laid.layers(pose).place
+        places = np.abs(framed.places_in_picture(place.points(pose.sample + pose.origin)))
+        if self._subject(pose) is not None and not (places <= (self._viewport.aspect / 2, 0.5)).all():
+            self._note("The view shows what the depth camera looks at. Zoom out to see the rest of the scan.")
+        self._session.change("Fit", camera=framed, pivot=None)
 
     def open_view(self) -> None:
         """Show the frame as a scan is first shown: as its pods see it, or from the front."""
@@ -101,11 +107,15 @@ class Steering:
 
     def _framing(self, camera: Camera, pose: Pose) -> Camera:
         """Move a camera, in the same direction, to where it shows the subject."""
-        whole, place = self.whole(pose), self._session.laid.layers(pose).place
-        subject = subject_of(pose.views, pose.sample + pose.origin, whole, self._upright(pose))
+        subject = self._subject(pose)
         if subject is None:
-            return camera.fit(whole, self._viewport.aspect)
+            return camera.fit(self.whole(pose), self._viewport.aspect)
+        place = self._session.laid.layers(pose).place
         return camera.framing(place.points(subject), self._viewport.aspect)
+
+    def _subject(self, pose: Pose) -> NDArray[np.float64] | None:
+        """The points of what one depth camera looks at, as of `subject_of`."""
+        return subject_of(pose.views, pose.sample + pose.origin, self.whole(pose), self._upright(pose))
 
     def look_from(self, azimuth: float, elevation: float) -> None:
         """Show the subject from a direction in degrees, such as those of `navigation.VIEWS`."""

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .steering import Steering
 
 _MENU = "turn upright"
+_ALSO_BELOW_LISTS = imgui.HoveredFlags_.allow_when_blocked_by_popup.value
 _BELOW = 2.02  # the button's top, in distances of the cube's centre from the edges of the view
 
 
@@ -36,7 +37,8 @@ def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object
     imgui.push_style_color(imgui.Col_.button, imgui.get_color_u32(imgui.Col_.button, 0.6))
     is_pressed = imgui.button(widgets.labelled(text, "up"))
     imgui.pop_style_color()
-    if is_pressed or (imgui.is_item_hovered() and not imgui.is_popup_open(_MENU)):
+    came, steering.cube.on_up = not steering.cube.on_up, imgui.is_item_hovered(_ALSO_BELOW_LISTS)
+    if is_pressed or (imgui.is_item_hovered() and came):  # not again while the mouse rests there
         imgui.open_popup(_MENU)
     is_hovered, low, high = imgui.is_item_hovered(), imgui.get_item_rect_min(), imgui.get_item_rect_max()
     imgui.set_cursor_pos(before)

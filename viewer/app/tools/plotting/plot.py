@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 _COMBO, _SLIDER, _TABLE = 9.0, 10.0, 38.0  # widths, in heights of the font
 _TABLE_SHARE = 0.5  # of the width, at most
+_LOWEST = 6.5  # height of the plot, likewise
 _LINE, _POINTED, _THIN = 0.1, 0.2, 0.05  # thickness of lines, likewise
 _DOT, _NOW = 0.15, 0.3  # radius of points, likewise
 _PADDING = 0.4
@@ -50,6 +51,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         widgets.faint(_why_none(tool))
         return
     room, em = imgui.get_content_region_avail(), imgui.get_font_size()
+    room.y = max(room.y, _LOWEST * em)  # in less, the drawer scrolls
     table = min(_TABLE * em, _TABLE_SHARE * room.x)
     size = ImVec2(room.x - table - imgui.get_style().item_spacing.x, room.y)
     frame = _draw_plot(tool, plot, size)
