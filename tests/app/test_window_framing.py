@@ -71,22 +71,6 @@ def test_f_says_where_parts_of_the_scan_are_outside(app: RunningApp) -> None:
     app.told("Zoom out to see the rest of the scan")
 
 
-def test_buttons_of_the_toolbar_stay_where_they_are_when_the_renderer_changes(app: RunningApp) -> None:
-    left, top, width, _ = app.view()
-    toolbar = slice(top - 30, top - 4), slice(left + width // 2, None)
-    app.screen.do("key", "b")  # undo is possible from now on
-    app.settle()
-    names, pictures = set(), []
-    for _ in range(3):
-        app.screen.do("key", "b")
-        names.add(app.settle().renderer)
-        app.see(renderer_named=None)
-        pictures.append(app.screen.picture()[toolbar])
-    assert len(names) == 3
-    assert np.ptp(pictures[0]) > 50, "there are buttons"
-    assert all((picture == pictures[0]).all() for picture in pictures)
-
-
 def test_home_brings_the_opening_view_back(app: RunningApp) -> None:
     opening = keys(app)
     assert np.linalg.norm(np.subtract(opening.eye, (1, 2, 3))) == pytest.approx(0, abs=1e-5), (
