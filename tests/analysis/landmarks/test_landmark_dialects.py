@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -284,3 +285,21 @@ def test_c3d_in_whole_numbers_beside_analog_channels(tmp_path: Path) -> None:
     assert there[:, :2].all()
     np.testing.assert_array_equal(there[:, 2], [True, False] * 3 + [True])
     np.testing.assert_allclose(found.positions[there], 10 * places[there], rtol=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore:No analog data")
+@pytest.mark.parametrize("rate", [-5.0, np.inf])
+def test_c3d_with_an_unusable_rate_has_no_times(rate: float, tmp_path: Path) -> None:
+    """Its frames keep their numbers."""
+    writer = c3d.Writer(point_rate=80.0)
+    writer.set_point_labels(["a"])
+    for _ in range(3):
+        writer.add_frames((np.ones((1, 5), np.float32), np.empty((0, 0), np.float32)))
+    with open(tmp_path / "m.c3d", "wb") as stream:
+        writer.write(stream)
+    data = (tmp_path / "m.c3d").read_bytes()
+    np.testing.assert_allclose(read_landmarks(tmp_path / "m.c3d", "mm").times, np.arange(3) / 80)
+    (tmp_path / "m.c3d").write_bytes(data.replace(struct.pack("<f", 80), struct.pack("<f", rate)))
+    found = read_landmarks(tmp_path / "m.c3d", "mm")
+    assert np.isnan(found.times).all()
+    np.testing.assert_array_equal(found.frames, np.arange(3))
