@@ -71,10 +71,10 @@ class PointPattern:
     @classmethod
     def around(cls, surface: MomentSurface, place: Float) -> PointPattern | None:
         """The pattern around a place; None where there are too few points, or no surface."""
-        from .pattern_kernels import nearest_rows
+        from .pattern_kernels import nearest_of
 
         rows = np.empty(_POINTS, np.int32)
-        found = nearest_rows(surface.held, place[0], place[1], place[2], rows, np.empty(_POINTS))
+        found = nearest_of(surface.held, place[0], place[1], place[2], rows, np.empty(_POINTS))
         if found < _POINTS:
             return None
         frame = surface.axes_at(place, float(np.linalg.norm(surface.held.points[rows[-1]] - place)))
@@ -112,8 +112,8 @@ class PointPattern:
     def _fitted(
         self, surface: MomentSurface, place: Float, linear: Float, search: float
     ) -> tuple[tuple[Float, Float], Rows, Float, Float]:
-        """Its place and map where it fits best, its rows there, how far each is off, and what
-        `find_pattern` tells."""
+        """Fit the pattern near a place: the place and map of the best fit, the rows, how far each is off, and
+        what `find_pattern` tells."""
         from .pattern_kernels import find_pattern
 
         linear, place = np.array(linear, np.float64), np.array(place, np.float64)
@@ -129,7 +129,7 @@ class PointPattern:
         return information - other >= _DISTINCT * len(self._offsets)
 
     def _weighted(self, surface: MomentSurface, rows: Rows, linear: Float) -> tuple[Float, Float]:
-        """Its place and map by the points that are known, those next to the place above all."""
+        """Fit the place and map of the pattern to the points that are known, the nearest above all."""
         from .pattern_kernels import fit_map
 
         linear, place = linear.copy(), np.full(3, np.nan)
@@ -140,7 +140,7 @@ class PointPattern:
         return place, linear
 
     def _told(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
-        """What is found, but for points that are far off, and how sure the others are of the place."""
+        """Drop points that are far off, and compute the covariance of the place from the others."""
         from .pattern_kernels import FREE
 
         place, linear = self._weighted(surface, rows, linear)
@@ -199,7 +199,7 @@ class RecurringPoints:
         return there, self.maps[rows[known[0]]] @ linear if len(known) else linear
 
     def moved(self, places: Float, reach: float) -> tuple[Float, NDArray[np.bool_]]:
-        """Where places (n, 3) go, and which are known, (n,): those within reach of a point that recurs."""
+        """Predict where places (n, 3) go; known, (n,), are those within reach of a recurring point."""
         from scipy.spatial import cKDTree
 
         known = np.flatnonzero(self.matches >= 0)
@@ -212,8 +212,7 @@ class RecurringPoints:
         return self._now.held.points[self.matches[rows]] + arms, away <= reach
 
     def _expected(self, place: Float) -> tuple[Float, Float]:
-        """Where a place is expected to go, (3,), and how it turns, (3, 3): as the nearest points that are
-        matched."""
+        """Predict where a place goes, (3,), and how it turns, (3, 3): as the nearest matched point does."""
         known = self._queue[: self._queued]
         if not len(known):
             return place, np.eye(3)

@@ -31,7 +31,7 @@ _CANDIDATES = 1024  # places that a pattern is looked for at, at most
 
 
 @compiled
-def nearest_rows(held: Cells, x: float, y: float, z: float, rows: NDArray[np.int32], squared: Float) -> int:
+def nearest_of(held: Cells, x: float, y: float, z: float, rows: NDArray[np.int32], squared: Float) -> int:
     """How many points nearest to a place are found, as many as `rows` has room for, the nearest first.
 
     squared gets their squared distances. Ties go to the lowest row.
@@ -68,7 +68,7 @@ def _apply(linear: Float, x: float, y: float, z: float, out: Float) -> None:
 
 @compiled
 def _normal_of(linear: Float, frame: Float, normal: Float) -> None:
-    """Where the normal of a tangent frame (3, 3) goes by a map: across the mapped tangents, of length 1."""
+    """Map the normal of a tangent frame (3, 3): the unit vector across the mapped tangents."""
     a, b = np.empty(3), np.empty(3)
     _apply(linear, frame[0, 0], frame[0, 1], frame[0, 2], a)
     _apply(linear, frame[1, 0], frame[1, 1], frame[1, 2], b)
@@ -329,7 +329,7 @@ def fill_pattern(
             continue
         _apply(linear, offsets[i, 0], offsets[i, 1], offsets[i, 2], there)
         x, y, z = there[0] + place[0], there[1] + place[1], there[2] + place[2]
-        if nearest_rows(held, x, y, z, nearest, squared) < 2:
+        if nearest_of(held, x, y, z, nearest, squared) < 2:
             continue
         is_sure = squared[0] <= reach * reach and squared[0] <= _UNIQUE**2 * squared[1]
         if is_sure and not (rows == nearest[0]).any():
@@ -473,7 +473,7 @@ def grow_matches(
             linear[:] = maps[row]
             if not _predicted(before, now, other, around[other], matches, linear, place):
                 continue
-            if nearest_rows(now, place[0], place[1], place[2], nearest, squared) < 2:
+            if nearest_of(now, place[0], place[1], place[2], nearest, squared) < 2:
                 continue
             most = _GROWN * before.reaches[other] * _OWN_SPACING
             is_sure = squared[0] <= most * most and squared[0] <= _UNIQUE**2 * squared[1]

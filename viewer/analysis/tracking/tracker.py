@@ -351,7 +351,7 @@ def _step(share: Sequence[_Followed], thread: int, frame: int) -> None:
 
 
 def _starts(followers: Sequence[Follower]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Where landmarks are and how they move, (n, 3) each; those that are not lost."""
+    """Give the places and motions of the landmarks that are not lost, (n, 3) each."""
     found = [follower for follower in followers if follower.place is not None]
     places = np.array([follower.place for follower in found]).reshape(-1, 3)
     return places, np.array([follower.velocity for follower in found]).reshape(-1, 3)
