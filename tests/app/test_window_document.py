@@ -172,9 +172,9 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
     folder = tmp_path / "config" / "scan4d" / "scans"
     assert [path.suffix for path in folder.iterdir()] == [".json"]
     for number in range(3):
-        (scan / f"{number}.npz").rename(scan / f"{number + 7}.npz")
+        formats.write(scan / f"{number}.npz", PointCloud.from_arrays(np.eye(3) + number))
     with running_app(screen, tmp_path, scan) as app:
-        app.told("has changed since")
+        app.told("The scan has changed since this was saved")
 
 
 def saved_session(app: RunningApp, name: str) -> Path:
