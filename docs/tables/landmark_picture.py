@@ -1,4 +1,4 @@
-"""The picture of docs/guide/landmarks.md, made anew: ways of landmarks over the demo, tracked and true.
+"""Make the picture of docs/how-it-works/landmarks.md: tracked and true paths of landmarks over the demo.
 
     python docs/tables/landmark_picture.py
 

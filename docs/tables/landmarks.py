@@ -1,4 +1,4 @@
-"""The tables of docs/guide/landmarks.md that tell how well landmarks are tracked, measured anew.
+"""Make the tables of docs/how-it-works/landmarks.md that show how well Scan4D tracks landmarks.
 
     python docs/tables/landmarks.py [NAME ...]
 
@@ -19,7 +19,7 @@ from viewer.bench.tracking.known import KnownScan, resampled_demo, scanned_demo,
 from viewer.bench.tracking.landmark_judge import Judgement, judge_tracking
 from viewer.scan.open import find_source
 
-PAGE = DOCS / "guide" / "landmarks.md"
+PAGE = DOCS / "how-it-works" / "landmarks.md"
 # Variants, pods, noises in mm
 CASES = (("smile", 2, (0.0, 0.1, 0.25)), ("sway", 2, (0.1,)), ("cough", 2, (0.1,)), ("sway", 1, (0.1,)))
 MESHES = {"crane": "crane_175", "horse-gallop": "horse_gallop_48"}

@@ -1,4 +1,4 @@
-"""The tables of docs/guide/landmarks.md about measures: errors on shapes that are known, and what ± covers.
+"""Make the tables of docs/how-it-works/landmarks.md about measures: errors on known shapes, coverage of ±.
 
     python docs/tables/measures.py [NAME ...]
 
@@ -28,7 +28,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.timeline import Timeline
 
-PAGE = DOCS / "guide" / "landmarks.md"
+PAGE = DOCS / "how-it-works" / "landmarks.md"
 SPACINGS = (3.5, 1.8, 0.9)  # mm; on a sphere of R = 100 mm 10 000, 40 000 and 160 000 points
 NOISES = (0.0, 0.1, 0.2)  # mm
 REPEATS, CHANCES = 2, 10

@@ -25,7 +25,7 @@ _FORMAT = 1
 _MOST_BYTES = 4 * 2**20
 _MOST = 10_000  # landmarks, and measures
 _LONGEST = 4000  # characters of a text
-_HINT = "docs/reference/formats.md tells what a template is"
+_HINT = "docs/reference/formats.md shows how to write a template"
 _FIELDS = ("format", "name", "title", "source", "landmarks", "measures")
 
 

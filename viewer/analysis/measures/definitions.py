@@ -13,7 +13,7 @@ from .kinds import kind_of
 _MOST_BYTES = 4 * 2**20
 _MOST = 10_000
 _FIELDS = ("name", "kind", "landmarks", "options")
-_HINT = "docs/guide/landmarks.md tells how measures are defined"
+_HINT = "docs/how-it-works/landmarks.md shows how to define measures"
 
 
 def read_measures(path: Path | str) -> tuple[Measure, ...]:

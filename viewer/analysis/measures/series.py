@@ -1,4 +1,4 @@
-"""The values of measures in all frames, with their uncertainty; docs/guide/landmarks.md has the formulas."""
+"""The values of measures in all frames, with their uncertainty (docs/how-it-works/landmarks.md)."""
 
 from __future__ import annotations
 
