@@ -232,7 +232,7 @@ def test_the_only_measure_goes_against_nothing(run: Run) -> None:
     Path("measures.json").write_text(json.dumps({"measures": held["measures"][:1]}))
     done = run(*WORDS, "--against", "way", "--numbers", "numbers.csv")
     assert done.code == 2
-    assert "--against: nothing goes against the only measure" in done.err
+    assert "--against: there is only one measure" in done.err
     assert not Path("out.csv").exists()
 
 
@@ -248,7 +248,7 @@ def test_the_only_measure_goes_against_nothing(run: Run) -> None:
         (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is the file of another table"),
         (("--repeats", "a.csv", "--aligned", "weg"), "unknown measure 'weg'. Known: still, way"),
         (("--repeats", "a.csv", "--least", "1.5"), "'1.5' is no share above 0, up to 1"),
-        (("--aligned", "way"), "--aligned: is of repeats, and none are asked for. Add --repeats FILE"),
+        (("--aligned", "way"), "--aligned: needs repeats, and there are none. Add --repeats FILE"),
         (("--numbers", "measures.json"), "is read by this command, and is not replaced"),
         (("--order", "jerk"), "jerk"),
         (("--smoothing", "0", "--order", "speed"), "'0' is no time above 0, in seconds"),
@@ -270,11 +270,11 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
     assert done.code == 2
-    assert f"{words[0]}: is of measures, and there are none. Name them by --measures" in done.err
+    assert f"{words[0]}: needs measures, and there are none. Name them with --measures" in done.err
     assert not Path("out.csv").exists()
 
 
 def test_smoothing_without_measures_or_speeds_is_refused(refused: Callable[..., str]) -> None:
     words = ("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", "--smoothing", "0.5")
-    assert "--smoothing: smooths nothing that is asked for. Use it with --measures" in refused(*words)
+    assert "--smoothing: has nothing to smooth. Use it with --measures" in refused(*words)
     assert not Path("out.csv").exists()

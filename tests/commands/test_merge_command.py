@@ -96,15 +96,15 @@ def test_points_are_those_that_are_kept(run: Run) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("points.ply", "-o", "out.exr"), "points.ply: has points, and no range views to merge"),
-        (("alone.exr", "-o", "out.exr"), "alone.exr: has one range view, and nothing to merge it with"),
+        (("points.ply", "-o", "out.exr"), "points.ply: has points, but no range views to merge"),
+        (("alone.exr", "-o", "out.exr"), "alone.exr: has only one range view to merge"),
         (("pods.exr", "-o", "pods.exr"), "pods.exr: is read by this command"),
         (("pods.exr", "-o", "points.ply"), "points.ply: is there already"),
         (("pods.exr", "-o", "nowhere/out.exr"), "there is no folder 'nowhere'"),
         (("pods.exr", "-o", "out.jpg"), "out.jpg: "),
         (("pods.exr", "-o", "out.exr", "--report", "out.txt"), "out.txt: "),
         (("pods.exr", "-o", "out.exr", "--ties", "-1"), "the threshold of ties is -1"),
-        (("seq", "-o", "out.exr"), "out.exr: is one file, for more than one result"),
+        (("seq", "-o", "out.exr"), "out.exr: is one file, but there are several results"),
     ],
 )
 def test_what_cannot_be_is_told_in_one_line(
@@ -123,5 +123,5 @@ def test_a_frame_with_one_view_ends_it_and_frames_before_stay(run: Run, views: t
     Path("merged").mkdir()
     done = run("merge", "seq", "-o", "merged/f%04d.exr")
     assert done.code == 2
-    assert "f1.exr: has one range view" in done.err
+    assert "f1.exr: has only one range view" in done.err
     assert [path.name for path in Path("merged").iterdir()] == ["f0000.exr"]

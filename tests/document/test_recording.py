@@ -323,7 +323,7 @@ def test_pictures_without_a_description_and_damaged_ones_are_refused(suffix: str
         import OpenEXR
 
         OpenEXR.File({}, {"Z": np.zeros((4, 4), np.float32)}).write(str(path))
-    with pytest.raises(InputError, match="not a picture that tells how it was made"):
+    with pytest.raises(InputError, match="holds no data on how it was made"):
         Recording.load(path)
 
 

@@ -86,7 +86,7 @@ def _measurement(row: Mapping[str, str], where: str, unit: str, count: int) -> M
     factor = conversion(row["unit"], unit)
     if factor is None:
         what = f"lengths are in '{row['unit']}', those of the scan in '{unit}'"
-        raise InputError(what, where, "Tell the scan's unit first, in the panel")
+        raise InputError(what, where, "Set the scan's unit in the panel first")
     return Measurement(_end(row, "1", where, factor, count), _end(row, "2", where, factor, count))
 
 

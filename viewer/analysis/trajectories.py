@@ -83,7 +83,7 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
             f"the rigid reference '{unknown[0]}' is not placed", hint="Place it first, or leave it out"
         )
     if len(set(anchors)) < 3:
-        hint = "Choose landmarks that do not move against each other, such as the corners of the eyes"
+        hint = "Choose landmarks that move as one rigid body, such as the corners of the eyes"
         raise InputError("removing head motion needs three rigid references", hint=hint)
     places = np.stack([tracks[name].positions for name in dict.fromkeys(anchors)], axis=1)  # (T, A, 3)
     known = np.logical_and.reduce(np.isfinite(places), axis=2)

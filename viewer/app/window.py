@@ -67,7 +67,7 @@ class Window(GlfwWindow):
             raise NoOpenGLError(
                 f"no window can be opened ({'; '.join(problems)})",
                 hint="It needs a display and OpenGL 4.3. 'scan4d render' makes pictures without a window; "
-                "'scan4d doctor' tells more",
+                "'scan4d doctor' has details",
             ) from error
         self.dropped: list[str] = []
         self._restore(place)

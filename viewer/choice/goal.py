@@ -31,7 +31,7 @@ def time_goal(text: str) -> Goal:
     """The goal of a time such as 50ms, 50 or 0.05s. Raises InputError."""
     number, unit = _parts(text, "--budget", "such as 50ms")
     if unit not in ("", "ms", "s"):
-        raise InputError(f"'{shortened(text)}' is no time", "--budget", "Tell milliseconds, such as 50ms")
+        raise InputError(f"'{shortened(text)}' is no time", "--budget", "Use milliseconds, such as 50ms")
     return Goal("time", number * (1000 if unit == "s" else 1))
 
 
@@ -48,8 +48,8 @@ def in_unit(goal: Goal, unit: str) -> Goal:
         return goal
     factor = conversion(goal.unit, unit)
     if factor is None:
-        hint = f"Tell pixels, such as 0.5px, or the scan's unit: --error {goal.bound:g}{unit}"
-        raise InputError(f"'{goal.unit}' cannot be told in the scan's '{unit}'", "--error", hint)
+        hint = f"Use pixels, such as 0.5px, or the scan's unit: --error {goal.bound:g}{unit}"
+        raise InputError(f"'{goal.unit}' cannot be converted to the scan's '{unit}'", "--error", hint)
     return Goal("error", goal.bound * factor, unit)
 
 

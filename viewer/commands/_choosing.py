@@ -36,7 +36,7 @@ def goal_of(args: Namespace) -> Goal | None:
     if not given:
         return None
     if len(given) > 1:
-        raise InputError("are two bounds, of which one can be kept", "--budget, --error", "Leave out one")
+        raise InputError("are two limits, and only one can apply", "--budget, --error", "Leave out one")
     (name,) = given
     if args.backend not in (None, AUTO):
         hint = f"Use --backend {AUTO}, or leave out --{name}"

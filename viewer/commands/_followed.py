@@ -34,7 +34,7 @@ def check_place(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
         )  # fmt: skip
     apart = told_apart(found, framing(timeline, range(len(timeline))))
     if apart is not None:
-        hint = "Use landmarks of this scan; --axes and --unit tell of the scan what it does not"
+        hint = "Use landmarks of this scan; --axes and --unit give the axes and unit of the scan"
         raise InputError(apart, path, hint)
 
 

@@ -197,7 +197,7 @@ def _no_command(words: Sequence[str], commands: Sequence[str]) -> InputError:
     first = shortened(words[0])
     if later := [word for word in words if word in commands]:
         hint = f"Write it after '{later[0]}'. See 'scan4d {later[0]} --help'"
-        return InputError(f"'{first}' stands before the command", hint=hint)
+        return InputError(f"'{first}' comes before the command", hint=hint)
     if files := [word for word in words if os.path.exists(word)]:
         name = shlex.quote(files[0])
         hint = f"'scan4d view {name}' shows it, 'scan4d render {name} -o picture.png' draws it. {see}"
@@ -214,5 +214,5 @@ def _too_many(words: Sequence[str], parser: _Parser) -> InputError:
     what = f"{more}{rest}: too much, as '{parser.prog}' takes {parser.takes or 'options alone'}"
     if not parser.takes:
         return InputError(what, hint=parser.see)
-    hint = f"If the shell has put files in the place of a pattern, quote it: 'frame*.ply'. {parser.see}"
+    hint = f"If the shell has expanded a pattern, quote it: 'frame*.ply'. {parser.see}"
     return InputError(what, hint=hint)

@@ -69,7 +69,7 @@ def _check_arguments(args: Namespace) -> None:
     if args.up is not None:
         given.append("--up")
     if given:
-        hint = "The recording tells what to draw; leave it out"
+        hint = "The recording says what to draw; leave it out"
         raise InputError(f"--replay takes no {', '.join(given)}", args.replay, hint)
 
 
@@ -178,7 +178,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Time
         found, timeline = args.scan, open_scan(args.scan)
     elif entry.scan is None:
         hint = f"Name it: scan4d render SCAN --replay {args.replay} -o {args.out}"
-        raise InputError("does not tell its scan", args.replay, hint)
+        raise InputError("does not name its scan", args.replay, hint)
     else:
         found, timeline = _open(entry.scan, args.replay)
     hash = fingerprint_as(entry.hash, timeline.files)

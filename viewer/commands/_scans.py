@@ -163,7 +163,7 @@ def report(timeline: Timeline, said: int) -> int:
 def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list[Path]:
     """All that `frame_files` leads to, of these poses of a scan.
 
-    Raises InputError where a times.csv tells the times of other files, or would be one to other frames.
+    Raises InputError where a times.csv holds the times of other files, or would be one to other frames.
     """
     files = [numbered(out, index) for index in indices]
     if not is_pattern(out):
@@ -191,7 +191,7 @@ def frame_files(out: Path) -> Iterator[Callable[[Pose], Path]]:
 
 
 def _check_times_file(path: Path, names: set[str]) -> None:
-    """Raise InputError where there is a times.csv that tells the times of other files."""
+    """Raise InputError where there is a times.csv that holds the times of other files."""
     if not path.exists():
         return
     try:
@@ -200,7 +200,7 @@ def _check_times_file(path: Path, names: set[str]) -> None:
     except (OSError, UnicodeDecodeError, csv.Error):
         told = {"?"}
     if told - names - {"file"}:
-        raise InputError("tells the times of other files", path, "Write into a folder of its own")
+        raise InputError("holds the times of other files", path, "Write into a folder of its own")
 
 
 def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:

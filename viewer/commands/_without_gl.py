@@ -54,7 +54,7 @@ def run(args: Namespace) -> int:
         raise InputError(f"'{args.backend}' needs OpenGL", "--no-gl", hint)
     _refuse(args, _NEED_GL, "is for pictures that OpenGL draws")
     if args.behind and args.out.suffix.lower() == SUFFIX:
-        raise InputError(f"is not kept in '{SUFFIX}' files", "--behind", "Name it where they are drawn")
+        raise InputError(f"is not stored in '{SUFFIX}' files", "--behind", "Give it when you draw them")
     if args.progress:
         say(device="CPU")
     if args.scan is not None and args.scan.lower().endswith(SUFFIX):

@@ -120,7 +120,7 @@ def run(args: Namespace) -> int:
     if args.report:
         if args.compare or args.backend or args.scene:
             hint = "Leave out --compare, --backend and --scene"
-            raise InputError("measures nothing, and tells all that is there", "--report", hint)
+            raise InputError("measures nothing, and reports all rows in DIR", "--report", hint)
         claim(_report_files(args), [], args.force)
         _report(args)
         return 0
@@ -162,7 +162,7 @@ def run(args: Namespace) -> int:
         _report(args)
     except KeyboardInterrupt:
         if any(measured):
-            warn(f"{args.out}: the rows are kept. With --report, 'scan4d bench' makes the page of them")
+            warn(f"{args.out}: the rows are stored. With --report, 'scan4d bench' makes the page from them")
         raise
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
@@ -187,7 +187,7 @@ def _calibrate(args: Namespace) -> int:
             _write(args.out / WAYS, bench, 0, bench.until_stopped(measure_ways(bench, scenes)))
         _write_notes(args.out, bench.notes)
         if bench.stopped:
-            warn(f"{args.out}: the rows are kept. With --report, --calibrate learns from them")
+            warn(f"{args.out}: the rows are stored. With --report, --calibrate uses them")
             return 1
     tell(keep_model(renderer.gpu, laws_of(read_rows(args.out / WAYS))))
     return 0

@@ -164,7 +164,7 @@ def _write_scan(
     out = args.out
     check_output(out, formats.scan_suffixes(), several=False)
     if is_pattern(out):
-        raise InputError("has a place for a number, and one file holds all poses", out, "Leave it out")
+        raise InputError("has a number, but one file holds all poses", out, "Leave it out")
     claim([out], scan_inputs(timeline), args.force)
     with progress(len(indices)) as tick:
 

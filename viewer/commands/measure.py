@@ -252,20 +252,20 @@ def _outputs(args: Namespace) -> list[Path]:
     is_of_speeds = args.order != ORDERS[0]
     lacking = [flag for flag in asked if flag != "--plot" or not is_of_speeds]
     if lacking and args.measures is None:
-        raise InputError("is of measures, and there are none", lacking[0], "Name them by --measures")
+        raise InputError("needs measures, and there are none", lacking[0], "Name them with --measures")
     if args.traced is not None and not is_of_speeds:
-        raise InputError("is of speeds, and none are asked for", "--traced", "Add --order speed")
+        raise InputError("needs speeds, and there are none", "--traced", "Add --order speed")
     if args.against is not None and args.measures is None:
-        raise InputError("is of measures, and there are none", "--against", "Name them by --measures")
+        raise InputError("needs measures, and there are none", "--against", "Name them with --measures")
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
-        hint = "Name landmarks that do not move against each other, with commas between"
+        hint = "Name landmarks that move as one rigid body, separated by commas"
         raise InputError("removing head motion needs three landmarks", "--anchors", hint)
     if args.smoothing is not None and not (is_of_speeds or args.measures):
         hint = f"Use it with --measures, or --order {' or '.join(ORDERS[1:])}"
-        raise InputError("smooths nothing that is asked for", "--smoothing", hint)
+        raise InputError("has nothing to smooth", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
         flag = "--least" if args.aligned is None else "--aligned"
-        raise InputError("is of repeats, and none are asked for", flag, "Add --repeats FILE")
+        raise InputError("needs repeats, and there are none", flag, "Add --repeats FILE")
     return outputs
 
 
@@ -290,7 +290,7 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
         if name is not None and name not in names:
             raise unknown_name("measure", name, names)
     if args.against is not None and len(kept) == 1:
-        raise InputError("nothing goes against the only measure", "--against", "Name others by --measures")
+        raise InputError("there is only one measure", "--against", "Name more with --measures")
     return kept
 
 

@@ -93,9 +93,9 @@ def _views(pose: Pose) -> tuple[RangeView, ...]:
     """The range views of a pose, at least two."""
     if not pose.views:
         hint = "Range views come from EXR files and folders of range images: docs/reference/formats.md"
-        raise InputError("has points, and no range views to merge", pose.label, hint)
+        raise InputError("has points, but no range views to merge", pose.label, hint)
     if len(pose.views) < 2:
-        raise InputError("has one range view, and nothing to merge it with", pose.label)
+        raise InputError("has only one range view to merge", pose.label)
     return pose.views
 
 

@@ -186,9 +186,7 @@ def _mesh(pose: Pose, faces: Faces) -> Mesh:
     try:
         return Mesh(pose.cloud, faces.triangles())
     except InputError as error:
-        raise InputError(
-            error.what, pose.label, "Its faces and its vertices do not belong together"
-        ) from error
+        raise InputError(error.what, pose.label, "Its faces do not match its vertices") from error
 
 
 def _numbers(text: str) -> tuple[float, ...]:

@@ -88,7 +88,7 @@ class _Named:
 def _named(names: list[str]) -> _Named:
     """Scans alone, a recording, or a session, before which its scan may be named.
 
-    Raises InputError where a file does not tell its scan, or that is not there.
+    Raises InputError where a file does not name its scan, or that is not there.
     """
     path = Path(names[-1])
     if is_session(path) and len(names) <= 2:
@@ -97,7 +97,7 @@ def _named(names: list[str]) -> _Named:
     if len(names) == 1 and is_recording(path):
         scan = Recording.load(path).entries[0].scan
         if scan is None:
-            raise InputError("does not tell its scan", path, "Open the scan, and drop this onto the window")
+            raise InputError("does not name its scan", path, "Open the scan, and drop this onto the window")
         return _Named([place_of(scan, path)], replay=path)
     return _Named(names)
 

@@ -184,10 +184,12 @@ def kept(scan: str) -> SavedSession | None:
     except InputError as error:
         what = f"what was kept of it cannot be read ({error.what})"
         if _is_foreign(error):
-            hint = f"It stays as it is in {path}; the scan opens anew, and changes of it are not kept"
+            hint = (
+                f"It stays unchanged in {path}. The scan opens without it, and Scan4D does not store changes"
+            )
             raise InputError(what, scan, hint) from error
         aside = _put_aside(path)
-        raise InputError(what, scan, f"It is put aside as {aside}; the scan opens anew") from error
+        raise InputError(what, scan, f"Scan4D renamed it to {aside}; the scan opens without it") from error
 
 
 def kept_elsewhere(scan: str, hash: str) -> list[SavedSession]:

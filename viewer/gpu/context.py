@@ -306,7 +306,7 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
     raise NoOpenGLError(
         f"no usable OpenGL ({attempts})",
         hint="Install a graphics driver, or Mesa's software OpenGL (Debian: apt-get install libegl1 "
-        "libgl1 libgl1-mesa-dri libegl-mesa0); 'scan4d doctor' tells more",
+        "libgl1 libgl1-mesa-dri libegl-mesa0); 'scan4d doctor' has details",
     )
 
 

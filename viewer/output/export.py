@@ -81,11 +81,11 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     places = len(_NUMBER.findall(path.name))
     film = suffix == FILM_SUFFIX
     if places > 1 or (places and film):
-        raise InputError("has too many places for numbers", path, "A film takes none, others one")
+        raise InputError("has too many number fields", path, "A film takes none, others one")
     if several and not places and not film:
         film_hint = f" or {path.stem}{FILM_SUFFIX}" if FILM_SUFFIX in suffixes else ""
         hint = f"Use a pattern such as {path.stem}%04d{path.suffix}{film_hint}"
-        raise InputError("is one file, for more than one result", path, hint)
+        raise InputError("is one file, but there are several results", path, hint)
 
 
 @contextmanager
@@ -183,8 +183,8 @@ def read_description(path: Path) -> str:
             raise InputError(f"cannot be read: {what}", path, hint) from error
         raise InputError("cannot be read as a picture", path, "It is damaged, or of another kind") from error
     if not isinstance(text, str):
-        hint = "Those that 'scan4d render' and the window save are"
-        raise InputError("is not a picture that tells how it was made", path, hint)
+        hint = "Pictures that 'scan4d render' and the window save hold it"
+        raise InputError("holds no data on how it was made", path, hint)
     return text
 
 

@@ -140,7 +140,9 @@ def folder_frames(folder: Path) -> list[Path]:
         if os.path.isdir(place) and (frames := _choose_frames(entries(place), place)):
             are_notes = all(frame.suffix.lower() in formats.NOTES for frame in frames)
             if are_notes and (lacking := lacking_part(place)):
-                raise InputError(f"{lacking}: its text tables alone are no points", folder, _NAME_TABLES)
+                raise InputError(
+                    f"{lacking}: Scan4D reads no points from its text tables", folder, _NAME_TABLES
+                )
             return frames
     if lacking := lacking_part(folder):
         raise InputError(lacking, folder, "Copy the folder as a whole")
@@ -196,9 +198,11 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     elif by_kind and any(file.suffix.lower() in _PICTURES for file in files):
         lacking = os.path.isdir(str(where)) and lacking_part(Path(str(where)))
         if lacking:
-            raise InputError(f"{lacking}: text tables beside pictures are no points", where, _NAME_TABLES)
-        hint = f"Depth is read from 16-bit PNG with a camera.json. {_NAME_TABLES}"
-        raise InputError("holds pictures, and text tables that are no scan beside them", where, hint)
+            raise InputError(
+                f"{lacking}: Scan4D reads no points from text tables beside pictures", where, _NAME_TABLES
+            )
+        hint = f"Scan4D reads depth from 16-bit PNG with a camera.json. {_NAME_TABLES}"
+        raise InputError("holds pictures and text tables, which are no scan", where, hint)
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
         most = max(by_kind, key=lambda kind: len(by_kind[kind]))

@@ -98,8 +98,8 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
         ({"landmarks": [{"name": ""}]}, r"landmarks\[0\]: has no 'name'"),
         ({"landmarks": [{"name": "a\nb"}]}, "no text of one line"),
         ({"landmarks": [{"name": "a" * 300}]}, "longer than 200"),
-        ({"landmarks": [{"name": "a"}, {"name": "a"}]}, "the landmark 'a' is there twice"),
-        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "whose partner it is not"),
+        ({"landmarks": [{"name": "a"}, {"name": "a"}]}, "the landmark 'a' appears twice"),
+        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "but not the reverse"),
         ({"landmarks": [{"name": "a", "colour": "b"}]}, "unknown field 'colour'"),
         (
             {"measures": [{"name": "w", "kind": "distance", "landmarks": ["x"]}]},

@@ -292,7 +292,7 @@ def test_members_that_numpy_does_not_write_are_refused(packing: int, tmp_path: P
     np.save(tmp_path / "positions.npy", np.eye(3))
     with zipfile.ZipFile(path, "w", packing) as archive:
         archive.write(tmp_path / "positions.npy", "positions.npy")
-    with pytest.raises(InputError, match=r"'positions.npy' is packed in another way than numpy does"):
+    with pytest.raises(InputError, match=r"'positions.npy' is packed in a way that numpy does not use"):
         formats.read(path)
 
 
@@ -302,7 +302,7 @@ def test_encrypted_members_are_refused(tmp_path: Path) -> None:
     data = bytearray(path.read_bytes())
     data[data.index(b"PK\x01\x02") + 8] |= 1
     path.write_bytes(bytes(data))
-    with pytest.raises(InputError, match="is packed in another way than numpy does"):
+    with pytest.raises(InputError, match="is packed in a way that numpy does not use"):
         formats.read(path)
 
 

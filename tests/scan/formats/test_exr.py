@@ -290,9 +290,12 @@ def test_eyes_count_where_their_cameras_are_known(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("camera", "reason"),
     [
-        ({"worldToCamera": np.eye(4, dtype=np.float32)}, "its worldToNDC is no camera's"),
+        ({"worldToCamera": np.eye(4, dtype=np.float32)}, "its worldToNDC is not that of an upright camera"),
         ({"worldToCamera": np.zeros((4, 4), np.float32)}, "Singular matrix"),
-        ({"worldToCamera": np.full((4, 4), np.nan, np.float32)}, "not a rotation|no camera's"),
+        (
+            {"worldToCamera": np.full((4, 4), np.nan, np.float32)},
+            "not a rotation|not that of an upright camera",
+        ),
         ({"screenWindowWidth": 0.0}, "calibration is unusable: fx inf|division by zero"),
     ],
 )

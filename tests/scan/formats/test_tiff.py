@@ -171,7 +171,9 @@ def test_odd_keys_tell_nothing(path: Path) -> None:
 
 def test_pictures_that_are_no_depth(path: Path) -> None:
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(path)
-    with pytest.raises(InputError, match="is a picture of type RGB, where one number a pixel should be"):
+    with pytest.raises(
+        InputError, match="is a picture of type RGB; a picture with one number a pixel is needed"
+    ):
         formats.read(path)
     path.write_bytes(b"II*\0" + bytes(100))
     with pytest.raises(InputError, match="is no TIFF, or damaged"):

@@ -242,7 +242,7 @@ def test_the_tree_before_has_to_be_there() -> None:
     told = to_bytes(octree, octree)
     assert_same_geometry(from_bytes(told, octree), octree)
     for previous in (None, replace(octree, edge=2.0)):
-        with pytest.raises(InputError, match="told by the octree before it"):
+        with pytest.raises(InputError, match="depends on the octree before it"):
             from_bytes(told, previous)
 
 
@@ -280,7 +280,7 @@ def test_attributes_are_told_by_the_pose_before(turn: float) -> None:
     assert sizes[0] < {0.0: 0.02, 0.002: 0.6, 0.4: 1.001}[turn] * sizes[1]
     assert bool(read_header(told)[0].told_attributes) == (turn < 0.4)
     if turn < 0.4:
-        with pytest.raises(InputError, match="told by the octree before it"):
+        with pytest.raises(InputError, match="depends on the octree before it"):
             from_bytes(told, bare(first))
         assert_same_geometry(from_bytes(told, bare(first), attributes=False), second)
 

@@ -156,7 +156,7 @@ def test_a_calibration_that_is_none_is_told(tmp_path: Path, stored: str, told: s
 def test_without_a_calibration_it_says_what_is_missing(tmp_path: Path) -> None:
     put(tmp_path, "a", "b", camera=False)
     (tmp_path / "a.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
-    assert "nothing tells their camera" in refusal(tmp_path)
+    assert "without the data of their camera" in refusal(tmp_path)
     assert "depth_scale" in refusal(tmp_path)
     assert [one.kind for one in list_folder(tmp_path)] == ["file"]  # the table alone
 
@@ -174,7 +174,7 @@ def test_pictures_beside_a_scan_are_left_alone(tmp_path: Path) -> None:
 def test_text_tables_beside_pictures_are_no_scan(tmp_path: Path) -> None:
     write_color(tmp_path / "photo.png", colors())
     (tmp_path / "poses.txt").write_text("0 0 1\n0 1 0\n")
-    assert "text tables that are no scan" in refusal(tmp_path)
+    assert "text tables, which are no scan" in refusal(tmp_path)
     assert len(find_source(tmp_path / "*.txt")) == 1
 
 
@@ -268,4 +268,4 @@ def test_a_color_may_be_grey(tmp_path: Path) -> None:
     view = only_view(tmp_path)
     np.testing.assert_array_equal(view.color, np.repeat(colors()[..., :1], 3, axis=2))
     write_depth(tmp_path / "color.png", depth_numbers())
-    assert "where colours should be" in refusal(tmp_path)
+    assert "colours are needed" in refusal(tmp_path)

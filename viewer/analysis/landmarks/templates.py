@@ -77,7 +77,7 @@ def _template(data: Any) -> Template:
     partners = {landmark.name: landmark.partner for landmark in landmarks if landmark.partner}
     for name, partner in partners.items():
         if partners.get(partner) != name:
-            raise InputError(f"'{name}' has the partner '{partner}', whose partner it is not", "landmarks")
+            raise InputError(f"'{name}' has the partner '{partner}', but not the reverse", "landmarks")
     names = {landmark.name for landmark in landmarks}
     measures = tuple(
         _measure(value, names, f"measures[{number}]")
@@ -144,7 +144,7 @@ def _text(fields: Mapping[str, Any], key: str, where: str, *, needed: bool = Fal
 def _check_names(names: list[str], what: str) -> None:
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InputError(f"the {what} '{shortened(twice)}' is there twice")
+        raise InputError(f"the {what} '{shortened(twice)}' appears twice")
 
 
 def template_of(name: str, landmarks: Sequence[Landmark], measures: Sequence[Measure]) -> Template:

@@ -236,7 +236,7 @@ def _readable(path: Path) -> ModuleType:
     if path.is_dir():
         raise InputError("is a folder, not a file", path)
     if not path.is_file():
-        raise InputError("is a device or a pipe, not a file", path, "Copy what it gives into a file")
+        raise InputError("is a device or a pipe, not a file", path, "Copy its output into a file")
     suffix = path.suffix.lower()
     if suffix not in _formats():
         hint = _CONVERT.get(suffix, f"Known: {', '.join(known_suffixes())}")  # one that is close is another

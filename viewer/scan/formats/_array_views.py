@@ -110,7 +110,7 @@ def _told_unit(arrays: _Arrays) -> str | None:
 def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     scale = _number(arrays, "depth_scale", 1.0)
     if not (np.isfinite(scale) and scale > 0):
-        raise InputError(f"its depth_scale is {scale:g}", hint="It is how many of the numbers are one unit")
+        raise InputError(f"its depth_scale is {scale:g}", hint="It is the number of depth steps in one unit")
     depth = stored.astype(np.float32)
     if scale != 1:
         depth /= np.float32(scale)
@@ -150,7 +150,7 @@ def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     elif "dx" in arrays and "dy" in arrays:
         left, first, right, down = 0.0, 0.0, abs(_number(arrays, "dx")), -abs(_number(arrays, "dy"))
     else:
-        raise InputError("has heights, but nothing tells the ground", hint="Add dx and dy, or xmin to ymax")
+        raise InputError("has heights but no ground coordinates", hint="Add dx and dy, or xmin to ymax")
     there = np.isfinite(heights)
     span = float(np.ptp(heights[there])) if there.any() else 0.0
     degrees = are_degrees(left, first, right * columns, down * rows, span)

@@ -120,9 +120,11 @@ def _check_header(head: bytes, held: int) -> None:
     (begin, records) = _FIRST.unpack_from(head)
     later = _OF_LATER_RECORDS.unpack_from(head)[0] if len(head) == _HEADER and head[25] >= 4 else 0
     if _SMALLEST_RECORD * (records + later) > held:
-        raise InputError(f"promises {records + later:,} records beside its points, more than fit into it")
+        raise InputError(
+            f"promises {records + later:,} records in addition to its points, more than it can hold"
+        )
     if begin > held:
-        raise InputError(f"says that its points begin at byte {begin:,}, and has {held:,} bytes")
+        raise InputError(f"states that its points begin at byte {begin:,}, and has {held:,} bytes")
 
 
 def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:

@@ -213,7 +213,7 @@ def _check_members(infos: Sequence[ZipInfo], held: int) -> None:
         raise InputError(f"two arrays are called '{twice}'", hint=_SAVE_ANEW)
     for info in infos:
         if info.compress_type not in (ZIP_STORED, ZIP_DEFLATED) or info.flag_bits & _ENCRYPTED:
-            raise InputError(f"'{info.filename}' is packed in another way than numpy does", hint=_SAVE_ANEW)
+            raise InputError(f"'{info.filename}' is packed in a way that numpy does not use", hint=_SAVE_ANEW)
     unpacked = sum(info.file_size for info in infos)
     if unpacked > _FREE + _MOST_RATIO * held:
         raise InputError(f"{held} bytes would unpack to {unpacked}", hint=_SAVE_ANEW)

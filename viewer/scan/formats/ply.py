@@ -122,7 +122,7 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
     points = np.full((len(cloud) + cloud.dropped, 3), np.nan)
     points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
     if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():
-        raise InputError("its range grid has more than one vertex in a place, or one that is not there")
+        raise InputError("its range grid has several vertices in one cell, or a missing vertex")
     grid = np.full((places, 3), np.nan)
     grid[lists.sizes == 1] = points[lists.corners]
     return grid.reshape(*sizes, 3)

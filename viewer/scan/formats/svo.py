@@ -238,5 +238,5 @@ def _found(path: Path, size: int, changed: int) -> list[_Place]:
     counts = [0, *(place.header.before for place in places)]
     for index, (above, here) in enumerate(pairwise(counts)):
         if here not in (0, above + 1) or here > index:
-            raise InputError(f"octree {index} is told by {here} before it, which are not there")
+            raise InputError(f"octree {index} depends on {here} before it, which are missing")
     return places

@@ -199,7 +199,7 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     if _are_too_many(sum(whole), len(data)):
         raise InputError(f"says that {len(data):,} bytes hold {sum(whole):,} octants, which is too many")
     if header.before and (previous is None or not _can_tell(header, previous, attributes)):
-        raise InputError("is told by the octree before it, which is missing")
+        raise InputError("depends on the octree before it, which is missing")
     before = previous if header.before else None
     coder = MaskCoder(header.levels[0].nodes, before.masks if before else ())
     masks: list[Bytes] = []
@@ -231,7 +231,7 @@ def read_strays(data: bytes) -> Strays:
     places = coding.unpack(data[size:middle], 24 * entry.nodes).reshape(24, -1).T
     positions = np.ascontiguousarray(places).view("<f8").astype(np.float64)
     if not (np.abs(positions) < _LARGEST).all():
-        raise InputError("the points outside an octree are nowhere")
+        raise InputError("the points outside an octree are not finite")
     found = Attributes()
     if header.width:
         values = coding.unpack(data[middle:end], header.width * entry.nodes)

@@ -122,7 +122,7 @@ def _checked(told: dict[str, Any], default: Calibration | None) -> Calibration:
     if len(given["distortion"]) not in (0, 4, 5, 8):
         raise InputError(f"has {len(given['distortion'])} coefficients of distortion, expected 4, 5 or 8")
     if given.get("depth_scale", 1) < 1:
-        hint = "It is how many of the numbers make one unit, such as 1000 for millimetres where the unit is m"
+        hint = "It is the number of depth steps in one unit, such as 1000 for millimetres where the unit is m"
         raise InputError(f"its depth_scale is {given['depth_scale']:g}", hint=hint)
     if "kind" in given and given["kind"] not in (kinds := get_args(DepthKind)):
         raise unknown_name("kind of depth", shortened(given["kind"]), kinds)

@@ -97,7 +97,7 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
     Raises InputError.
     """
     if picture.pose is None:
-        raise InputError("has no pose: no file beside it tells one", picture.depth)
+        raise InputError("has no pose: there is no file with its pose", picture.depth)
     try:
         numbers = np.array([word for _, words in rows_of(picture.pose) for word in words], np.float64)
         if numbers.shape != (16,):

@@ -43,7 +43,7 @@ def read_depth(path: Path) -> NDArray:
     """The numbers of a 16-bit grey PNG, or of a TIFF, (H, W). Raises InputError."""
     with opened_picture(path, DEPTH_KINDS) as image:
         if image.format == "PNG" and not image.mode.startswith(_SIXTEEN_BITS):
-            raise InputError(f"is a picture of type {image.mode}, where 16-bit grey tells depth")
+            raise InputError(f"is a picture of type {image.mode}; a depth picture is 16-bit grey")
         return numbers_of_picture(image)
 
 

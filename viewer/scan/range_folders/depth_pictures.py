@@ -33,7 +33,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     if camera is None:
         if has_scans:
             return None
-        raise InputError("holds depth pictures, but nothing tells their camera", folder, _HINT)
+        raise InputError("holds depth pictures without the data of their camera", folder, _HINT)
     calibration = read_calibration(folder / camera)
     have_poses = any(picture.pose for picture in pictures)
     return frames_of_pictures(

@@ -100,8 +100,8 @@ def _quarter_turns(file: Path) -> int:
         gravity = np.array([(record["gravity_x"], record["gravity_y"]) for record in records], np.float64)
         right, up = gravity.sum(axis=0)  # none of an empty list
     except (ValueError, KeyError, TypeError) as error:
-        hint = "Without this file, pictures are shown as the sensor lies"
-        raise InputError(f"tells no gravity: {shortened(repr(error))}", file, hint) from error
+        hint = "Without this file, Scan4D shows pictures in the sensor's orientation"
+        raise InputError(f"has no usable gravity: {shortened(repr(error))}", file, hint) from error
     sides = (right, -up, -right, up)  # how far up the picture's top is, its left, its bottom, its right
     return sides.index(max(sides))
 

@@ -104,7 +104,7 @@ def write_landmarks(path: Path | str, landmarks: LandmarkSet, axes: str = "LPS")
     if not _NUMBER.search(path.name):
         if len(landmarks) > 1 and getattr(module, "ONE_MOMENT", False):
             hint = f"Name a file a frame, such as '{_series_name(path)}', or use .c3d or .csv"
-            raise InputError(f"{module.TITLE} holds one moment, and there are {len(landmarks)}", path, hint)
+            raise InputError(f"{module.TITLE} holds one moment, but there are {len(landmarks)}", path, hint)
         return _write(module, path, landmarks)
     remark = None
     for row, frame in enumerate(landmarks.frames):

@@ -140,7 +140,7 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
     if len(first) < len(at):
         again = np.setdiff1d(np.arange(len(at)), first)[0]
         name = list(numbers)[number_of_row[again]]
-        what = f"'{shortened(name)}' is there twice in one frame"
+        what = f"'{shortened(name)}' appears twice in one frame"
         raise at_line(what, int(lines[again]), "Give each its own name")
     values, known = np.full((len(frames) * len(numbers), 4), np.nan), np.zeros(len(frames) * len(numbers))
     values[at], known[at] = np.array(numerals).reshape(-1, 4), states

@@ -56,7 +56,7 @@ def read(path: Path) -> LandmarkSet:
         if match := _SECTION.fullmatch(text):
             name = match[1].lower().replace(" ", "")
             if name in sections:
-                raise at_line(f"[{name}] is there twice", line)
+                raise at_line(f"[{name}] appears twice", line)
             current = sections[name] = []
         elif current is None:
             raise at_line(
