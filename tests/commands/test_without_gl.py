@@ -111,7 +111,7 @@ def test_a_picture_lies_behind(run: Run, scans: Path, tmp_path: Path) -> None:
     assert (drawn[covered][:, :3] != behind[covered]).any(axis=1).mean() > 0.9
     for arguments, told in (
         ((scan, "--no-gl", "-o", "c.png", "--size", "50x40", *over), "has 96 x 64 pixels, where the picture"),
-        ((scan, "-o", "c.cw", *SMALL, *over), "--behind: is not kept in '.cw' files"),
+        ((scan, "-o", "c.cw", *SMALL, *over), "--behind: is not stored in '.cw' files"),
         ((scan, "-o", "c.png", *SMALL, *over), "--behind: is for pictures without OpenGL"),
         ((scan, "--no-gl", "-o", "c.png", *SMALL, "--behind", scan), "is no PNG or JPEG or TIFF"),
         ((scan, "--no-gl", "-o", over[1], *SMALL, "--force", *over), "behind.png"),
