@@ -141,7 +141,7 @@ def test_a_scan_is_chosen_a_way_that_draws_it_from_what_is_stored() -> None:
         for way in ways(pose):
             needs = backends()[way.backend].needs(pose, way.params)
             assert all(getattr(pose.overview, name) is not None for name in needs)
-            assert backends()[way.backend].derive is None
+            assert backends()[way.backend].derives is Derives.NEVER
         model = {way.key: law for way in ways(pose)}
         choice = choose_way(pose, view, Goal("time", 1e6), model)
         assert choice is not None
