@@ -11,7 +11,7 @@ from range_scenes import sphere_view
 from scenes import sphere
 from test_model import seen, true_law
 
-from viewer.backends import SHARES, backends
+from viewer.backends import SHARES, Derives, backends
 from viewer.camera import Camera
 from viewer.choice.choose import Candidate, Comparison, best, choose_way
 from viewer.choice.goal import PIXELS, Goal
