@@ -164,7 +164,7 @@ def _text(app: App, item: str | Menu[App], has_words: bool) -> str:
 
 
 def _drop_text(menu: Menu[App], title: str, has_words: bool) -> str:
-    """The same of a button that a menu drops from, which has a title now."""
+    """The text of a button that a menu drops from, and its name after "###". title: of the menu now."""
     words = f"{title} {icons.ICON_FA_CARET_DOWN}".lstrip()
     has_words = has_words or menu.title_now is not None
     return f"{f'{menu.icon}  {words}' if has_words and menu.icon else menu.icon or words}###{_name(menu)}"
