@@ -47,7 +47,7 @@ explain_missing_packages()
 def __getattr__(name: str) -> object:
     """Import what the package gives when it is first used.
 
-    So the command line, which is in this package, is there to take an interrupt before anything else is.
+    The command line is in this package; so it can handle an interrupt before anything else is imported.
     """
     if name not in _HOMES:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'")
@@ -68,9 +68,8 @@ def render(
 ) -> Surface:
     """Draw one pose without a window and return its Surface (`.image()` is the picture).
 
-    camera: None fits the pose from the front. backend: None for the default of the scan.
-    layers: numbers over its points, and where it is moved to. params: the backend's parameters. Raises
-    InputError, NoOpenGLError.
+    camera: None fits the pose from the front. backend: None for the default of the scan. layers: numbers for
+    its points, and its motion. params: the backend's parameters. Raises InputError, NoOpenGLError.
     """
     from . import frame
 

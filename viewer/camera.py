@@ -28,12 +28,11 @@ _MOST_BYTES = 2**20  # of a file; ours have some 300
 
 @dataclass(frozen=True)
 class Camera:
-    """A camera: where a picture is taken from.
+    """A camera: position, direction and projection of a picture.
 
-    eye, target, up: scan units (up: any length). fov_y: degrees, 1e-6 to 170: in wider ones pixels would
-    show nearly half of all directions, so that no splat is as small as a pixel. height: scan units that
-    the picture shows from bottom to top (orthographic only). near, far: scan units along
-    the view axis; None: fitted (see `clip_range`).
+    eye, target, up: scan units (up: any length). fov_y: degrees, 1e-6 to 170; in a wider view a pixel shows
+    nearly half of all directions. height: scan units from the bottom to the top of the picture (orthographic
+    only). near, far: scan units along the view axis; None: fitted (see `clip_range`).
     """
 
     eye: Vector = (0.0, 0.0, 1.0)
@@ -82,9 +81,9 @@ class Camera:
     ) -> Camera:
         """A camera that circles the centre of `bounds`.
 
-        azimuth: degrees; 0 looks from the front (+z for up +y), positive moves the eye
-        towards +x. elevation: degrees, positive is above. distance: scan units; None: as
-        near as shows all of the bounds at this aspect (width / height).
+        azimuth: degrees; 0 looks from the front (+z for up +y), positive moves the eye towards +x. elevation:
+        degrees, positive is above. distance: scan units; None: as near as possible with all bounds in view at
+        this aspect (width / height).
         """
         bounds = _with_extent(bounds)
         above = np.array(up_vector(up), float)
@@ -167,13 +166,13 @@ class Camera:
         return np.stack([right, np.cross(back, right), back])
 
     def place_in_picture(self, point: Vector) -> tuple[float, float] | None:
-        """The place of a point in the picture, in its heights: to the right of and above its centre; None
-        behind the eye."""
+        """Position of a point in the picture, right of and above its centre, in picture heights; None behind
+        the eye."""
         right, up = self.places_in_picture(np.array([point], np.float64))[0].tolist()
         return None if math.isnan(right) else (right, up)
 
     def places_in_picture(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The places of points (N, 3) as `place_in_picture` gives them, (N, 2); NaN behind the eye."""
+        """Positions of points (N, 3) in the picture, (N, 2), as in `place_in_picture`; NaN behind the eye."""
         right, up, _ = self.rotation() @ (points - self.eye).T
         return np.stack([right, up], axis=1) / self.heights_at(points)[:, None]
 
@@ -185,7 +184,7 @@ class Camera:
         return height * -back / self.distance if self.projection == "perspective" else height
 
     def clip_range(self) -> tuple[float, float]:
-        """(near, far) along the view axis, scan units: what is outside is not drawn.
+        """(near, far) along the view axis, scan units. Nothing outside is drawn.
 
         A missing near is a thousandth of the distance to the target, a missing far infinite.
         """
@@ -193,7 +192,7 @@ class Camera:
         return near, math.inf if self.far is None else self.far
 
     def reach(self, bounds: Bounds) -> float:
-        """A depth that nothing near the bounds lies behind, scan units.
+        """A depth beyond everything near the bounds, scan units.
 
         An orthographic depth buffer is scaled to it.
         """
@@ -202,7 +201,8 @@ class Camera:
     # --- moving it --------------------------------------------------------------------
 
     def fit(self, bounds: Bounds, aspect: float = 1.0) -> Camera:
-        """Move along the direction to as near as shows the box of `bounds` whole, with a small margin."""
+        """Move along the view axis, as near as possible with the whole box of `bounds` in view and a small
+        margin."""
         bounds = _with_extent(bounds)
         x, y, z = self.rotation() @ (bounds.corners() - bounds.center).T
         tangent = math.tan(math.radians(self.fov_y) / 2) / _FIT_MARGIN
@@ -216,10 +216,11 @@ class Camera:
         return replace(self, eye=eye, target=vector(bounds.center), height=height)
 
     def framing(self, points: NDArray[np.float64], aspect: float = 1.0) -> Camera:
-        """Move sideways and along the direction to as near as shows all points, with a small margin.
+        """Move sideways and along the view axis, as near as possible with all points in view and a small
+        margin.
 
-        It comes nearer than `fit` does where the points do not fill their box, as those that one depth camera
-        sees. points: (N, 3) scan units, at least one. The target is at their median depth.
+        It comes nearer than `fit` if the points do not fill their box, such as those of one depth camera.
+        points: (N, 3) scan units, at least one. The target is at their median depth.
         """
         bounds = Bounds(points.min(axis=0), points.max(axis=0))
         if _with_extent(bounds) is not bounds:
@@ -252,8 +253,8 @@ class Camera:
     def orbited(self, azimuth: float, elevation: float, about: Vector | None = None) -> Camera:
         """Turn about the target: azimuth about up, then elevation, in degrees.
 
-        about: another point to turn about, scan units; it keeps its place in the picture.
-        Elevation stops short of the poles, so that the picture never flips.
+        about: another point to turn about, scan units; it stays at its position in the picture. Elevation
+        stops short of the poles, so that the picture never flips.
         """
         up = np.array(self.up) / np.linalg.norm(self.up)
         arm = np.subtract(self.eye, self.target)
@@ -285,11 +286,12 @@ class Camera:
         return replace(self, eye=vector(np.add(self.eye, by)), target=vector(np.add(self.target, by)))
 
     def zoomed(self, factor: float) -> Camera:
-        """Zoom: nearer for factor > 1, farther for factor < 1; what is at the target scales by it."""
+        """Zoom: nearer for factor > 1, farther for factor < 1. The surface at the target scales by the
+        factor."""
         return self.at_distance(self.distance / factor)
 
     def approached(self, point: Vector, factor: float) -> Camera:
-        """Approach a point, for factor > 1; it keeps its place in the picture."""
+        """Approach a point, for factor > 1. It stays at its position in the picture."""
         about = np.array(point)
         eye, target = (about + (np.array(p) - about) / factor for p in (self.eye, self.target))
         return replace(
@@ -297,7 +299,7 @@ class Camera:
         )
 
     def projected(self, projection: str) -> Camera:
-        """Change the projection: what is at the target keeps its size."""
+        """Change the projection. The surface at the target keeps its size."""
         camera = replace(self, projection=projection, height=self.view_height)
         if projection == "orthographic":
             return camera

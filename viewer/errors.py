@@ -13,8 +13,8 @@ _SHOWN = 80  # characters of a value that a message shows
 class Scan4DError(Exception):
     """Base of all errors that are shown to a user without a traceback.
 
-    what: what failed, one clause. where: the file, frame or name it concerns.
-    hint: what to try. `exit_code` is what the command line ends with.
+    what: what failed, one clause. where: the file, frame or name it concerns. hint: what to try. `exit_code`
+    is the exit code of the command line.
     """
 
     exit_code = 1
@@ -47,14 +47,14 @@ class NoOpenGLError(Scan4DError):
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> InputError:
-    """The error for a name that is not one of `known`; it tells which are close to it, and lists them all."""
+    """Error for a name that is not in `known`. Its hint suggests similar names and lists all."""
     known = sorted(set(known))
     hint = f"{did_you_mean(name, known)}Known: {', '.join(known)}"
     return InputError(f"unknown {kind} '{shortened(name)}'", hint=hint)
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A question that names what is close to a name, "Did you mean 'points'? "; empty where nothing is."""
+    """A question with similar names, "Did you mean 'points'? "; empty without any."""
     import difflib  # 3 ms
 
     close = difflib.get_close_matches(name[:_SHOWN], list(known), n=2)
@@ -62,7 +62,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 def shortened(value: object) -> str:
-    """A value as messages show it, whatever it is: long ones are cut."""
+    """Any value as messages show it; long ones are cut."""
     text = value if isinstance(value, str) else reprlib.repr(value)
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
@@ -92,7 +92,7 @@ _CUT_SHORT = re.compile(r"[0-9]+ requested and [0-9]+ written")  # all that nump
 def explained(error: OSError, hint: str | None = None) -> tuple[str, str | None]:
     """Reason and advice where the system refused: "the disk is full", "Make room, or use another disk".
 
-    hint: what to try where the cause is another one than those that are known.
+    hint: what to try for an unknown cause.
     """
     number = errno.ENOSPC if _CUT_SHORT.match(str(error)) else error.errno
     return _SYSTEM.get(number or 0, (error.strerror or str(error) or type(error).__name__, hint))

@@ -1,4 +1,4 @@
-"""Rigid motions: a rotation and a translation, by which a scan is moved."""
+"""Rigid motions: a rotation and a translation of a scan."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _EXACT = 1e-6  # how far the rotation of a `Rigid` may be from orthonormal
 class Rigid:
     """A rotation and a translation of column vectors, in float64.
 
-    matrix: (4, 4). What is moved by the identity stays the very same, bit for bit. Raises InputError for
-    any other matrix than a rotation and a translation.
+    matrix: (4, 4). The identity changes no bit. Raises InputError for a matrix that is not a rotation and a
+    translation.
     """
 
     matrix: NDArray[np.float64] = field(default_factory=lambda: np.eye(4))
@@ -57,20 +57,20 @@ class Rigid:
         return vectors if self.is_identity else (vectors @ self.rotation.T).astype(vectors.dtype)
 
     def bounds(self, bounds: Bounds) -> Bounds:
-        """The upright box around a moved one."""
+        """Upright box around a moved box."""
         if self.is_identity:
             return bounds
         corners = self.points(bounds.corners())
         return Bounds(corners.min(axis=0), corners.max(axis=0))
 
     def after(self, other: Rigid) -> Rigid:
-        """The motion that is another one and then this one."""
+        """Motion that applies the other one first and then this one."""
         if self.is_identity or other.is_identity:
             return other if self.is_identity else self
         return Rigid(self.matrix @ other.matrix)
 
     def in_frame(self, origin: NDArray[np.float64]) -> Rigid:
-        """A motion that is the same in coordinates that count from an origin, (3,)."""
+        """Motion in coordinates relative to an origin, (3,), that is the same as this one."""
         if self.is_identity:
             return self
         moved = self.matrix.copy()

@@ -1,4 +1,4 @@
-"""Layers: what lies over the points of a pose, without being part of the scan."""
+"""Layers: numbers and motions over the points of a pose that are not part of the scan."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from .pose import Pose
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """Numbers that were computed of a pose's points, and where the pose is moved to.
+    """Numbers computed for a pose's points, and the pose's motion.
 
-    scalars: name -> (N,) array of any real type, by row of the pose's cloud; a name that the scan has too
-    stands for these. An array that is given again, be it in other Layers, is not uploaded again; to change
+    scalars: name -> (N,) array of any real type, by row of the pose's cloud; it has precedence over a scalar
+    of the scan with that name. Scan4D does not upload the same array twice, even in other Layers; for other
     numbers, give a new array. place: from the scan's coordinates to the world's.
     """
 
@@ -26,7 +26,7 @@ class Layers:
     place: Rigid = STILL
 
     def check(self, pose: Pose) -> None:
-        """Raise InputError where there are not as many numbers as points."""
+        """Raise InputError unless there is one number for each point."""
         for name, values in self.scalars.items():
             if np.shape(values) != (len(pose.cloud),) or values.dtype.kind not in "fiub":
                 found = f"{np.shape(values)} {values.dtype}"

@@ -1,4 +1,4 @@
-"""From what a user names (a file, a folder, a pattern, the demo) to a Timeline."""
+"""From a user's name of a scan (a file, a folder, a pattern, the demo) to a Timeline."""
 
 from __future__ import annotations
 
@@ -38,14 +38,13 @@ def is_demo(scan: str | None) -> bool:
 
 
 def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float | None = None) -> Timeline:
-    """Open a scan; no frame is read before it is asked for.
+    """Open a scan without reading any frame.
 
-    path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo",
-    of which "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed.
-    unit: the name of its unit of length, for example "mm"; None: what the scan tells, else "units".
-    fps: frame numbers a second, where no times.csv tells the times. Without it the times
-    stored in the file count, and without those 25 a second.
-    Raises InputError where there is nothing to open, and says what is near.
+    path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo", of which
+    "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed. unit: the
+    name of its unit of length, for example "mm"; None: what the scan tells, else "units". fps: frame numbers
+    a second, where no times.csv tells the times. Without it the times stored in the file count, and without
+    those 25 a second. Raises InputError where there is nothing to open, and says what is near.
     """
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise InputError(f"a frame rate of {fps} is not usable", hint="Give frames per second above 0")
@@ -72,8 +71,8 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
 
 
 def left_aside(path: str | os.PathLike[str], source: FrameSource) -> list[str]:
-    """The names of the scan files in a folder that its frames do not use, so that each may be a scan of its
-    own; none where `path` is no folder."""
+    """Names of scan files in a folder that are not its frames, so that each may be a scan of its own; none if
+    `path` is no folder."""
     if not os.path.isdir(path):
         return []
     kinds = {*formats.known_suffixes()} - _TABLES
@@ -93,7 +92,7 @@ def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> Non
 
 
 def has_times_in_names(timeline: Timeline) -> bool:
-    """Whether the names of the frames tell when they are, and nothing better does."""
+    """Whether the names of the frames give their times, and nothing better does."""
     return not timeline.is_measured and times_in_names(_labels(timeline.source)) is not None
 
 
@@ -133,8 +132,8 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
 def folder_frames(folder: Path) -> list[Path]:
     """The scan files that a folder plays as one scan, at least one, in natural order. No file is read.
 
-    They are in the folder, or in its folder `frames`, whatever stands beside that. Raises InputError
-    where there are none, and where text tables seem to belong to range images that are missing.
+    They are in the folder, or in its folder `frames`, whatever stands beside that. Raises InputError where
+    there are none, and where text tables seem to belong to range images that are missing.
     """
     for place in (folder / "frames", folder):
         if os.path.isdir(place) and (frames := _choose_frames(entries(place), place)):
@@ -174,7 +173,7 @@ def matches(pattern: str) -> list[Path]:
 
 
 def searches_folders(path: str) -> bool:
-    """Whether a name is a pattern with wild cards in its folders, which may stand for a whole disk."""
+    """Whether a name is a pattern with wild cards in its folders, which may match a whole disk."""
     folder, name = os.path.split(path)
     is_pattern = "**" in name or glob.has_magic(folder) or _PRINTF.search(folder) is not None
     return is_pattern and not os.path.exists(path)
@@ -183,8 +182,8 @@ def searches_folders(path: str) -> bool:
 def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     """The frames among the files, in natural order; empty where there is none.
 
-    Left aside: hidden files, times.csv, unknown suffixes, and TXT and CSV beside frames of
-    another kind. Raises InputError where two kinds remain, and where TXT and CSV stand beside pictures alone.
+    Left aside: hidden files, times.csv, unknown suffixes, and TXT and CSV beside frames of another kind.
+    Raises InputError where two kinds remain, and where TXT and CSV stand beside pictures alone.
     """
     known = set(formats.known_suffixes())
     by_kind: dict[str, list[Path]] = {}

@@ -18,7 +18,7 @@ Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
 
 
 class Life:
-    """A token that a pose shares with itself at other times; what is on the GPU of it stays for as long."""
+    """A token that a pose shares with itself at other times. Its GPU data live as long as the token."""
 
     __slots__ = ("__weakref__",)
 
@@ -30,8 +30,8 @@ class Pose:
     index: its place on the timeline. time: seconds. label: the file or frame it came from. points: its
     points, or those of the range views where it was scanned as such. life: see `Life`.
 
-    To merge the points of range views takes time and memory, and is done where something reads `cloud`. What
-    is told of them by the `overview` needs no merging.
+    Merging the points of range views takes time and memory. It happens when something first reads `cloud`;
+    the `overview` needs no merging.
     """
 
     index: int
@@ -48,17 +48,17 @@ class Pose:
 
     @property
     def cloud(self) -> PointCloud:
-        """All its points; those of range views are merged at the first call, on any thread, and kept."""
+        """All points. The first call merges those of range views, on any thread, and caches them."""
         return self.points if isinstance(self.points, PointCloud) else self.points.cloud
 
     @property
     def is_merged(self) -> bool:
-        """Whether `cloud` is there, rather than to be merged."""
+        """Whether `cloud` exists already."""
         return isinstance(self.points, PointCloud) or self.points.is_merged
 
     @property
     def views(self) -> tuple[RangeView, ...]:
-        """The range views that it was scanned as; none where it holds points alone."""
+        """The range views of the scan; none if it holds only points."""
         return () if isinstance(self.points, PointCloud) else self.points.views
 
     @property
@@ -79,7 +79,7 @@ class Pose:
 
     @property
     def dropped(self) -> int:
-        """Number of points that were left out of `cloud`; 0 before it is there."""
+        """Number of points left out of `cloud`; 0 before it exists."""
         return self.cloud.dropped if self.is_merged else 0
 
     @property

@@ -1,4 +1,4 @@
-"""Range views: what one pod of a scanner measured, a depth for each pixel of a calibrated camera."""
+"""Range views: the measurement of one pod of a scanner, a depth for each pixel of a calibrated camera."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class RangeView:
 
     @property
     def eye(self) -> NDArray[np.float64]:
-        """The pod's place in the world, (3,) float64."""
+        """Position of the pod in the world, (3,) float64."""
         return -self._camera_to_world() @ self.world_to_camera[:3, 3]
 
     @property
@@ -144,7 +144,7 @@ class RangeView:
     def project(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Pixels (N, 2) in which the pod sees world points (N, 3), by its calibration: column and row with
         centres at +0.5; and depths (N,) of the view's kind. NaN where a point is not before the pod or its
-        lens cannot show it. What lies outside of the picture is not left out."""
+        lens cannot show it. Pixels may lie outside the picture."""
         x, y, z = (points @ self.world_to_camera[:3, :3].T + self.world_to_camera[:3, 3]).T
         depth = -z
         if self.kind != "height":
@@ -261,8 +261,8 @@ class RangeView:
 
 
 def assumed_pinhole(width: int, height: int) -> dict[str, Any]:
-    """A calibration for pictures of this size where nothing tells it, and `assumed`, as a RangeView has them:
-    45 degrees across the longer edge."""
+    """Default calibration for pictures of this size, and `assumed`, as in RangeView: 45 degrees across the
+    longer edge."""
     focal = max(width, height) / (2 * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
     told = f"no calibration is told: a field of view of {_FIELD_OF_VIEW:g} degrees is assumed"
     return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": told}
@@ -274,12 +274,12 @@ def mask_of(numbers: NDArray) -> NDArray[np.bool_]:
 
 
 def merge(views: Sequence[RangeView], normals: bool = False, origin: ArrayLike | None = None) -> PointCloud:
-    """The points that all views see, in view order and then in row order.
+    """Points of all views, in view order and then in row order.
 
-    ids count all pixels in that order, so they tell the pixel. Colours and the scalar `confidence` are
-    there where every view has them; the scalar `view` is the number of the view. normals: whether to
-    make them, see `RangeView.normals`. origin: as for `PointCloud.from_arrays`. One view's eye is the
-    viewpoint. Raises InputError where no view sees a point.
+    ids count all pixels in that order, so each id names a pixel. Colours and the scalar `confidence` exist if
+    every view has them; the scalar `view` is the number of the view. normals: whether to make them, see
+    `RangeView.normals`. origin: as for `PointCloud.from_arrays`. One view's eye is the viewpoint. Raises
+    InputError where no view sees a point.
     """
     valid = [view.valid() for view in views]
     counts = [int(np.count_nonzero(pixels)) for pixels in valid]

@@ -1,4 +1,4 @@
-"""A scan in time: it knows when each pose is and where it comes from, and reads it when asked."""
+"""A scan in time: the time and the source of each pose, which it reads when asked."""
 
 from __future__ import annotations
 
@@ -34,13 +34,12 @@ _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 
 @dataclass(frozen=True)
 class ScanMessage:
-    """Something about a scan that its user should know.
+    """A message about a scan for the user.
 
-    kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite
-    coordinate were left out), "shortened" (splats far larger than the scan were), "unit" (lengths in
-    another unit than the scan's, or a name of it that is no unit), "assumed" (what of range views nothing
-    tells), "times" or "beside" (files in its folder may be another scan). index: the frame; None where it
-    concerns all.
+    kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite coordinate were left
+    out), "shortened" (splats far larger than the scan were), "unit" (lengths in another unit than the scan's,
+    or a name of it that is no unit), "assumed" (what of range views nothing tells), "times" or "beside"
+    (files in its folder may be another scan). index: the frame; None where it concerns all.
     """
 
     kind: Literal["broken", "dropped", "shortened", "unit", "assumed", "times", "beside"]
@@ -49,7 +48,7 @@ class ScanMessage:
 
 
 class TimelineClosed(ValueError):
-    """The timeline is closed, as another scan is open now: its poses are not read any more."""
+    """The timeline is closed because another scan is open; it reads no more poses."""
 
 
 class Timeline:
@@ -65,9 +64,9 @@ class Timeline:
     finish:   called with each pose on the thread that has read it, before anybody gets it; for what
               would take too long where it is shown
 
-    Every method may be called from any thread. One worker thread, started by the first
-    `request` or `prefetch`, reads ahead; it knows no GL. Scripts use `pose`, which waits; a
-    window uses `request` or `prefetch`, and `ready`, which do not.
+    Every method may be called from any thread. One worker thread, started by the first `request` or
+    `prefetch`, reads ahead; it knows no GL. Scripts use `pose`, which waits; a window uses `request` or
+    `prefetch`, and `ready`, which do not.
     """
 
     def __init__(
@@ -192,8 +191,8 @@ class Timeline:
     def pose(self, index: int) -> Pose:
         """One pose, read now unless it is in memory; threads that ask for it at once read it once.
 
-        Raises InputError where there is no such pose, or its frame is broken; a broken frame
-        is not read again.
+        Raises InputError where there is no such pose, or its frame is broken; a broken frame is not read
+        again.
         """
         index = self._checked_index(index)
         with self._state:
@@ -242,9 +241,8 @@ class Timeline:
     def prefetch(self, index: int, direction: int = 1) -> None:
         """Ask the worker for the pose at the playhead, then for those that playing reaches next.
 
-        It reads on, round the end, as far as the cache holds them, and evicts none that is
-        reached earlier than the one it reads. Replaces all that was asked of it earlier.
-        direction: 1 or -1.
+        It reads on, round the end, as far as the cache holds them, and evicts none that is reached earlier
+        than the one it reads. Replaces all that was asked of it earlier. direction: 1 or -1.
         """
         index = self._checked_index(index)
         with self._state:
