@@ -59,11 +59,25 @@ def test_real_files_hold_as_many_points_as_stated(data_dir: Path) -> None:
             assert len(read(data_dir / name)) == count, name
 
 
+def test_false_lengths_of_records_behind_the_points_take_no_memory(tmp_path: Path) -> None:
+    written = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    written.x = written.y = written.z = np.arange(5.0)
+    written.evlrs = laspy.vlrs.vlrlist.VLRList([laspy.VLR("a", 1, "behind", b"b" * 50)])
+    path = tmp_path / "a.las"
+    written.write(path)
+    whole = path.read_bytes()
+    place = int.from_bytes(whole[235:243], "little")
+    for at, size in ((235, 8), (243, 4), (place + 20, 8)):  # where they begin, their number, a length
+        for value in (1 << 31, (1 << 8 * size) - 1):
+            path.write_bytes(whole[:at] + value.to_bytes(size, "little") + whole[at + size :])
+            np.testing.assert_array_equal(read(path).world()[:, 0], np.arange(5))
+
+
 @pytest.mark.parametrize("suffix", [".las", pytest.param(".laz", marks=pytest.mark.slow)])
 def test_damaged_files_are_refused_in_one_message(suffix: str, tmp_path: Path) -> None:
     path = save(tmp_path / f"a{suffix}")
     whole = path.read_bytes()
-    for size in (1, 100, 230, 400, len(whole) // 2):
+    for size in (1, 100, 104, 230, 400, len(whole) // 2):
         path.write_bytes(whole[:size])
         with pytest.raises(InputError) as caught:
             read(path)

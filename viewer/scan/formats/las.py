@@ -39,11 +39,9 @@ _MOST_RATIO = 100  # of memory to the file: LAZ packs points of regular scanners
 _COLORS = ("red", "green", "blue")
 _WHOLE = {"X", "Y", "Z"}  # coordinates before scale and offset
 _COPIES, _OTHERS = 2, 36  # of a point's bytes; bytes of its coordinates and of what becomes of them
-_HEADER = 247  # bytes, of the first versions fewer
-_FIRST = struct.Struct("<96xII")  # where points begin, and the number of records before them
-_OF_LATER_RECORDS = struct.Struct("<243xI")  # the number of records behind the points
+_FIRST = struct.Struct("<96xIIB")  # where points begin, number of records before, format of points
 _SMALLEST_RECORD = 54  # bytes
-_FORMAT, _PACKED = 104, 0x80  # where the header has the format of points, and the bit that tells LAZ
+_PACKED = 0x80  # the bit of the format that tells LAZ
 _LOOK = 0.1  # seconds between looks at whether reading is cancelled
 _SAID = 200  # letters of what the unpacker says
 
@@ -54,11 +52,10 @@ def read(path: Path, frame: int = 0) -> PointCloud:
 
     logging.getLogger("laspy").setLevel(logging.CRITICAL)  # what is wrong is told by what is raised
     with opened(path) as stream:
-        head, held = stream.read(_HEADER), size_of(stream)
-        _check_header(head, held)
-        if not head[_FORMAT] & _PACKED:
+        held = size_of(stream)
+        if not _checked_format(stream.read(_FIRST.size), held) & _PACKED:
             stream.seek(0)
-            with laspy.open(stream, closefd=False) as reader:
+            with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
                 return cloud_from_columns(_columns(reader, held))
     with temporary_folder() as folder:
         plain = folder / "plain.las"
@@ -72,7 +69,7 @@ def unpack_laz(packed: str, plain: str) -> None:
     import laspy
 
     logging.getLogger("laspy").setLevel(logging.CRITICAL)
-    with laspy.open(packed) as reader:
+    with laspy.open(packed, read_evlrs=False) as reader:
         header, done = reader.header, 0
         admit(
             os.path.getsize(packed),
@@ -112,19 +109,20 @@ def _unpack_beside(packed: Path, plain: Path) -> None:
         )
 
 
-def _check_header(head: bytes, held: int) -> None:
-    """Raise InputError where a file of `held` bytes promises more than fits into it: laspy would go through
-    all records, and make room for all that stands before the points."""
+def _checked_format(head: bytes, held: int) -> int:
+    """The format of the points of a file of `held` bytes.
+
+    Raises InputError where the file promises more than fits into it: laspy goes through all records before
+    the points, and makes room for them. It does not read the records behind the points.
+    """
     if not head.startswith(b"LASF") or len(head) < _FIRST.size:
         raise InputError("is no LAS file")
-    (begin, records) = _FIRST.unpack_from(head)
-    later = _OF_LATER_RECORDS.unpack_from(head)[0] if len(head) == _HEADER and head[25] >= 4 else 0
-    if _SMALLEST_RECORD * (records + later) > held:
-        raise InputError(
-            f"promises {records + later:,} records in addition to its points, more than it can hold"
-        )
+    begin, records, form = _FIRST.unpack(head)
+    if _SMALLEST_RECORD * records > held:
+        raise InputError(f"promises {records:,} records before its points, more than it can hold")
     if begin > held:
         raise InputError(f"states that its points begin at byte {begin:,}, and has {held:,} bytes")
+    return form
 
 
 def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:
