@@ -25,7 +25,7 @@ from viewer.splatting import lists
 
 if TYPE_CHECKING:
     from viewer.backends import Backend
-    from viewer.gpu.surface import Surface
+    from viewer.picture.surface import Surface
     from viewer.renderer import Renderer
 
 pytest_plugins = ["parts"]
@@ -114,7 +114,7 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
 
     from viewer.backends import backend
     from viewer.frame import Request, render_frame
-    from viewer.gpu.surface import Surface
+    from viewer.picture.surface import Surface
 
     def draw(
         scanned: Scanned,

@@ -11,8 +11,8 @@ from pathlib import Path
 from viewer.backends import FrameView, Suited
 from viewer.backends import points as plain
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
 from viewer.params import param
+from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
 
 SHADER = str(Path(__file__).with_suffix(".comp").resolve())

@@ -15,8 +15,8 @@ from viewer.backends import points as plain
 from viewer.gpu import gl
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import NOTHING, Surface
 from viewer.look import ValueKind
+from viewer.picture.surface import NOTHING, Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from viewer.bench.rounding import Rounding, half_step
 from viewer.camera import Camera
 from viewer.gpu.context import Gpu
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 

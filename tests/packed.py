@@ -14,7 +14,7 @@ from viewer.camera import Camera
 from viewer.gpu import gl
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.splatting.amplify import Points
 from viewer.srgb import roots_from_bytes

@@ -18,7 +18,7 @@ from viewer.gpu.bindings import Texture
 from viewer.gpu.context import Gpu, Program
 from viewer.gpu.pose import GpuPose
 from viewer.gpu.scatter import Visits, scatter
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
 from viewer.scan.range_points import RangePoints
 from viewer.view import View

@@ -16,9 +16,9 @@ from viewer.errors import InputError
 from viewer.frame import Request, backend_for, bring, fallback, is_prepared, render_frame
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.params import param
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer, Want
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud

@@ -23,6 +23,7 @@ LAYERS = (
     {"scan"},
     {"mesh", "codewords"},
     {"simulate", "gpu"},
+    {"picture"},
     {"splatting", "visibility", "projection"},
     {"backends"},
     {"renderer", "frame", "timing", "choice"},

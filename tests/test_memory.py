@@ -14,7 +14,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 PLAY = """
 import sys, viewer
 from viewer.frame import Request, render_frame, shared_renderer
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 
 renderer = shared_renderer()
 surface = Surface(renderer.gpu, (640, 480))

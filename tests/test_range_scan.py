@@ -17,8 +17,8 @@ from viewer.commands import render as render_command
 from viewer.commands._scans import read_poses
 from viewer.errors import InputError
 from viewer.frame import Request, bring, is_prepared, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan import formats
 from viewer.scan.open import open_scan

@@ -13,8 +13,8 @@ from viewer.backends import backend, backends
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, reshade
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.pose import Pose

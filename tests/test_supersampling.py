@@ -13,9 +13,9 @@ from scenes import every_backend, of_variant, sphere
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame, sample_shifts, supersample
-from viewer.gpu.mean import PictureMean
-from viewer.gpu.surface import Surface
 from viewer.look import SAMPLES, Look
+from viewer.picture.mean import PictureMean
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -7,7 +7,7 @@ from scenes import looking_down_z, plane
 from viewer.backends import CHANGES, FrameView, points
 from viewer.frame import Request
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
 from viewer.timing import call_ms, draw, pass_ms
 

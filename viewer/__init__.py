@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from .analysis.visible_normals import VisibleNormals, estimate_normals
     from .camera import Camera
     from .errors import Scan4DError
-    from .gpu.surface import Surface
     from .look import Look
+    from .picture.surface import Surface
     from .rigid import Rigid
     from .scan.layers import Layers
     from .scan.open import open_scan

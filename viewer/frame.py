@@ -13,13 +13,13 @@ from .backends import Backend, FrameView, backends, missing_source
 from .backends import backend as find_backend
 from .camera import Camera
 from .gpu.context import Gpu
-from .gpu.frame_view import Before
-from .gpu.mean import PictureMean
 from .gpu.pose import GpuPose, drawn_bounds
-from .gpu.shade import shade
-from .gpu.stats import Stats
-from .gpu.surface import Surface
 from .look import SAMPLES, Look, drawable
+from .picture.frame_view import Before
+from .picture.mean import PictureMean
+from .picture.shade import shade
+from .picture.stats import Stats
+from .picture.surface import Surface
 from .renderer import Renderer, Want
 from .scan.layers import NO_LAYERS, Layers
 from .scan.pods import first_camera

@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from .frame import Request, render_frame
-from .gpu.surface import Surface
+from .picture.surface import Surface
 from .renderer import Renderer
 
 _PROCESS = Path("/proc/self")  # Linux

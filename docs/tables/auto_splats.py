@@ -19,7 +19,7 @@ from viewer.bench.report.measurement import markdown_table, remeasure_tables, sp
 from viewer.bench.run import BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.viewpoints import viewpoints
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 
 PAGE = DOCS / "how-it-works" / "auto-splats.md"
 BACKEND = "auto_splats"

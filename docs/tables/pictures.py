@@ -15,8 +15,8 @@ from viewer.bench.scenes.subjects import Subject
 from viewer.bench.scenes.viewpoints import viewpoints
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 

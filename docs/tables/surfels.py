@@ -40,10 +40,10 @@ from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.mesh.reference import trace, visible_pixels
 from viewer.mesh.triangles import Mesh, read_mesh
+from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

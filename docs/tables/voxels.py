@@ -20,8 +20,8 @@ from viewer.bench.report.measurement import markdown_table, remeasure_tables, sp
 from viewer.bench.scenes.catalog import subject
 from viewer.bench.scenes.subjects import Moment
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.scan.octree.build import build
 from viewer.scan.octree.traverse import Traversal
 from viewer.scan.spacing import typical_spacing

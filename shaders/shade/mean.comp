@@ -1,4 +1,4 @@
-// The mean of pictures, in linear light as far as they cover what lies behind: viewer/gpu/mean.py.
+// The mean of pictures, in linear light as far as they cover what lies behind: viewer/picture/mean.py.
 // STEP 0: adds a picture to the sums, which START begins. 1: writes the mean of so many.
 #include "common/item.glsl"
 

@@ -9,7 +9,7 @@
 #include "common/color.glsl"
 #include "common/item.glsl"
 #include "common/list.glsl"
-// gpu/shade.py.
+// picture/shade.py.
 #include <params>
 
 layout(binding = TEXTURE_DEPTHS) uniform usamplerBuffer depths;  // float bits, +inf where nothing is

@@ -1,4 +1,4 @@
-// Softens the picture of a preview: viewer/gpu/soften.py.
+// Softens the picture of a preview: viewer/picture/soften.py.
 // STEP 0: closes holes: a pixel becomes the mean of those around it that see something clearly nearer, where these are at
 // least HOLE of the 8. 1: each pixel becomes the mean of the 3 x 3 around it, weighted 4, 2 and 1.
 // An invocation goes along RUN pixels of a row, so that it reads what two pixels share once.

@@ -22,7 +22,7 @@ from viewer.camera import Camera
 from viewer.csv_text import save_rows, to_text
 from viewer.errors import InputError
 from viewer.gpu.constants import EMPTY
-from viewer.gpu.surface import NOTHING, Surface
+from viewer.picture.surface import NOTHING, Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

@@ -12,7 +12,7 @@ from scenes import looking_down_z, plane, rarely, sphere, sphere_hits
 
 from viewer.analysis.pick import are_seen, before_gap, is_seen, pick
 from viewer.camera import Camera
-from viewer.gpu.surface import EMPTY, NOTHING, Surface
+from viewer.picture.surface import EMPTY, NOTHING, Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 

@@ -10,7 +10,7 @@ from scenes import looking_down_z, plane, rarely_together, sphere
 
 from viewer.analysis.seen_normal import seen_normal
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]

@@ -10,7 +10,7 @@ from scenes import NOTHING, sphere
 from viewer.analysis.visible_ids import visible_ids
 from viewer.camera import Camera
 from viewer.frame import Request
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud

@@ -15,7 +15,7 @@ from test_window import Screenshot, on_screen, shown
 from virtual_screen import PANEL, ROOT, SIZE, RunningApp, running_app, virtual_screen
 
 from viewer.analysis.pick import pick
-from viewer.gpu.surface import EMPTY, Surface
+from viewer.picture.surface import EMPTY, Surface
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud

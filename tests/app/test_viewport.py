@@ -19,8 +19,8 @@ from viewer.backends import Backend, FrameView
 from viewer.camera import Camera
 from viewer.frame import Request, shared_renderer
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import NOTHING, Surface
 from viewer.look import Look
+from viewer.picture.surface import NOTHING, Surface
 from viewer.renderer import Renderer
 from viewer.scan.open import DEMO, open_scan
 from viewer.scan.pose import Pose

@@ -27,7 +27,7 @@ from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.document.recording import Recording
 from viewer.frame import render_frame, shared_renderer
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud

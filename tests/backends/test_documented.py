@@ -17,7 +17,7 @@ from viewer import backends as registry
 from viewer import resources
 from viewer.backends import backend, backends
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 

@@ -21,7 +21,7 @@ from test_instancing import (
 )
 
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.splatting.amplify import FEEDS
 from viewer.view import View

@@ -13,7 +13,7 @@ from test_elliptical import rays
 
 from viewer.bench.scenes import samples
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 

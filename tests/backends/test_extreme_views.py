@@ -14,8 +14,8 @@ from viewer.analysis.pick import is_seen, pick
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, bring, render_frame, shared_renderer
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -18,7 +18,7 @@ from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu import gl
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -12,9 +12,9 @@ from viewer.backends import SHARES, backend, surfels
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, reshade, supersample
-from viewer.gpu.sample import is_sampled
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.sample import is_sampled
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

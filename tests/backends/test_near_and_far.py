@@ -11,7 +11,7 @@ from test_instancing import assert_agree, assert_covers_the_same
 
 from viewer.bench.scenes import samples
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 
 pytestmark = pytest.mark.backend("surfels")

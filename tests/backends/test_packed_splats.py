@@ -14,8 +14,8 @@ from test_elliptical import ELLIPSES
 from test_instancing import CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
 
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.splatting.packed import WAYS
 from viewer.splatting.packed import draw_splats as draw_all

@@ -16,7 +16,7 @@ from scipy.spatial import ConvexHull
 
 from viewer.bench.rounding import Rounding
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.range_view import RangeView
 
 pytestmark = pytest.mark.backend("pyramidal")

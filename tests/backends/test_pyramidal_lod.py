@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from viewer.bounds import Bounds
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.pods import first_camera
 from viewer.scan.range_view import RangeView
 

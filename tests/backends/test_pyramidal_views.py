@@ -16,9 +16,9 @@ from scipy.ndimage import binary_erosion, maximum_filter, minimum_filter
 
 from viewer.bench.scenes.viewpoints import pod_camera, sample_near
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
 from viewer.mesh.range_mesh import triangulated
 from viewer.mesh.reference import trace
+from viewer.picture.surface import Surface
 from viewer.scan.range_view import RangeView
 
 pytestmark = pytest.mark.backend("pyramidal")

@@ -17,8 +17,8 @@ from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
 from viewer.gpu import gl
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.splatting.packed import WAYS, _ByRow, draw_splats

@@ -12,7 +12,7 @@ from scenes import BUFFERS, sphere
 from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

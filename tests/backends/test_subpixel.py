@@ -13,8 +13,8 @@ from test_instancing import assert_agree, assert_covers_the_same
 from viewer.bench.judge import Judge, Walk
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.splatting.amplify import FEEDS
 from viewer.srgb import bytes_from_linear, linear_from_bytes

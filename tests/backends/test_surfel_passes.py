@@ -19,9 +19,9 @@ from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.mesh.reference import footprint, trace, visible_pixels
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud

@@ -20,9 +20,9 @@ from viewer.backends.voxels import Params
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.mesh.reference import trace
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

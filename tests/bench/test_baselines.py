@@ -11,9 +11,9 @@ from viewer.bench import baselines
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.mesh.reference import trace
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 

@@ -22,7 +22,7 @@ from viewer.choice import known
 from viewer.choice.model import CAP
 from viewer.choice.ways import SCALES
 from viewer.frame import Request, scaled_size
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.timing import draw
 

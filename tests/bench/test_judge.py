@@ -25,7 +25,7 @@ from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
 
 if TYPE_CHECKING:
-    from viewer.gpu.surface import Surface
+    from viewer.picture.surface import Surface
     from viewer.renderer import Renderer
 
 SIZE = (96, 72)

@@ -19,7 +19,7 @@ from viewer.bench.scenes.samples import on_torus
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -20,8 +20,8 @@ from viewer import frame
 from viewer.app.scene.extent import Extent
 from viewer.camera import Camera
 from viewer.document.recording import Recording
-from viewer.gpu.surface import NOTHING
 from viewer.look import SAMPLES, Look
+from viewer.picture.surface import NOTHING
 from viewer.renderer import Renderer
 from viewer.scan import formats
 from viewer.scan.open import open_scan

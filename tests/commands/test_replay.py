@@ -25,11 +25,11 @@ from viewer.document.recording import Entry, Recording, fingerprint, matrix_of
 from viewer.errors import InputError
 from viewer.frame import render_frame
 from viewer.geometry import vector
-from viewer.gpu.surface import Surface
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
 from viewer.output.legend import Marks
 from viewer.output.overlays import LINE_COLOR, DrawnCurve, DrawnLandmark, DrawnPath, DrawnPlot
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan import formats

@@ -38,9 +38,9 @@ from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame, shared_renderer
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.output.export import write_png
+from viewer.picture.surface import Surface
 from viewer.scan import formats
 from viewer.scan.listing import list_folder
 from viewer.scan.open import open_scan

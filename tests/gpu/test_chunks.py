@@ -18,8 +18,8 @@ from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu import chunks
 from viewer.gpu.chunks import in_coarse_order, in_file_order
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

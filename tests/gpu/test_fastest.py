@@ -16,7 +16,7 @@ from viewer.camera import Camera
 from viewer.errors import Scan4DError
 from viewer.frame import Request, render_frame
 from viewer.gpu.context import headless
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.splatting import fastest as module

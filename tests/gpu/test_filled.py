@@ -13,9 +13,9 @@ from scenes import NOTHING, looking_down_z, plane
 
 from viewer.analysis.pick import pick
 from viewer.gpu import gl
-from viewer.gpu.shade import shade
-from viewer.gpu.surface import EMPTY, Surface
 from viewer.look import Look, color_table
+from viewer.picture.shade import shade
+from viewer.picture.surface import EMPTY, Surface
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]

@@ -18,9 +18,9 @@ from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, fallback, render_frame
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
 from viewer.look import COLOR_BY, Look, ValueKind, color_table
 from viewer.output.export import write_picture
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud

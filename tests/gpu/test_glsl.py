@@ -33,12 +33,12 @@ from viewer.frame import Request, render_frame, supersample
 from viewer.gpu import chunks
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
-from viewer.gpu.present import Presenter
 from viewer.gpu.pyramid import Image, add_expanded, expand, subtract_expanded
 from viewer.gpu.shader import Source
-from viewer.gpu.soften import soften
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.present import Presenter
+from viewer.picture.soften import soften
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.resources import resource_path
 from viewer.scan.points import PointCloud

@@ -15,9 +15,9 @@ from test_filled import FLAT, around, linear, slope
 
 from viewer.camera import Camera
 from viewer.gpu import gl
-from viewer.gpu.shade import shade
-from viewer.gpu.surface import Surface
 from viewer.look import HOLE_COLOR, HOLE_REACH, LEVEL_COLORS, Look, rgba
+from viewer.picture.shade import shade
+from viewer.picture.surface import Surface
 
 Draw = Callable[..., Surface]
 SIZE = (61, 43)

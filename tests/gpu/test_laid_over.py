@@ -19,10 +19,10 @@ from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_request
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
 from viewer.mesh.triangles import Mesh
 from viewer.output.export import write_picture
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers

@@ -19,7 +19,7 @@ from pathlib import Path
 from viewer.camera import Camera
 from viewer.errors import Scan4DError
 from viewer.frame import Request, render_frame, shared_renderer
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 
 renderer, pose = shared_renderer(), open_scan("demo").pose(0)

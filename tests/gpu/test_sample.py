@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from viewer.gpu.sample import Sample, is_sampled
+from viewer.picture.sample import Sample, is_sampled
 from viewer.renderer import Renderer
 
 ROWS = np.arange(1 << 16, dtype=np.uint32)

@@ -22,9 +22,9 @@ from viewer.document.anonymous import anonymous_request
 from viewer.errors import InputError
 from viewer.frame import Request, bring, is_prepared, render_frame
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
 from viewer.look import Look, color_table
 from viewer.output.export import write_picture
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.layers import NO_LAYERS, Layers
 from viewer.scan.points import PointCloud

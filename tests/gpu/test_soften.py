@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scenes import looking_down_z
 from test_filled import slope
 
-from viewer.gpu.soften import soften
-from viewer.gpu.surface import Surface
+from viewer.picture.soften import soften
+from viewer.picture.surface import Surface
 
 Draw = Callable[..., Surface]
 CAMERA = looking_down_z(fov_y=2 * np.degrees(np.arctan(1 / 4)))

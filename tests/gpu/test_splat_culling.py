@@ -17,8 +17,8 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
 from viewer.gpu import chunks, gl
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -13,8 +13,8 @@ from viewer.errors import InputError
 from viewer.frame import Request, render_frame
 from viewer.gpu import gl
 from viewer.gpu.context import headless
-from viewer.gpu.surface import Surface
 from viewer.look import Look, color_table
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.estimate import fake_color
 from viewer.scan.points import PointCloud

@@ -25,7 +25,7 @@ from viewer.scan.spacing import typical_spacing
 from viewer.srgb import bytes_from_linear, linear_from_bytes
 
 if TYPE_CHECKING:
-    from viewer.gpu.surface import Surface
+    from viewer.picture.surface import Surface
     from viewer.renderer import Renderer
 
 SIZE = (96, 72)

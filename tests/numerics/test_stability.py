@@ -18,7 +18,7 @@ from viewer.bench.shots import RgbdImage, picture
 from viewer.bench.stability import Difference, Row, difference
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.splatting.amplify import FEEDS

@@ -16,9 +16,9 @@ from written import bits, film, picture
 from viewer import files
 from viewer.camera import Camera
 from viewer.errors import InputError
-from viewer.gpu.surface import NOTHING, Surface
 from viewer.look import Look
 from viewer.output import export
+from viewer.picture.surface import NOTHING, Surface
 
 SIZE = (61, 43)  # odd on purpose
 ALL_SUFFIXES = (*export.PICTURE_SUFFIXES, export.FILM_SUFFIX)

@@ -35,7 +35,7 @@ from viewer.output.plot_below import PLOT_HEIGHT, draw_plot, round_values
 from viewer.scan.points import PointCloud
 
 if TYPE_CHECKING:
-    from viewer.gpu.surface import Surface
+    from viewer.picture.surface import Surface
 
 FLAT = Camera(projection="orthographic", height=10.0)  # 36 pixels a unit in a picture of SIZE
 SIZE = (640, 360)

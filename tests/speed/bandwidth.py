@@ -28,8 +28,8 @@ from viewer.errors import Scan4DError
 from viewer.frame import Request
 from viewer.gpu.bindings import Storage
 from viewer.gpu.context import Gpu
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -20,7 +20,7 @@ from endurance import CACHE_MB, FRAMES, POINTS, endure, own_megabytes, playing_a
 from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame, shared_renderer
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 
 PICTURE = (320, 240)

@@ -27,8 +27,8 @@ from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.errors import Scan4DError
 from viewer.frame import Request
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.timing import draw, pass_ms

@@ -63,7 +63,7 @@ class Scan4D:
     splats = "backend surfels, head light"
 
     def __init__(self, size: tuple[int, int]) -> None:
-        from viewer.gpu.surface import Surface
+        from viewer.picture.surface import Surface
         from viewer.renderer import Renderer
 
         self._renderer = Renderer()

@@ -21,7 +21,7 @@ from turning import cpu_ms
 
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

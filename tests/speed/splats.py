@@ -19,7 +19,7 @@ import numpy as np
 from viewer.backends import FrameView, backend
 from viewer.camera import Camera
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

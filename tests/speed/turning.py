@@ -36,7 +36,7 @@ from viewer.app.scene.viewport import Viewport
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import NOTHING, PointCloud
 from viewer.scan.pose import Pose

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..geometry import Vector, vector
 from ..gpu.constants import EMPTY, NOTHING
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import ENOUGH, nearest_rows, spacing_at
 from .local_surface import LocalSurface, local_surface

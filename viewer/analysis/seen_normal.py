@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 
 _REACH = 24  # parts of the picture's height that are looked at to each side
 _LEAST = 8  # pixels to each side, and of the surface at all

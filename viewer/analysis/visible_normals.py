@@ -12,7 +12,7 @@ from ..camera import Camera
 from ..errors import InputError
 from ..frame import shared_renderer
 from ..gpu.constants import UNKNOWN
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..scan.pods import first_camera
 from ..scan.points import PointCloud
 from ..scan.pose import Pose

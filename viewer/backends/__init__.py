@@ -20,12 +20,12 @@ from typing import Any, NamedTuple, Protocol
 
 from ..errors import InputError, unknown_name
 from ..gpu.context import Gpu
-from ..gpu.frame_view import CHANGES as CHANGES
-from ..gpu.frame_view import FrameView
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
 from ..look import COLOR_BY, ValueKind
 from ..params import Parameter, describe, param, parse
+from ..picture.frame_view import CHANGES as CHANGES
+from ..picture.frame_view import FrameView
+from ..picture.surface import Surface
 from ..scan.pose import Pose
 from ..view import View
 

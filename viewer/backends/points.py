@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
 from ..params import param
+from ..picture.surface import Surface
 from ..scan.pose import Pose
 from ..splatting.squares import LARGEST_SQUARE, draw_squares
 from ..visibility.search import mark_visible

@@ -7,7 +7,7 @@ reduces it to targets of half, a quarter, ... of its size. The finest target tha
 from __future__ import annotations
 
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..projection.filled import draw_filled
 from ..projection.settings import ProjectionParams
 from ..scan.pose import Pose

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from ..gpu import gl
 from ..gpu.constants import LEAST_RADIUS, UNKNOWN
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
 from ..params import param
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import typical_spacing

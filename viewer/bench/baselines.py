@@ -19,8 +19,8 @@ from ..gpu import gl
 from ..gpu.bindings import Texture
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
 from ..mesh.triangles import Mesh
+from ..picture.surface import Surface
 from ..scan.faces import Triangles
 from ..scan.points import PointCloud
 from ..scan.pose import Pose

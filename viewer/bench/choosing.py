@@ -23,10 +23,10 @@ from ..choice.seen import ScanInView
 from ..choice.ways import SCALES, DrawingWay, ways
 from ..errors import InputError
 from ..frame import Request, scaled_size, view_of
-from ..gpu.surface import Surface
 from ..look import Look
 from ..mesh.reference import first_hits
 from ..mesh.scene import Scene
+from ..picture.surface import Surface
 from ..timing import draw, undisturbed_ms
 from .plan import Group
 from .report.results import Row

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..gpu.context import Gpu
-from ..gpu.surface import Surface
 from ..look import Look
 from ..mesh.range_mesh import was_scanned
 from ..mesh.reference import Reference, both_see, footprint, trace, visible
 from ..mesh.scene import Rays, Scene
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.range_view import RangeView
 from ..scan.spacing import typical_spacing

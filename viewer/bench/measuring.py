@@ -23,9 +23,9 @@ from ..camera import Camera
 from ..errors import InputError
 from ..frame import Request, render_frame
 from ..geometry import vector
-from ..gpu.surface import Surface
 from ..mesh.reference import first_hits, trace
 from ..mesh.scene import Scene
+from ..picture.surface import Surface
 from ..renderer import Renderer
 from ..scan.pose import Pose
 from .plan import Group

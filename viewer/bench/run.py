@@ -24,10 +24,10 @@ from ..camera import Camera
 from ..errors import InputError
 from ..files import output_folder, whole_file
 from ..frame import Request
-from ..gpu.surface import Surface
 from ..look import Look
 from ..mesh.range_mesh import triangulated
 from ..mesh.reference import footprint
+from ..picture.surface import Surface
 from ..renderer import Renderer
 from ..signals import Interrupts
 from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..backends import Backend
 from ..camera import Camera
 from ..frame import Request, render_frame
-from ..gpu.surface import Surface
 from ..look import Look
+from ..picture.surface import Surface
 from ..renderer import Renderer
 from ..scan.points import PointCloud
 from ..scan.pose import Pose

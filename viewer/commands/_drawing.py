@@ -18,10 +18,10 @@ from ..document.recording import Entry
 from ..errors import InputError
 from ..frame import Request, backend_for
 from ..gpu.context import headless
-from ..gpu.surface import Surface
 from ..look import COLOR_BY, Look, drawable, is_open_range, with_range
 from ..output.export import numbered
 from ..output.legend import Legend
+from ..picture.surface import Surface
 from ..renderer import Renderer
 from ..scan.pods import first_camera
 from ..scan.pose import Pose

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..choice.choose import Automatic
 from ..frame import Request
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..renderer import Renderer
 from ..timing import call_ms, pass_ms, peak_rss
 

@@ -33,7 +33,7 @@ from .legend import Legend
 from .marked import marked
 
 if TYPE_CHECKING:
-    from ..gpu.surface import Surface
+    from ..picture.surface import Surface
 
 PICTURE_SUFFIXES = (".png", ".exr", ".npz")
 FILM_SUFFIX = ".mp4"

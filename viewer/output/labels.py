@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from ..gpu.surface import Surface
+    from ..picture.surface import Surface
 
 Box = tuple[float, float, float, float]  # left, top, right, bottom
 Spot = tuple[float, float]  # to the right, down

@@ -14,7 +14,7 @@ import numpy as np
 from ..gpu.bindings import Texture
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits, scatter
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import sparse_spacing
 from ..view import View

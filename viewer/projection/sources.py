@@ -10,7 +10,7 @@ from ..gpu.bindings import Texture
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 
 CHANNELS = {"color": Texture.COLORS, "normal": Texture.NORMALS, "value": Texture.VALUES}
 

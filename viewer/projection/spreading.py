@@ -11,7 +11,7 @@ from ..gpu import gl
 from ..gpu.bindings import Texture
 from ..gpu.context import Gpu
 from ..gpu.scatter import CellSums, FixedPoint, Visits
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 
 FUNCTIONS = ("off", "table", "analytic")  # as placing.glsl numbers them
 KERNELS = ("3x3", "5x5")

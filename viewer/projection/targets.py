@@ -10,7 +10,7 @@ from ..gpu.blocks import Values
 from ..gpu.compact import IndexList
 from ..gpu.context import Gpu
 from ..gpu.pyramid import sizes
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from .sources import SampleSource
 
 LEVELS = 5  # of targets, the picture among them (Farooq 2013, 4.3.1)

@@ -14,8 +14,8 @@ from ..gpu.constants import RANGE_TILE
 from ..gpu.context import Gpu, Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits
-from ..gpu.surface import Surface
 from ..look import is_lit
+from ..picture.surface import Surface
 
 MODES = ("nearest", "linear", "best")  # as of_views.glsl numbers them
 _SPARE = 1 << 16  # entries of a list for the parts of large tiles

@@ -15,7 +15,7 @@ from ..gpu.bindings import Texture, UniformBlock
 from ..gpu.blocks import Values
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 
 _STAGES = ("amplify/corner.vert",)

@@ -21,7 +21,7 @@ from ..gpu.chunks import Chunks
 from ..gpu.compact import IndexList
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
-from ..gpu.target import RenderTarget
+from ..picture.target import RenderTarget
 from ..view import View
 
 _TILE = 16  # pixels along an edge, whose farthest depth hides chunks

@@ -20,7 +20,7 @@ from ..files import whole_file
 from ..folders import cache_folder
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..view import View

@@ -13,7 +13,7 @@ from ..gpu.bindings import Texture
 from ..gpu.compact import IndexList
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
-from ..gpu.target import RenderTarget
+from ..picture.target import RenderTarget
 
 _RUN = 8  # pixels that an invocation of points/kept.comp looks at
 

@@ -15,7 +15,7 @@ from ..gpu.compact import scan_words
 from ..gpu.constants import NOTHING
 from ..gpu.context import Gpu, Program
 from ..gpu.scatter import Visits, take_items
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from .amplify import Points
 from .looks import looks_of
 from .splats import Splats

@@ -14,7 +14,7 @@ from ..gpu.bindings import Storage, Texture
 from ..gpu.constants import LEAST_RADIUS
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from .amplify import Points, amplify
 from .fastest import instancing_for
 from .lists import TileLists

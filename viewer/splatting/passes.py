@@ -18,8 +18,8 @@ from ..gpu import gl
 from ..gpu.bindings import Texture
 from ..gpu.constants import BEHIND
 from ..gpu.context import Gpu
-from ..gpu.frame_view import FrameView
-from ..gpu.surface import Surface
+from ..picture.frame_view import FrameView
+from ..picture.surface import Surface
 from ..scan.ranges import robust_range
 from .amplify import Points, draw_shapes, told_feed
 from .lists import ALL, NOT_HIDDEN, TOWARDS, TileLists

@@ -23,7 +23,7 @@ from ..gpu.chunks import Chunks, chunk_size
 from ..gpu.compact import IndexList, list_flagged
 from ..gpu.context import Gpu, Program
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..view import View
 from .amplify import ListedRows, Points
 from .culling import (

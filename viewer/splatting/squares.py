@@ -15,10 +15,10 @@ from ..gpu import gl
 from ..gpu.bindings import Texture
 from ..gpu.compact import IndexList
 from ..gpu.context import Program
-from ..gpu.frame_view import Before
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import HitCells, Visits, scatter, take_items, take_keys
-from ..gpu.surface import Surface
+from ..picture.frame_view import Before
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import sparse_spacing, typical_spacing
 from ..view import View

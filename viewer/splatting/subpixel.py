@@ -14,7 +14,7 @@ from ..gpu.bindings import Storage
 from ..gpu.constants import LEAST_RADIUS
 from ..gpu.context import Gpu, Program
 from ..gpu.scatter import CellSums, FixedPoint, Visits, scatter
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..srgb import LIGHT_STEPS
 from .amplify import Points

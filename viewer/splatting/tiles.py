@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..gpu.context import Gpu
-from ..gpu.surface import Surface
+from ..picture.surface import Surface
 from .amplify import Points, amplify
 from .lists import ALL, AWAY, DISC_BITS, DISC_BYTES, TOWARDS, TileLists
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..gpu.sample import lots
+from ..picture.sample import lots
 from ..scan.points import NOTHING, PointCloud, strided
 from .sectors import Sectors
 

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import InputError, unknown_name
 from ..gpu import gl
 from ..gpu.context import Gpu, headless
-from ..gpu.frame_view import FrameView
 from ..gpu.pose import GpuPose
-from ..gpu.surface import Surface
+from ..picture.frame_view import FrameView
+from ..picture.surface import Surface
 from ..scan.points import PointCloud, checked_viewpoint
 from ..scan.pose import Pose
 from ..view import View

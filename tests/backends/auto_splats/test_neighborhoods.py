@@ -32,7 +32,7 @@ from viewer.scan.points import NOTHING, PointCloud
 from viewer.scan.pose import Pose
 
 if TYPE_CHECKING:
-    from viewer.gpu.surface import Surface
+    from viewer.picture.surface import Surface
 
 pytestmark = pytest.mark.backend("auto_splats")
 

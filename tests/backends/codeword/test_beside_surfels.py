@@ -17,8 +17,8 @@ from viewer.codewords.settings import words_of
 from viewer.codewords.stream import FINE_DEPTHS
 from viewer.frame import Request, render_frame, view_of
 from viewer.gpu.constants import NOTHING
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud

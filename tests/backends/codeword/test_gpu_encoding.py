@@ -30,8 +30,8 @@ from viewer.codewords.settings import elements_of, point_materials, word_lights,
 from viewer.codewords.stream import strip_width
 from viewer.codewords.words import decode_words
 from viewer.frame import Request, render_frame, view_of
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

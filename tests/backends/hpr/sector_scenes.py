@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from viewer.camera import Camera
 from viewer.gpu.constants import NOTHING
 from viewer.gpu.pose import GpuPose
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -11,7 +11,7 @@ from scenes import NOTHING, sphere
 
 from viewer.analysis.pick import pick
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.visibility.search import visible_points

@@ -8,8 +8,8 @@ import numpy as np
 from scenes import NOTHING, sphere, sphere_hits
 
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]

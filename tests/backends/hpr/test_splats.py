@@ -13,8 +13,8 @@ from sector_scenes import Scene
 
 from viewer.backends.hpr.splats import SectorSplats
 from viewer.camera import Camera
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 

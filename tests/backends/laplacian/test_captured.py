@@ -18,8 +18,8 @@ from viewer.backends import backend
 from viewer.bench.seams import pods_facing, seam_visibility, seams
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.mesh.reference import trace
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.colors import linear_from_srgb8
 from viewer.scan.pose import Pose

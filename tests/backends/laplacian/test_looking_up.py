@@ -11,7 +11,7 @@ from range_scenes import heights, straight_above
 from scenes import rarely_together
 from test_spline import ROUNDING, SHAPE, speckled
 
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.colors import linear_from_srgb8
 
 pytestmark = pytest.mark.backend("laplacian")

@@ -15,9 +15,9 @@ from viewer.bench.seams import detail_psnr, pods_facing, seam_visibility, seams
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView

@@ -11,7 +11,7 @@ from plain_splines import DARK, KERNELS, expanded, reduced, splined
 from range_scenes import heights, straight_above
 from scenes import rarely
 
-from viewer.gpu.surface import Surface
+from viewer.picture.surface import Surface
 from viewer.scan.colors import linear_from_srgb8
 from viewer.scan.range_view import RangeView
 

@@ -13,8 +13,8 @@ from scipy import ndimage
 from viewer.backends import backend
 from viewer.backends.laplacian.spline import Pictures
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.mesh.merging.competition import competition_weights
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView

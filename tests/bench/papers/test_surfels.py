@@ -16,8 +16,8 @@ from viewer.bench.run import BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
 from viewer.frame import Request, render_frame
-from viewer.gpu.surface import Surface
 from viewer.look import Look
+from viewer.picture.surface import Surface
 from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
 from viewer.splatting.amplify import FEEDS

@@ -21,12 +21,12 @@ from ...document.recording import Entry, Recorder, Recording
 from ...errors import InputError, explained
 from ...files import free_file, working_folder
 from ...frame import Request
-from ...gpu.surface import Surface
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.labels import LabelPlaces
 from ...output.legend import Legend, Marks
 from ...output.marked import marked
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
+from ...picture.surface import Surface
 from ...task import Task, in_background
 from ..failures import failure_in_words
 from ..notices import Offer, Problem

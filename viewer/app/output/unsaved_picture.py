@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...frame import Request, bring, prepare, render_frame, supersample
-from ...gpu.surface import Surface
 from ...look import SAMPLES
+from ...picture.surface import Surface
 from ...renderer import Renderer
 from ...task import Task
 

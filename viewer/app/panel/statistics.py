@@ -12,8 +12,8 @@ from .. import widgets
 from ..scene import counting
 
 if TYPE_CHECKING:
-    from ...gpu.stats import Stats
     from ...gpu.timers import Timers
+    from ...picture.stats import Stats
     from ..scene.viewport import Viewport
 
 

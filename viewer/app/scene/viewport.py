@@ -27,11 +27,11 @@ from ...frame import (
     reshade,
     supersample,
 )
-from ...gpu.present import Presenter
-from ...gpu.soften import soften
-from ...gpu.surface import Surface
 from ...look import SAMPLES
 from ...output.labels import covered_cells
+from ...picture.present import Presenter
+from ...picture.soften import soften
+from ...picture.surface import Surface
 from ...renderer import Renderer
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
 from ...params import param
+from ...picture.surface import Surface
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
 from ...splatting.packed import WAYS, draw_depths, draw_splats

@@ -29,8 +29,8 @@ from ...gpu.constants import GROUP, NO_DEPTH, UNKNOWN
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
-from ...gpu.surface import Surface
 from ...gpu.view import ViewBlock
+from ...picture.surface import Surface
 from ...scan.points import PointCloud
 from ...scan.range_points import RangePoints
 from ...scan.spacing import spacings

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ...gpu import gl
 from ...gpu.bindings import Storage, Texture
 from ...gpu.context import Gpu
-from ...gpu.surface import Surface
 from ...look import ValueKind
+from ...picture.surface import Surface
 from .neighborhoods import Neighborhoods
 
 VALUES = {

@@ -19,9 +19,9 @@ from ...codewords.settings import uniform_radius, word_look, words_of
 from ...codewords.stream import WordStream
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
 from ...look import Look
 from ...params import param
+from ...picture.surface import Surface
 from ...scan.layers import Layers
 from ...scan.points import PointCloud
 from ...scan.pose import Pose

@@ -14,8 +14,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
 from ...params import param
+from ...picture.surface import Surface
 from ...visibility.candidates import UNLIMITED
 from ...visibility.search import DEPTH, HULL, MODES, MOST_SECTORS, QUALITY, SearchSettings, SeenPicture
 from .. import AROUND_ALL, NO_DETAIL, Backend, FrameView, Limit

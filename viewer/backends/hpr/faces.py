@@ -11,7 +11,7 @@ from ...gpu.constants import GROUP, NOTHING
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, take_items, take_keys
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from ...visibility.candidates import Candidates
 from .splats import SectorSplats
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
 from ...look import wants_normals
+from ...picture.surface import Surface
 from ...splatting.amplify import Points
 from ...splatting.packed import draw_splats, take_normals
 from ...splatting.squares import draw_squares

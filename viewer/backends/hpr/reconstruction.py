@@ -13,7 +13,7 @@ from ...gpu.bindings import Storage, Texture
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...gpu.pyramid import FRONT_BOX, FRONT_TENT, Pyramid, fill, reduce
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from .splats import SectorSplats
 
 _LEVELS = 8  # splats that reach 64 pixels are joined

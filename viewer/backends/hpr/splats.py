@@ -13,7 +13,7 @@ from ...gpu.constants import NO_DEPTH
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import CellSums, FixedPoint, Visits, take_keys
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from ...visibility.calibration import EyeCalibration, body_of
 from ...visibility.candidates import Candidates
 from ...visibility.covering import Covering

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
 from ...params import param
+from ...picture.surface import Surface
 from ...projection.filled import draw_filled
 from ...projection.settings import ProjectionParams
 from ...projection.views import ViewSource

@@ -25,7 +25,7 @@ from ...gpu.bindings import Texture
 from ...gpu.context import Gpu, Program
 from ...gpu.pyramid import sizes
 from ...gpu.scatter import CellSums, FixedPoint, Visits
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from ...projection.views import ViewSource
 
 _LIMIT = 4.0  # of light or of its logarithm

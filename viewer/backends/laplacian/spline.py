@@ -21,7 +21,7 @@ from ...gpu.bindings import Storage, Texture
 from ...gpu.context import Gpu, Program
 from ...gpu.pyramid import BINOMIAL, GAUSSIAN, Filter, sizes
 from ...gpu.scatter import FixedPoint
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from ...projection.sources import CHANNELS
 from ...projection.views import DrawnTiles, ViewSource
 from .splats import CapturedLevels, add_splats, levels_that_fit

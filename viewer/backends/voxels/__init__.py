@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
-from ...gpu.stats import Stats
-from ...gpu.surface import Surface
 from ...params import param
+from ...picture.stats import Stats
+from ...picture.surface import Surface
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
 from ...scan.octree.discs import usual_radius

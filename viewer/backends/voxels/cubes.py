@@ -13,7 +13,7 @@ from ...gpu import gl
 from ...gpu.bindings import Texture
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from ...splatting.amplify import FEEDS, Points, Shape, amplify
 from ...splatting.fastest import instancing_for
 

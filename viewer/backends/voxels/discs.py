@@ -7,7 +7,7 @@ from functools import partial
 
 from ...gpu.constants import LEAST_RADIUS
 from ...gpu.pose import GpuPose
-from ...gpu.surface import Surface
+from ...picture.surface import Surface
 from ...splatting.amplify import FEEDS, Points, amplify
 from ...splatting.fastest import instancing_for
 from ...splatting.passes import tiled_two_passes, two_passes

@@ -6,10 +6,10 @@ import numpy as np
 
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
-from ...gpu.shade import shade
-from ...gpu.surface import Surface
 from ...look import Look
 from ...mesh.reference import Reference
+from ...picture.shade import shade
+from ...picture.surface import Surface
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...srgb import bytes_from_linear

@@ -17,7 +17,7 @@ import numpy as np
 
 from ....camera import Camera
 from ....frame import Request
-from ....gpu.surface import Surface
+from ....picture.surface import Surface
 from ....scan.formats.exr import write_views
 from ....scan.open import open_scan
 from ....scan.pose import Pose

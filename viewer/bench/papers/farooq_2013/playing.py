@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 
 from ....frame import Request, render_frame
-from ....gpu.surface import Surface
+from ....picture.surface import Surface
 from ....scan.formats.exr import write_views
 from ....scan.open import open_scan
 from ....scan.timeline import Timeline

@@ -18,9 +18,9 @@ from ....backends import backend
 from ....camera import Camera
 from ....errors import InputError
 from ....frame import Request
-from ....gpu.surface import Surface
 from ....look import Look
 from ....mesh.reference import Reference, footprint, trace
+from ....picture.surface import Surface
 from ....renderer import Renderer
 from ....scan.pose import Pose
 from ....scan.range_view import RangeView

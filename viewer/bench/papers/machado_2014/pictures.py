@@ -12,8 +12,8 @@ from ....backends import backend
 from ....camera import Camera
 from ....files import output_folder, whole_file
 from ....frame import Request
-from ....gpu.surface import Surface
 from ....look import Look
+from ....picture.surface import Surface
 from ....renderer import Renderer
 from ....scan.points import PointCloud
 from ....scan.pose import Pose

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....backends import backend
 from ....frame import Request
-from ....gpu.surface import Surface
+from ....picture.surface import Surface
 from ....resources import resource_path
 from ....scan.pose import Pose
 from ....timing import draw

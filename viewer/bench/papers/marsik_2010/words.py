@@ -23,7 +23,7 @@ from ....codewords.tables import PAPER, Steps, shape_table
 from ....errors import InputError
 from ....frame import Request, render_frame, view_of
 from ....gpu.constants import NOTHING
-from ....gpu.surface import Surface
+from ....picture.surface import Surface
 from ....scan.pose import Pose
 from ....timing import draw
 from ...plan import Group

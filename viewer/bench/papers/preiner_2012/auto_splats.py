@@ -10,7 +10,7 @@ from typing import Any
 from ....analysis.visible_normals import VisibleNormals, estimate_normals
 from ....backends import backend
 from ....camera import Camera
-from ....gpu.surface import Surface
+from ....picture.surface import Surface
 from ....resources import resource_path
 from ....scan.pose import Pose
 from ...baselines import PRECOMPUTED

@@ -16,7 +16,7 @@ import numpy as np
 
 from ....camera import Camera
 from ....frame import Request
-from ....gpu.surface import Surface
+from ....picture.surface import Surface
 from ....scan.pose import Pose
 from ....timing import draw
 from ...plan import Group

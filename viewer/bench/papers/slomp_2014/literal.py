@@ -20,8 +20,8 @@ from ....gpu.bindings import Texture
 from ....gpu.constants import LEAST_RADIUS
 from ....gpu.context import Gpu
 from ....gpu.pose import GpuPose
-from ....gpu.surface import Surface
 from ....params import param
+from ....picture.surface import Surface
 from ....scan.points import PointCloud
 from ....scan.pose import Pose
 from ....scan.spacing import typical_spacing

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import moderngl
 
-from .bindings import Texture
-from .context import Gpu
+from ..gpu.bindings import Texture
+from ..gpu.context import Gpu
 from .surface import Surface
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from . import gl
-from .bindings import Storage, Texture
-from .context import Gpu
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.context import Gpu
 from .surface import Surface
 
 _HOLE = 7  # of the 8 pixels around: two holes side by side count, the line between closed lips does not

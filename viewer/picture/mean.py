@@ -5,10 +5,10 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.context import Gpu
 from ..srgb import LIGHT_PARTS, LIGHT_STEPS, bytes_from_light, light_from_bytes
-from . import gl
-from .bindings import Storage, Texture
-from .context import Gpu
 
 
 class PictureMean:

@@ -9,6 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import up_vector
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture
+from ..gpu.blocks import Mat4, Vec4
+from ..gpu.context import Gpu
 from ..look import (
     HOLE_COLOR,
     HOLE_REACH,
@@ -20,10 +24,6 @@ from ..look import (
     value_source,
 )
 from ..scan.ranges import robust_range
-from . import gl
-from .bindings import Storage, Texture
-from .blocks import Mat4, Vec4
-from .context import Gpu
 from .surface import Surface
 
 # How shade.comp names where a colour, a number and the light come from.

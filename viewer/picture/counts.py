@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from ..gpu.constants import NOTHING
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
 from ..task import checkpoint
 from ..view import View
-from .constants import NOTHING
 from .sample import is_sampled
 
 _CHUNK = 1 << 20  # points counted at a time

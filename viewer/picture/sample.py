@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from . import gl
-from .context import Gpu
+from ..gpu import gl
+from ..gpu.context import Gpu
 
 _GROWTH = 1.125  # so that poses a little larger than the last ones need no new list
 _CHUNK = 1 << 20  # rows looked at at a time

@@ -11,23 +11,23 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry import up_vector
+from ..gpu import gl
+from ..gpu.bindings import Storage, Texture, UniformBlock
+from ..gpu.blocks import BlockBuffer
+from ..gpu.chunks import Chunks
+from ..gpu.compact import IndexList, list_covered
+from ..gpu.constants import NO_DEPTH, NOTHING
+from ..gpu.context import Gpu, Resource, Workspace
+from ..gpu.pose import GpuPose
+from ..gpu.view import ViewBlock
 from ..look import Look, ValueKind, is_lit, rgba, value_source, wants_normals
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
 from ..scan.ranges import robust_range
 from ..view import View
-from . import gl
-from .bindings import Storage, Texture, UniformBlock
-from .blocks import BlockBuffer
-from .chunks import Chunks
-from .compact import IndexList, list_covered
-from .constants import NO_DEPTH, NOTHING
-from .context import Gpu, Resource, Workspace
-from .pose import GpuPose
 from .sample import is_sampled, row_list, sample_of
 from .stats import Stats
-from .view import ViewBlock
 
 _SAMPLED = 256  # pixels along the longer edge whose numbers tell a range
 _FEW = 1000  # points of which none is left out: it would gain nothing, and they would be missed
