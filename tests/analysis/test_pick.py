@@ -183,6 +183,26 @@ def test_what_a_gap_between_points_shows_is_not_meant_but_what_is_round_it(
         assert before_gap(surface, *place) == place
 
 
+@pytest.mark.parametrize("projection", CAMERAS)
+@pytest.mark.parametrize("spacing", [0.15, 0.6], ids=["close", "sparse"])
+def test_an_empty_pixel_between_points_means_the_surface_of_these(
+    draw: Draw, projection: str, spacing: float
+) -> None:
+    surface = draw(plane(6, depth=4.0, spacing=spacing), CAMERAS[projection], SIZE, "points")
+    across, down = (np.flatnonzero((surface.level != EMPTY).any(axis=axis)) for axis in (0, 1))
+    middle = np.s_[down[1] : down[-2], across[1] : across[-2]]
+    empty = np.argwhere(surface.level[middle] == EMPTY) + (down[1], across[1])
+    assert len(empty) > 20
+    for y, x in empty.tolist():
+        meant = before_gap(surface, x, y)
+        assert surface.level[meant[1], meant[0]] == 0
+        picked = pick(surface, x, y, shown=meant)
+        assert picked is not None
+        np.testing.assert_allclose(picked.position[2], -4.0, atol=1e-5)
+    for x in (across[0] - 1, across[-1] + 1):
+        assert pick(surface, int(x), 20, shown=before_gap(surface, int(x), 20)) is None, "beside the points"
+
+
 def test_on_a_slope_every_pixel_is_meant(draw: Draw) -> None:
     cloud = sphere(20_000)
     surface = draw(cloud, Camera.orbit(cloud.bounds()), SIZE, "surfels")

@@ -248,23 +248,39 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     """The pixel that is meant by (x, y): itself; or the nearest one of the front, where (x, y) is seen
     through a gap between the points of that.
 
-    Such a pixel is far behind others that lie all round it. At an edge they lie on one side.
+    Such a pixel is far behind others that lie all round it, or empty. At an edge they lie on one side.
     """
-    if not _has(surface, x, y) or (texel := surface.texel(x, y)).level == EMPTY:
+    if not _has(surface, x, y):
         return x, y
-    reach = int(np.clip(np.ceil(_GAP * _pitch(surface, texel.depth)), _REACH, _AROUND[1]))
+    shown = surface.texel(x, y).depth
+    depth = shown if np.isfinite(shown) else _nearest_depth(surface, x, y)
+    if not np.isfinite(depth):
+        return x, y
+    reach = int(np.clip(np.ceil(_GAP * _pitch(surface, depth)), _REACH, _AROUND[1]))
     depths = surface.depth_around(x, y, reach)
     spacings, steepness = _BEHIND
-    footprint = (texel.depth if surface.view.perspective else 1.0) / surface.view.scale
-    away = np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1])
+    footprint = (depth if surface.view.perspective else 1.0) / surface.view.scale
+    away = _distances(reach)
     behind = steepness * np.maximum(away, _REACH) * footprint + spacings * surface.scanned.pose.spacing
     down, across = (
-        np.argwhere((away <= max(reach, np.sqrt(2) * _REACH)) & (depths < texel.depth - behind)).T - reach
+        np.argwhere((away <= max(reach, np.sqrt(2) * _REACH)) & (depths < shown - behind)).T - reach
     )
     if not _lie_all_round(down, across):
         return x, y
     nearest = np.argmin(down**2 + across**2)
     return x + int(across[nearest]), y + int(down[nearest])
+
+
+def _nearest_depth(surface: Surface, x: int, y: int) -> float:
+    """The depth at the nearest pixel that is not empty; +inf where all are, as far as points are looked for."""
+    reach = _AROUND[1]
+    depths = surface.depth_around(x, y, reach)
+    return float(depths.flat[np.where(np.isfinite(depths), _distances(reach), np.inf).argmin()])
+
+
+def _distances(reach: int) -> NDArray[np.float64]:
+    """(2 reach + 1, 2 reach + 1), from the pixel in the middle, in pixels."""
+    return np.hypot(*np.mgrid[-reach : reach + 1, -reach : reach + 1])
 
 
 def _has(surface: Surface, x: int, y: int) -> bool:

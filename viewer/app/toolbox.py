@@ -301,7 +301,8 @@ class Toolbox:
         at = pixel if in_full else viewport.pixel_of_picture(pixel)
         meant = before_gap(surface, *at)
         picked = pick(surface, *at, shown=meant, spacing=in_full)
-        return Click(picked, request.pose, meant != at, request.layers.place, meant)
+        is_farther = meant != at and surface.texel(*at).depth < np.inf
+        return Click(picked, request.pose, is_farther, request.layers.place, meant)
 
     @property
     def spans(self) -> list[FrameSpan]:
