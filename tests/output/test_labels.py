@@ -237,3 +237,15 @@ def test_the_subject_is_where_the_surface_shows_something() -> None:
     assert covered[12:36, 18:54].mean() > 0.9
     covered[11:37, 17:55] = False
     assert covered.mean() < 0.01
+
+
+def test_points_that_lie_a_few_pixels_apart_are_the_subject_throughout() -> None:
+    class Seen:
+        size = 960, 640
+        depth = np.full((640, 960), np.inf, np.float32)
+
+    Seen.depth[160:480:5, 240:720:5] = 1.0
+    covered = covered_cells(Seen())  # type: ignore[arg-type]
+    assert covered[13:35, 19:53].all()
+    covered[11:37, 17:55] = False
+    assert not covered.any()

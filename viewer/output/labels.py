@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 _ROWS = 48  # of the cells that tell where the subject is
 _LEAST_COVERED = 0.1  # of a cell, so that a few stray points are no subject
-_SAMPLED = 4  # rows of the surface that tell of a cell
+_SAMPLED = 4  # rows of squares of the surface that tell of a cell
 _MOST_ROWS = 64  # of places that are tried
 _JUDGED = 48  # places whose leaders are looked at, those that cost least without
 _SHARES = (0.5, 0.25, 0.75, 0.0, 1.0)  # places on a line that a leader may begin at
@@ -121,7 +121,9 @@ def covered_cells(surface: Surface) -> NDArray[np.bool_]:
     """Find which cells of a picture show the subject, (rows, columns): 48 rows, fewer of a picture that has
     fewer."""
     step = max(1, surface.size[1] // (_ROWS * _SAMPLED))
-    seen = np.isfinite(surface.depth[::step, ::step])
+    seen = np.isfinite(surface.depth)
+    for axis, length in enumerate(seen.shape):  # a square that shows one point counts: these may lie apart
+        seen = np.logical_or.reduceat(seen, np.arange(0, length, step), axis=axis)
     height, width = seen.shape
     rows = min(_ROWS, height)
     columns = max(1, round(rows * width / height))
