@@ -191,7 +191,7 @@ def test_an_empty_pixel_between_points_means_the_surface_of_these(
     surface = draw(plane(6, depth=4.0, spacing=spacing), CAMERAS[projection], SIZE, "points")
     across, down = (np.flatnonzero((surface.level != EMPTY).any(axis=axis)) for axis in (0, 1))
     middle = np.s_[down[1] : down[-2], across[1] : across[-2]]
-    empty = np.argwhere(surface.level[middle] == EMPTY) + (down[1], across[1])
+    empty = np.argwhere(surface.level[middle] == EMPTY) + np.array([down[1], across[1]])
     assert len(empty) > 20
     for y, x in empty.tolist():
         meant = before_gap(surface, x, y)

@@ -272,7 +272,7 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
 
 
 def _nearest_depth(surface: Surface, x: int, y: int) -> float:
-    """The depth at the nearest pixel that is not empty; +inf where all are, as far as points are looked for."""
+    """The depth at the nearest pixel that shows something; +inf where none within `_AROUND` does."""
     reach = _AROUND[1]
     depths = surface.depth_around(x, y, reach)
     return float(depths.flat[np.where(np.isfinite(depths), _distances(reach), np.inf).argmin()])

@@ -264,7 +264,7 @@ def assumed_pinhole(width: int, height: int) -> dict[str, Any]:
     """Default calibration for pictures of this size, and `assumed`, as in RangeView: 45 degrees across the
     longer edge."""
     focal = max(width, height) / (2 * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
-    told = f"no calibration is told: a field of view of {_FIELD_OF_VIEW:g} degrees is assumed"
+    told = f"Scan4D found no calibration and assumes a field of view of {_FIELD_OF_VIEW:g} degrees"
     return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": told}
 
 
