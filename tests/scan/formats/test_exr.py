@@ -237,7 +237,7 @@ def test_a_camera_that_nothing_tells_is_assumed(tmp_path: Path) -> None:
     shape, header, channels = rendered()
     path = parts(tmp_path / "f.exr", ("beauty", header, channels))
     (view,) = formats.read(path)
-    assert "a field of view of 45 degrees is assumed" in view.assumed
+    assert "assumes a field of view of 45 degrees" in view.assumed
     assert view.fx == view.fy == pytest.approx(24 / np.tan(np.radians(22.5)))
     assert (view.cx, view.cy) == (24, 20)
     assert np.array_equal(view.valid(), shape.valid()), "without alpha nothing was seen"
