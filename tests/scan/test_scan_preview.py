@@ -73,3 +73,16 @@ def test_a_camera_of_ones_own_sees_its_side() -> None:
         picture = preview_picture(pose, SIZE, camera.projected("orthographic"))
         seen = picture[picture[..., 3] == 255]
         assert (seen[:, :3].argmax(axis=1) == channel).mean() > 0.99
+
+
+def test_what_is_right_and_above_is_right_and_above_in_the_picture() -> None:
+    points = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    colors = np.array([[200, 30, 30], [30, 200, 30], [30, 30, 200], [200, 200, 200]], np.uint8)
+    camera = Camera(eye=(0, 0, 6), target=(0, 0, 0))
+    picture = preview_picture(pose_of(PointCloud.from_arrays(points, colors=colors)), SIZE, camera)
+    shares = picture[..., :3] / np.maximum(picture[..., :3].max(axis=2, keepdims=True), 1)
+    focal = SIZE[1] / 2 / np.tan(np.radians(camera.fov_y) / 2)
+    for (x, y, _), color in zip(points, colors / colors.max(), strict=True):
+        lines, columns = np.nonzero((abs(shares - color) < 0.05).all(axis=2))
+        assert np.mean(columns) == pytest.approx(SIZE[0] / 2 + focal * x / 6, abs=1.5)
+        assert np.mean(lines) == pytest.approx(SIZE[1] / 2 - focal * y / 6, abs=1.5)

@@ -31,8 +31,9 @@ ENDS = np.array([[0.0, 0.0, -LONG], [0.0, THICK, -LONG]])  # the middle of the f
 PATHS = np.array([[*on_arm(frame, -1, ENDS), *on_arm(frame, 1, ENDS)] for frame in range(FRAMES)])
 
 
-def timeline() -> Timeline:
-    source = KeptFrames("arms", [PointCloud.from_arrays(arms(n)) for n in range(FRAMES)], np.arange(4.0))
+def timeline(scale: float = 1.0, frames: int = FRAMES) -> Timeline:
+    clouds = [PointCloud.from_arrays(scale * arms(n)) for n in range(frames)]
+    source = KeptFrames("arms", clouds, np.arange(float(frames)))
     return Timeline(source, source.times(), "mm")
 
 
@@ -40,11 +41,11 @@ def tracks_of(landmarks: list[Landmark], scan: Timeline) -> list[Track]:
     return list(track_landmarks(scan, landmarks).values())
 
 
-def keyed(sigma: float) -> list[Landmark]:
+def keyed(sigma: float, scale: float = 1.0) -> list[Landmark]:
     six = (sigma**2, 0.0, 0.0, sigma**2, 0.0, sigma**2)
     return [
-        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), "surface", None, SPACING, 0, six))
-        for n, place in enumerate(PATHS[0])
+        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), "surface", None, scale * SPACING, 0, six))
+        for n, place in enumerate(scale * PATHS[0])
     ]
 
 
@@ -70,6 +71,15 @@ def test_the_doubt_of_the_key_is_told_and_makes_no_gap() -> None:
         told = one.known == Known.TRACKED
         np.testing.assert_allclose(other.sigmas[told] ** 2, one.sigmas[told] ** 2 + 9 * SPACING**2, rtol=1e-6)
         assert one.sigmas[told].max() < SPACING
+
+
+def test_the_unit_of_a_scan_changes_lengths_alone() -> None:
+    scale = 64.0  # changes the exponents of numbers, and no digit
+    with timeline(frames=2) as scan, timeline(scale, frames=2) as scaled:
+        for one, other in zip(tracks_of(keyed(0.0), scan), tracks_of(keyed(0.0, scale), scaled), strict=True):
+            np.testing.assert_array_equal(other.known, one.known)
+            np.testing.assert_allclose(other.positions, scale * one.positions, rtol=1e-6)
+            np.testing.assert_allclose(other.sigmas, scale * one.sigmas, rtol=1e-6)
 
 
 def followers(*places: tuple[float, float, float]) -> list[Follower]:

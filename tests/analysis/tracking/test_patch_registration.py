@@ -39,6 +39,13 @@ def test_a_parabola_around_a_point_is_that_of_its_neighbours() -> None:
     assert np.isclose(held.reaches[row], np.linalg.norm(away[near[-1]]), rtol=1e-5)
 
 
+def test_colours_are_compared_as_brightness_and_two_opponents() -> None:
+    colors = np.array([[255, 255, 255], [255, 0, 0], [0, 255, 0], [0, 0, 255]], np.uint8)
+    surface = MomentSurface(np.eye(4, 3), SPACING, colors)
+    expected = [[1, 0, 0], [1 / 3, 0.5, 0.25], [1 / 3, -0.5, 0.25], [1 / 3, 0, -0.5]]
+    np.testing.assert_allclose(surface.held.colors, expected, atol=1e-6)
+
+
 def test_rows_around_a_place_are_those_within_reach() -> None:
     chance = np.random.default_rng(2)
     points = chance.normal(0, 3, (3000, 3))
