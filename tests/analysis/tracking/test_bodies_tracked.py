@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -31,9 +32,10 @@ ENDS = np.array([[0.0, 0.0, -LONG], [0.0, THICK, -LONG]])  # the middle of the f
 PATHS = np.array([[*on_arm(frame, -1, ENDS), *on_arm(frame, 1, ENDS)] for frame in range(FRAMES)])
 
 
-def timeline(scale: float = 1.0, frames: int = FRAMES) -> Timeline:
-    clouds = [PointCloud.from_arrays(scale * arms(n)) for n in range(frames)]
-    source = KeptFrames("arms", clouds, np.arange(float(frames)))
+def timeline(frames: Sequence[np.ndarray] | None = None) -> Timeline:
+    frames = [arms(n) for n in range(FRAMES)] if frames is None else frames
+    clouds = [PointCloud.from_arrays(points) for points in frames]
+    source = KeptFrames("arms", clouds, np.arange(float(len(clouds))))
     return Timeline(source, source.times(), "mm")
 
 
@@ -75,7 +77,8 @@ def test_the_doubt_of_the_key_is_told_and_makes_no_gap() -> None:
 
 def test_the_unit_of_a_scan_changes_lengths_alone() -> None:
     scale = 64.0  # changes the exponents of numbers, and no digit
-    with timeline(frames=2) as scan, timeline(scale, frames=2) as scaled:
+    frames = [arms(n) for n in range(2)]
+    with timeline(frames) as scan, timeline([scale * places for places in frames]) as scaled:
         for one, other in zip(tracks_of(keyed(0.0), scan), tracks_of(keyed(0.0, scale), scaled), strict=True):
             np.testing.assert_array_equal(other.known, one.known)
             np.testing.assert_allclose(other.positions, scale * one.positions, rtol=1e-6)

@@ -110,7 +110,7 @@ RINGS = np.stack([THICK * np.cos(AROUND), THICK * np.sin(AROUND), np.linspace(-1
 PATHS = np.array([[*on_arm(n, -1, RINGS), *on_arm(n, 1, RINGS)] for n in range(FRAMES)])
 
 
-def tracks_of_arms(noise: float, kept: float = 1.0) -> Mapping[str, Track]:
+def tracks_of_arms(noise: float, kept: float = 1.0, scale: float = 1.0) -> Mapping[str, Track]:
     """Tracks of landmarks of both arms, whose points come back in another order in each frame.
 
     noise: of each point in each frame, standard deviation. kept: share of the points that a frame has.
@@ -119,14 +119,25 @@ def tracks_of_arms(noise: float, kept: float = 1.0) -> Mapping[str, Track]:
     for frame in range(FRAMES):
         chance, points = np.random.default_rng(frame), arms(frame, 0)
         points = points[chance.permutation(len(points))[: int(kept * len(points))]]
-        clouds.append(PointCloud.from_arrays(points + chance.normal(0, noise, points.shape)))
+        clouds.append(PointCloud.from_arrays(scale * (points + chance.normal(0, noise, points.shape))))
     landmarks = [
-        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), "surface", None, SPACING, 0, (0.0,) * 6))
-        for n, place in enumerate(PATHS[0])
+        Landmark(f"{n}").with_key(
+            Spot(0, 0.0, vector(place), "surface", None, scale * SPACING, 0, (0.0,) * 6)
+        )
+        for n, place in enumerate(scale * PATHS[0])
     ]
     source = KeptFrames("arms", clouds, np.arange(float(FRAMES)))
     with Timeline(source, source.times(), "mm") as scan:
         return track_landmarks(scan, landmarks)
+
+
+def test_the_unit_of_a_scan_changes_lengths_alone() -> None:
+    scale = 64.0  # changes the exponents of numbers, and no digit
+    tracks, scaled = tracks_of_arms(0.05), tracks_of_arms(0.05, scale=scale)
+    for name, track in tracks.items():
+        np.testing.assert_array_equal(scaled[name].known, track.known)
+        np.testing.assert_allclose(scaled[name].positions, scale * track.positions, rtol=1e-6)
+        np.testing.assert_allclose(scaled[name].sigmas, scale * track.sigmas, rtol=1e-6)
 
 
 def judged(tracks: Mapping[str, Track]) -> tuple[Float, Float]:
