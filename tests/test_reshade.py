@@ -84,9 +84,10 @@ def test_what_shows_something_else_is_not_shaded(renderer: Renderer, pose: Pose)
         {"pose": Pose(1, 1.0, "", sphere(1400))},
         {"layers": Layers({"more": np.zeros(1500)})},
     )
+    relit = replace(request, look=Look(color_by="id"))
     for other in others:
-        assert not reshade(renderer, replace(request, **other), surface), other
-    assert reshade(renderer, replace(request, look=Look(color_by="id")), surface)
+        assert not reshade(renderer, replace(relit, **other), surface), other
+    assert reshade(renderer, relit, surface)
     with pytest.raises(InputError):
         render_frame(renderer, replace(request, look=Look(color_by="missing")), surface)
     assert not reshade(renderer, request, surface), "it was not drawn"
