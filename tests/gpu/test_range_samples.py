@@ -186,6 +186,16 @@ def stepped_view(
     )
 
 
+def test_the_spacing_of_samples_is_that_of_the_farthest_views(renderer: Renderer) -> None:
+    """Of a map of heights, that of its cells; of a camera, where nine tenths of the depths are nearer."""
+    heights, camera = stepped_view((33, 18), "height"), stepped_view((33, 18))
+    for depth in (5.0, 0.5):
+        flat = replace(camera, depth=np.full_like(camera.depth, depth))
+        samples = held(renderer.gpu, (heights, flat))
+        assert samples.spacing == pytest.approx(max(1 / 40, depth / 40))
+        samples.release()
+
+
 # --- level 0 and the pyramid ----------------------------------------------------------
 
 
