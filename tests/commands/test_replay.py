@@ -168,8 +168,8 @@ def test_landmarks_and_their_lines_stand_in_anonymous_pictures_where_they_are(ru
             np.abs(picture(Path(name)).astype(int)[..., :3] - color).max(axis=2) < 60
             for name in ("p.png", "q.png")
         )
-        assert named.sum() > 5, color
-        assert (named & anonymous).sum() > 0.8 * named.sum(), color
+        assert anonymous.sum() > 5, color
+        assert (named & anonymous).sum() > 0.8 * anonymous.sum(), color  # names have lines of their own
     assert run("render", "--replay", "a.json", "--marks", "landmarks", "-o", "r.png").code == 0
     assert not (np.abs(picture(Path("r.png")).astype(int)[..., :3] - (255, 0, 0)).max(axis=2) < 60).any()
 

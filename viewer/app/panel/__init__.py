@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from imgui_bundle import ImVec2, imgui
 
 from ...document.schema import Kind, ReadBy, is_object
+from .. import widgets
 from ..ui import Ui
 from . import appearance, renderer, statistics, views
 from .scan import ScanSection
@@ -101,7 +102,7 @@ class Panel:
         if shows != is_open or name in self._opened:
             self._opened[name] = shows
         if shows:
-            imgui.push_id(name)  # what other sections declare may have the same labels
+            imgui.push_id(widgets.unhidden(name))  # what other sections declare may have the same labels
             declare()
             imgui.pop_id()
             if is_revealed:
