@@ -1,7 +1,7 @@
 """Do the quick tests find small mistakes? `mutate.py COUNT SEED SECONDS` runs the tests beside each mutant.
 
-A mutant has one operator, number or word changed. Tests kill it where one fails that passes without it, or
-where they do not end. Exit code 1: they kill fewer than 90 %.
+A mutant has one operator, number or word changed. A test kills it that fails or does not end with it alone.
+Exit code 1: tests kill fewer than 90 %.
 """
 
 import os
@@ -42,7 +42,7 @@ CODE = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8")
 
 
 def mutants(part: str, seed: int) -> Iterator[tuple[str, str, str, str]]:
-    """The mutants of a part in an order by chance: file, function, change of a line, new text."""
+    """The mutants of a part in random order: file, function, change of a line, new text."""
     places = [(f, *m.span(1)) for f in CODE if re.match(part, f) for m in FOUND.finditer(CODE[f]) if m[1]]
     for file, start, end in random.Random(seed).sample(places, len(places)):
         text = CODE[file][:start] + BECOMES[CODE[file][start:end]] + CODE[file][end:]
@@ -65,24 +65,27 @@ def tests_of(file: str, function: str) -> list[str]:
 
 
 def failing(copy: Path, tests: list[str], seconds: int, mutant: str = "") -> str:
-    """The first test that fails in a copy, or how the tests end; empty where none does within the time."""
+    """The first test that fails in a copy or is not done in time, or how they end; empty where all pass."""
     env = {"SCAN4D_DATA": str(ROOT.parent / "shared" / "data"), **os.environ, "PYTHONPATH": str(copy)}
     if "kernels" in mutant:  # what numba compiles from other files, too, may hold the mutant
         env["NUMBA_CACHE_DIR"], seconds = tempfile.mkdtemp(dir=copy), 3 * seconds
-    command = ["timeout", str(3 * seconds), sys.executable, "-Bm", "pytest", "-xq", "-rfE", "--tb=no", *tests]
-    options = ["-p", "no:cacheprovider", "-m", "not slow", f"--seconds={seconds}"]
-    done = subprocess.run([*command, *options], cwd=copy, env=env, capture_output=True, text=True)
-    found = re.search("(?:FAILED|ERROR) (tests/.*?)(?: - |\n)", done.stdout)
-    return (found[1] if found else f"exit code {done.returncode}") if done.returncode else ""
+    options = ["-xv", "--tb=no", "-p", "no:cacheprovider", "-m", "not slow", f"--seconds={seconds}"]
+    command = ["timeout", str(3 * seconds), sys.executable, "-Bm", "pytest", *options, *tests]
+    done = subprocess.run(command, cwd=copy, env=env, capture_output=True, text=True)
+    found = re.search(r"^(tests/.*?) (?:FAILED|ERROR|SKIPPED \(the time)", done.stdout, re.M)
+    return found[1] if found else f"exit code {done.returncode}" if done.returncode else ""
 
 
-def judged(copies: "Queue[Path]", mutant: tuple[str, ...], tests: list[str], seconds: int) -> bool:
-    """Whether tests kill a mutant, in one of the copies; what fails without it, too, kills nothing."""
-    (file, _, change, text), copy = mutant, copies.get()
+def judged(copies: "Queue[Path]", mutant: tuple[str, str, str, str], seconds: int) -> bool:
+    """Whether a test, alone, fails or does not end with a mutant, and passes without it."""
+    (file, function, change, text), copy = mutant, copies.get()
+    tests = tests_of(file, function)
     (copy / file).write_text(text, encoding="utf-8")
     failed = failing(copy, tests, seconds, file)
+    alone = [failed] if "::" in failed else tests
+    killed = failed != "" and failing(copy, alone, seconds, file) != ""
     shutil.copy2(ROOT / file, copy / file)
-    killed = failed != "" and not failing(copy, [failed] if "::" in failed else tests, seconds)
+    killed = killed and not failing(copy, alone, seconds)
     copies.put(copy)
     print("killed  " if killed else "SURVIVES", change, "by", failed or "none", flush=True)
     return killed
@@ -90,15 +93,14 @@ def judged(copies: "Queue[Path]", mutant: tuple[str, ...], tests: list[str], sec
 
 def main(count: int = 40, seed: int = 1, seconds: int = 60) -> int:
     """Report what becomes of each mutant."""
-    share, copies = count // len(PARTS), Queue[Path]()
-    chosen = [each for part in PARTS for each in islice(mutants(part, seed), share)]
-    every = [(each, tests_of(*each[:2])) for each in chosen]
+    copies = Queue[Path]()
+    chosen = [each for part in PARTS for each in islice(mutants(part, seed), count // len(PARTS))]
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
         for place in (f"{folder}/a", f"{folder}/b"):  # with what is compiled, which holds for files as old
             copies.put(Path(shutil.copytree(ROOT, place, ignore=shutil.ignore_patterns(".*", "out"))))
-        killed = sum(pool.map(lambda each: judged(copies, *each, seconds), every))
-    print(f"{killed} of {len(every)} mutants are killed")
-    return int(killed < 0.9 * len(every))
+        killed = sum(pool.map(lambda mutant: judged(copies, mutant, seconds), chosen))
+    print(f"{killed} of {len(chosen)} mutants are killed")
+    return int(killed < 0.9 * len(chosen))
 
 
 if __name__ == "__main__":

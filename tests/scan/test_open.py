@@ -160,6 +160,7 @@ def test_printf_patterns_in_folders_and_odd_names(tmp_path: Path, monkeypatch: p
 def test_glob_patterns(tmp_path: Path) -> None:
     put(tmp_path, "f9.npy", "f10.npy", "g1.npy", "take[1].npy")
     assert labels(tmp_path / "f*.npy") == ["f9.npy", "f10.npy"]
+    assert labels(tmp_path / "**" / "f9.npy") == ["f9.npy"], "in the folder itself, too"
     assert labels(tmp_path / "f[0-9].npy") == ["f9.npy"]
     assert labels(tmp_path / "take[1].npy") == ["take[1].npy"]  # a name that exists is no pattern
     assert "h*.npy: matches no file. Check its folder" in message(tmp_path / "h*.npy")
