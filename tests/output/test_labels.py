@@ -249,3 +249,15 @@ def test_points_that_lie_a_few_pixels_apart_are_the_subject_throughout() -> None
     assert covered[13:35, 19:53].all()
     covered[11:37, 17:55] = False
     assert not covered.any()
+
+
+def test_in_a_view_that_is_too_small_for_the_cube_labels_take_all_room() -> None:
+    size, em = (512.0, 224.0), 30.0
+    scale_bar = 0.0, 100.0, 160.0, 224.0
+    line = np.array([[256.0, 120.0]])
+    labels = [Callout(f"measure {n}", ((230.0, 60.0),), line) for n in range(2)]
+    small = LabelGround(size, em, np.zeros((48, 110), bool), line, [scale_bar])
+    places = LabelPlaces().place(labels, small)
+    assert overlaps(places) == 0
+    for place in places:
+        assert place.box[0] >= scale_bar[2] or place.box[3] <= scale_bar[1], "beside the scale bar"

@@ -35,6 +35,7 @@ _AROUND = 6  # cells about marks that a label on the subject keeps off
 # In heights of the text:
 _TOP, _SIDE = 2.8, 0.5  # of the picture, left free: for the window's prompt; at the sides and below
 _CORNER = 6.6, 8.4  # upper right, the same: for the window's cube
+CUBE_ROOM = 14.0  # shorter edge of a view that has that cube; in smaller ones labels take all room
 _APART = 0.3  # labels from each other
 _LEAST_LEADER = 0.8  # shorter ones are not needed
 
@@ -227,10 +228,11 @@ class _Layout:
     def __init__(self, labels: Sequence[Callout], ground: LabelGround) -> None:
         self.labels, self.ground, self.em = labels, ground, ground.em
         width, height = ground.size
-        self.low = np.array([_SIDE, _TOP]) * self.em
+        has_cube = min(width, height) >= CUBE_ROOM * self.em
+        self.low = np.array([_SIDE, _TOP if has_cube else _SIDE]) * self.em
         self.high = np.array([width - _SIDE * self.em, height - _SIDE * self.em])
         cube = width - _CORNER[0] * self.em, 0.0, width, _CORNER[1] * self.em
-        self.taken = np.array([cube, *ground.taken], float)
+        self.taken = np.array([*[cube] * has_cube, *ground.taken], float).reshape(-1, 4)
         self.boxes = np.full((len(labels), 4), np.nan)
         self.forms = [0] * len(labels)
         self.starts = [_starts(label.line) for label in labels]

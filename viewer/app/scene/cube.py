@@ -13,6 +13,7 @@ from imgui_bundle import ImVec2, imgui
 from numpy.typing import NDArray
 
 from ...camera import Camera
+from ...output.labels import CUBE_ROOM
 from .. import theme, widgets
 from . import navigation, orientation
 from .orientation import Direction
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
 _HALF = 1.55  # of an edge, in heights of the font
 _REACH = _HALF * 3**0.5  # of the corners from the centre
 _MARGIN = 0.5
-_ROOM = 14.0  # a smaller view has no cube
 _TEXT_HEIGHT = 0.57  # of a face's label, in half edges
 _READABLE = 0.3  # cosine between line of sight and face from which its label is written
 SHADE = 0.24  # how much darker a face is that is seen from the side
@@ -52,7 +52,7 @@ def cube_place(width: float, height: float, em: float) -> tuple[float, float, fl
 
     width, height: of the view. em: the font's height.
     """
-    if min(width, height) < _ROOM * em:
+    if min(width, height) < CUBE_ROOM * em:
         return None
     inset = (_REACH + _MARGIN) * em
     return width - inset, inset, _HALF * em
