@@ -73,7 +73,6 @@ def test_a_look_can_ask_for_normals_too() -> None:
     assert np.ptp(lit.image()[lit.row != NOTHING][:, 0]) > 60
 
 
-@pytest.mark.slow
 def test_the_window_gets_points_until_what_it_asked_for_is_ready(renderer: Renderer) -> None:
     own = Renderer(renderer.gpu)
     surface = Surface(renderer.gpu, (64, 64))
