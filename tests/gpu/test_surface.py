@@ -26,6 +26,19 @@ CLOUD = sphere(3000)
 CAMERA = Camera.orbit(CLOUD.bounds(), 30, 20)
 
 
+def test_images_of_a_raster_are_copied_pixel_by_pixel(renderer: Renderer) -> None:
+    ctx = renderer.gpu.ctx
+    raster = gl.Raster(ctx, (7, 5))
+    given = np.arange(35, dtype=np.uint32), np.arange(35, dtype=np.float32) / 7
+    buffers = [ctx.buffer(reserve=4 * 35) for _ in given]
+    for image, values in zip(raster.images, given, strict=True):
+        image.write(values.tobytes())
+    raster.copy_to(*buffers)
+    for buffer, values in zip(buffers, given, strict=True):
+        np.testing.assert_array_equal(np.frombuffer(buffer.read(), values.dtype), values)
+    raster.release()
+
+
 def test_the_depth_buffer_is_really_32_bit_float(renderer: Renderer) -> None:
     raster = gl.Raster(renderer.gpu.ctx, (32, 16))
     assert raster.depth_is_float32()
