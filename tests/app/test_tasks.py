@@ -228,6 +228,7 @@ def test_set_c_distances_to_a_table_a_film_colours_and_back(tmp_path: Path) -> N
         person.push(PANEL, "Export CSV...")
         person.press("Return")
         file = app.told(r"Saved (.*\.csv), in all 64 frames")[1]
+        assert Path(file).name == "demo_distances.csv"
         with open(file, newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))
         assert sorted(int(row["frame_1"]) for row in rows) == list(range(1, 65))

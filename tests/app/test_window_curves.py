@@ -6,6 +6,7 @@ import csv
 import io
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -94,7 +95,7 @@ def pasted(screen: Screen) -> list[dict[str, str]]:
 
 def save_as(app: RunningApp, name: str) -> Path:
     app.act(DRAWER, ("item_click", "Export plot..."))
-    app.settle()
+    assert re.fullmatch(r"\w+_measures.csv", app.settle().fields["##name"]), "named like the scan"
     app.screen.do("type", "--delay", 40, name)
     app.screen.do("key", "Return")
     return Path(app.told(r"Saved (.+?)(?: and .+)?$")[1])

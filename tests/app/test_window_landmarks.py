@@ -279,6 +279,7 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
         assert math.dist(state.landmarks["A"][1], 1.25 * points[34]) < 1.25 * CLICK
         for typed, frames in (("all.c3d", 3), ("one.mrk.json", 1)):
             press(app, "ctrl+l", "ctrl+a")
+            assert app.state.fields["##name"] == "scan_landmarks.mrk.json"
             screen.do("type", "--delay", 40, typed)
             screen.do("key", "Return")
             app.told(f"Saved .*{typed}")

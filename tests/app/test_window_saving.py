@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from virtual_screen import RunningApp, Screen, running_app
 
-from viewer.app.files.sessions import named_like
 from viewer.app.path_dialog import files_of
+from viewer.app.session import named_like
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
 

@@ -6,11 +6,13 @@ import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..analysis.pick import Picked
 from ..document.document import Document
 from ..document.part import Part
+from ..files import working_folder
 from ..geometry import Vector
 from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
@@ -20,6 +22,7 @@ from ..task import Cancelled, Task, in_background
 from .followed import Followed
 from .laid import NumbersOf, PlaceOf
 from .scene.viewport import Viewport
+from .session import named_like
 
 if TYPE_CHECKING:
     from .toolbox import Toolbox
@@ -99,6 +102,11 @@ class Desk:
     def scan(self) -> str:
         """The name of the open scan, as the user gave it."""
         return self._toolbox.session.scan
+
+    def free_file(self, ending: str) -> Path:
+        """A file for what is made of the scan, named like it, that is not there yet. ending: of its name, as
+        "_distances.csv"."""
+        return named_like(self.scan, working_folder(), ending)
 
     @property
     def pose(self) -> Pose | None:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Hashable
 from concurrent.futures import Future
 from dataclasses import replace
+from itertools import chain, count
+from pathlib import Path
 from typing import Any
 
 from ..document.document import Document
@@ -23,6 +27,16 @@ _MOST_LEFT = 50  # scans whose changes can still be undone
 def known_as(scan: str) -> str:
     """The name that a scan is remembered by: its path from the root, wherever Scan4D was started."""
     return scan if is_demo(scan) else absolute(scan)
+
+
+def named_like(scan: str, folder: Path, suffix: str) -> Path:
+    """A file in a folder that is named like a scan and is not there yet: "face.scan4d.json", then
+    "face_2.scan4d.json"."""
+    path = Path(known_as(scan))
+    name = path.name if os.path.isdir(path) else path.stem
+    stem = re.sub(r"%0?[0-9]*d|[^\w .-]+", "_", name).strip(" ._-")
+    paths = (folder / f"{stem or 'scan'}{more}{suffix}" for more in chain([""], map("_{}".format, count(2))))
+    return next(path for path in paths if not os.path.exists(path))
 
 
 class Session:

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Callable
-from itertools import chain, count
 from pathlib import Path
 
 from ...document.recording import place_of
@@ -17,7 +14,7 @@ from ...scan.listing import is_there
 from ..notices import Problem
 from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
-from ..session import Session, known_as
+from ..session import Session, known_as, named_like
 
 
 class Sessions:
@@ -97,13 +94,3 @@ class Sessions:
             self._take_up(session)
         else:
             self._open(scan, session)
-
-
-def named_like(scan: str, folder: Path, suffix: str) -> Path:
-    """A file in a folder that is named like a scan and is not there yet: "face.scan4d.json", then
-    "face_2.scan4d.json"."""
-    path = Path(known_as(scan))
-    name = path.name if os.path.isdir(path) else path.stem
-    stem = re.sub(r"%0?[0-9]*d|[^\w .-]+", "_", name).strip(" ._-")
-    paths = (folder / f"{stem or 'scan'}{more}{suffix}" for more in chain([""], map("_{}".format, count(2))))
-    return next(path for path in paths if not os.path.exists(path))

@@ -26,7 +26,7 @@ from ....analysis.track import Track
 from ....bounds import Bounds
 from ....document.landmarks import Landmarks
 from ....errors import InputError
-from ....files import free_file, working_folder
+from ....files import working_folder
 from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ....scan.times import frame_in_words
@@ -67,7 +67,7 @@ class Exchange:
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self._saving.ask(free_file(working_folder(), _USUAL))
+        self._saving.ask(self._desk.free_file(f"_landmarks{_USUAL}"))
 
     def ask_to_read(self) -> None:
         """Open the dialog that reads landmarks or a template."""

@@ -18,7 +18,7 @@ from ....analysis.spot import Spot, spot_slack
 from ....csv_text import save_rows, to_text
 from ....document.measurements import Measurements
 from ....errors import InputError
-from ....files import free_file, working_folder
+from ....files import working_folder
 from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ...commands import Command, Menu
@@ -191,7 +191,7 @@ class Tool:
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self.saving.ask(free_file(working_folder(), ".csv"))
+        self.saving.ask(self.desk.free_file("_distances.csv"))
 
     def _save(self, file: Path) -> None:
         timeline, pose = self.desk.timeline, self.desk.pose

@@ -17,7 +17,6 @@ from ....analysis.measures.curves import NUMBER_COLUMNS, number_rows, numbers_fi
 from ....csv_text import save_rows, to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError
-from ....files import free_file, working_folder
 from ....output.overlays import NOTHING_DRAWN, DrawnMarks
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
@@ -275,7 +274,7 @@ class Tool:
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self.saving.ask(free_file(working_folder(), PLOT_SUFFIXES[0]))
+        self.saving.ask(self.desk.free_file(f"_measures{PLOT_SUFFIXES[0]}"))
 
     def _save(self, file: Path) -> None:
         """Save what is plotted; beside a table, the numbers of the movements as another one."""
