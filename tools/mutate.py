@@ -17,8 +17,8 @@ from pathlib import Path
 from queue import Queue
 
 ROOT = Path(__file__).resolve().parents[1]
-PARTS = ["viewer/analysis/", "viewer/scan/", "viewer/(frame|gpu/|backends/(points|surfels))",
-         "shaders/(chunks|common|compact|points|scatter|shade|surfels)/"]  # fmt: skip
+PARTS = ["viewer/analysis/", "viewer/scan/", "shaders/(chunks|common|compact|points|scatter|shade|surfels)/",
+         "viewer/(frame|gpu/|picture/|splatting/|backends/(points|surfels))"]  # fmt: skip
 PAIRS = "< <=,> >=,== !=,&& ||,and or,min max,any all,True False,true false,floor ceil,+ -,* /,0 1,1 2"
 BECOMES = {a: b for pair in PAIRS.split(",") for a, b in (pair.split(), pair.split()[::-1])}
 FOUND = re.compile(  # texts, comments and declarations of shaders first, so that nothing in them is found
