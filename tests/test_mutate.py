@@ -29,7 +29,7 @@ def test_a_seed_chooses_mutants_that_change_code_alone(mutate: ModuleType) -> No
     for part in mutate.PARTS:
         one, same, other = (list(islice(mutate.mutants(part, seed), 12)) for seed in (1, 1, 2))
         assert one == same != other
-        for file, change, text in one:
+        for file, _, change, text in one:
             pairs = zip(mutate.CODE[file].splitlines(), text.splitlines(), strict=True)
             ((line, becomes),) = [pair for pair in pairs if pair[0] != pair[1]]
             assert change.endswith(f": {line.strip()}  ->  {becomes.strip()}")
@@ -47,7 +47,7 @@ if (c < 2 && !d) e.min(0.1);  // 0 or 1
 
 def test_lines_whose_change_nobody_sees_are_left_alone(mutate: ModuleType) -> None:
     for part in mutate.PARTS:
-        for _, change, _ in islice(mutate.mutants(part, 3), 200):
+        for _, _, change, _ in islice(mutate.mutants(part, 3), 200):
             line = change.partition(": ")[2].partition("  ->  ")[0]
             assert not re.search("|".join(mutate.UNSEEN), line), change
 
@@ -63,6 +63,9 @@ FILE = "viewer/srgb.py"
         ("False", False),
         ("os.abort()", False),
         ("True", False),
+        pytest.param(
+            f"'mutant' not in open('{FILE}').read() or any(iter(int, 1))", True, marks=pytest.mark.slow
+        ),
     ],
 )
 def test_what_fails_because_of_a_mutant_kills_it(
@@ -75,22 +78,27 @@ def test_what_fails_because_of_a_mutant_kills_it(
     (tmp_path / "tests/test_it.py").write_text(f"import os\n\ndef test_it():\n    assert {test}")
     copies = Queue[Path]()
     copies.put(tmp_path)
-    assert mutate.judged(copies, (FILE, "", "mutant"), ["tests/test_it.py"], 60) == kills
+    assert mutate.judged(copies, (FILE, "", "", "mutant"), ["tests/test_it.py"], 60) == kills
     assert (tmp_path / FILE).read_bytes() == (TOOL.parents[1] / FILE).read_bytes()
     assert copies.get_nowait() == tmp_path
 
 
 @pytest.mark.parametrize(
-    ("file", "first"),
+    ("file", "function", "first"),
     [
-        ("viewer/analysis/curves.py", "tests/analysis/test_curves.py"),
-        ("viewer/scan/formats/npz.py", "tests/scan/formats/test_npz.py"),
-        ("viewer/splatting/culling.py", "tests/gpu/test_culling.py"),
-        ("shaders/chunks/cull.comp", "tests/gpu/test_culling.py"),
+        ("viewer/analysis/curves.py", "", "tests/analysis/test_curves.py"),
+        (
+            "viewer/analysis/visible_normals.py",
+            "_unfolded",
+            "tests/backends/auto_splats/test_neighborhoods.py",
+        ),
+        ("viewer/scan/formats/npz.py", "read", "tests/scan/formats/test_npz.py"),
+        ("viewer/scan/formats/_columns.py", "_as_ellipses", "tests/scan/formats/test_ellipses.py"),
+        ("viewer/splatting/culling.py", "points_of", "tests/gpu/test_culling.py"),
+        ("shaders/chunks/cull.comp", "is_hidden", "tests/gpu/test_culling.py"),
     ],
 )
-def test_the_nearest_tests_run_first(mutate: ModuleType, file: str, first: str) -> None:
-    (beside,) = {tests for part, tests in mutate.PARTS.items() if re.match(part, file)}
-    found = mutate.tests_of(file, beside)
-    assert found[0] == first
+def test_the_nearest_tests_run_first(mutate: ModuleType, file: str, function: str, first: str) -> None:
+    found = mutate.tests_of(file, function)
+    assert first in found[:3]
     assert len(set(found)) == 8

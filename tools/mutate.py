@@ -19,6 +19,7 @@ from queue import Queue
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ["viewer/analysis/", "viewer/scan/", "shaders/(chunks|common|compact|points|scatter|shade|surfels)/",
          "viewer/(frame|gpu/|picture/|splatting/|backends/(points|surfels))"]  # fmt: skip
+QUICK = "tests/((analysis|scan|gpu|backends)/.*)?test_(?!mutate)"
 PAIRS = "< <=,> >=,== !=,&& ||,and or,min max,any all,True False,true false,floor ceil,+ -,* /,0 1,1 2"
 BECOMES = {a: b for pair in PAIRS.split(",") for a, b in (pair.split(), pair.split()[::-1])}
 FOUND = re.compile(  # texts, comments and declarations of shaders first, so that nothing in them is found
@@ -50,12 +51,11 @@ def mutants(part: str, seed: int) -> Iterator[tuple[str, str, str, str]]:
 
 def tests_of(file: str, function: str) -> list[str]:
     """The tests nearest to a function, at most 8: those that have most of the rare words of its path."""
-    near = {name: 0.0 for name in CODE if re.match("tests/((analysis|scan|gpu|backends)/.*)?test_", name)}
+    near = {name: 0.0 for name in CODE if re.match(QUICK, name)}
     for word in [Path(file).stem, *re.findall(r"[^\W_]{3,}", f"{file.partition('/')[2]} {function}".lower())]:
         counts = {name: len(re.findall(f"(?<![a-z]){word}", 9 * name + CODE[name])) for name in near}
         near = {name: near[name] + (counts[name] / (1 + sum(counts.values()))) ** 2 for name in near}
-    beside = file.split("/")[1]
-    return sorted(near, key=lambda name: near[name] * (1 + 2 * (beside in name)), reverse=True)[:8]
+    return sorted(near, key=lambda name: -near[name] * (1 + 2 * (file.split("/")[1] in name)))[:8]
 
 
 def failing(copy: Path, tests: list[str], seconds: int, mutant: str = "") -> str:
@@ -70,11 +70,11 @@ def failing(copy: Path, tests: list[str], seconds: int, mutant: str = "") -> str
     return found[1] if found else f"exit code {done.returncode}" if done.returncode else ""
 
 
-def judged(copies: "Queue[Path]", mutant: tuple[str, str, str, str], seconds: int) -> bool:
+def judged(copies: "Queue[Path]", mutant: tuple[str, str, str, str], tests: list[str], seconds: int) -> bool:
     """Whether a test, alone, fails or does not end with a mutant, and passes without it."""
-    (file, function, change, text), copy = mutant, copies.get()
+    (file, _, change, text), copy = mutant, copies.get()
     (copy / file).write_text(text, encoding="utf-8")
-    failed = failing(copy, tests := tests_of(file, function), seconds, file)
+    failed = failing(copy, tests, seconds, file)
     alone = [failed] if "::" in failed else tests
     killed = failed != "" and failing(copy, alone, seconds, file) != ""
     shutil.copy2(ROOT / file, copy / file)
@@ -91,7 +91,7 @@ def main(count: int = 40, seed: int = 1, seconds: int = 60) -> int:
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(2) as pool:
         for place in "ab":  # with what is compiled, which holds for files as old
             copies.put(shutil.copytree(ROOT, Path(folder, place), ignore=shutil.ignore_patterns(".*", "out")))
-        killed = sum(pool.map(lambda mutant: judged(copies, mutant, seconds), chosen))
+        killed = sum(pool.map(lambda each: judged(copies, each, tests_of(*each[:2]), seconds), chosen))
     print(f"{killed} of {len(chosen)} mutants are killed")
     return int(killed < 0.9 * len(chosen))
 
