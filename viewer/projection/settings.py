@@ -84,7 +84,7 @@ class ProjectionParams:
     )
     hide: bool = param(
         True,
-        "Leave out samples seen through the holes of a nearer surface",
+        "Leave out samples seen through the holes of a nearer surface; polygons of range images always do",
         key="Shift+H",
         title="Hide what lies behind",
         basic=True,
