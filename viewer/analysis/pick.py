@@ -268,7 +268,8 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     if not _lie_all_round(down, across):
         return x, y
     nearest = np.argmin(down**2 + across**2)
-    return x + int(across[nearest]), y + int(down[nearest])
+    meant = x + int(across[nearest]), y + int(down[nearest])
+    return meant if shown < np.inf else before_gap(surface, *meant)  # which may be seen through a gap too
 
 
 def _nearest_depth(surface: Surface, x: int, y: int) -> float:
