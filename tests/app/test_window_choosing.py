@@ -132,7 +132,7 @@ def test_an_error_is_bounded_in_pixels_and_in_the_unit_of_the_scan(shown: Shown)
         assert shown.settle() == DrawingWay("surfels"), unit
     shown.session.change("Name unit", unit="units")
     shown.settle()
-    assert "cannot be told in the scan's 'units'" in shown.choosing.problem
+    assert "cannot be converted to the scan's 'units'" in shown.choosing.problem
     assert shown.choosing.choice is None
 
 

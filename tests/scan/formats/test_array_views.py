@@ -183,7 +183,7 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
             "'distortion' is .2000,. float64",
         ),
         ({"depth": np.ones((2, 2)), "distortion": np.ones(3)}, "expected the numbers k1 k2 p1 p2"),
-        ({"elevation": np.ones((2, 2))}, "nothing tells the ground. Add dx and dy"),
+        ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add dx and dy"),
         ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "its cells measure 0 x -1"),
         ({"normals": np.ones((2, 3))}, "has no array 'positions', only: normals. Name points 'positions'"),
     ],

@@ -220,8 +220,8 @@ def test_a_cut_behind_a_level_of_the_last_pose_is_a_coarser_one(scan: Path, tmp_
         (lambda data, at: data + b"some more", r"octree 20, at byte \d+: an octree is missing"),
         (lambda data, at: data[:at] + b"x" + data[at:], r"octree 2, at byte \d+: an octree is missing"),
         (lambda data, at: data[:at + 40] + b"x" + data[at + 41:], "the header of an octree is damaged"),
-        (lambda data, at: data[: headers_at(data, 1)] + data[headers_at(data, 5):], "told by 5 before it"),
-        (lambda data, at: data[headers_at(data, 5):], "octree 0 is told by 5 before it"),
+        (lambda data, at: data[: headers_at(data, 1)] + data[headers_at(data, 5):], "depends on 5 before it"),
+        (lambda data, at: data[headers_at(data, 5):], "octree 0 depends on 5 before it"),
     ],
 )  # fmt: skip
 def test_damage_is_one_clear_error(change, message: str, scan: Path, tmp_path: Path) -> None:

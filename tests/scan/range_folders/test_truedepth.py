@@ -71,7 +71,7 @@ def test_pictures_stand_upright(tmp_path: Path, gravity: tuple[float, float], tu
 def test_motion_that_tells_no_gravity_is_told(tmp_path: Path, text: str) -> None:
     put(tmp_path, 1)
     (tmp_path / "motion-data.json").write_text(text)
-    with pytest.raises(InputError, match=r"motion-data\.json: tells no gravity"):
+    with pytest.raises(InputError, match=r"motion-data\.json: has no usable gravity"):
         find_source(tmp_path)
 
 
