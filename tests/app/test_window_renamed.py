@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_window_changes import lowest_button, points
-from virtual_screen import Screen, running_app
+from virtual_screen import Screen, running_app, wait_until_kept
 
 
 @pytest.mark.slow
@@ -18,14 +18,15 @@ def test_what_was_made_comes_back_under_another_name(screen: Screen, tmp_path: P
         np.save(old / f"{number}.npy", points(number))
     with running_app(screen, tmp_path, old) as app:
         app.do(("key", "ctrl+b"), ("key", "Return"))
-        document = app.see(lambda state: state.document["bookmarks"]).document
+        made = app.see(lambda state: state.document["bookmarks"])
+        wait_until_kept(tmp_path, old, made)
     old.rename(new)
     with running_app(screen, tmp_path, new) as app:
         app.told("Scan4D knows these files by another name: .*doe .bookmarks., which is no longer there")
         assert not app.settle().document["bookmarks"]
         app.do(("mousemove", *lowest_button(app)), ("click", 1))
         used = app.see(lambda state: state.document["bookmarks"])
-        assert used.document["bookmarks"] == document["bookmarks"]
+        assert used.document["bookmarks"] == made.document["bookmarks"]
         screen.do("key", "ctrl+z")
         app.see(lambda state: not state.document["bookmarks"])
         assert "Traceback" not in app.log()

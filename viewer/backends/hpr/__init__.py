@@ -150,7 +150,6 @@ class VisiblePoints(Backend):
         "zoomed out x10^6": Limit(0.02, AROUND_ALL),
         "zoomed out x10^9": Limit(0.02, AROUND_ALL),
         "collinear points": Limit(0.02, AROUND_ALL),
-        "normals parallel to y": Limit(0.02, AROUND_ALL, {"output": ("splats",)}),
     }
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
