@@ -131,7 +131,7 @@ def libraries(names: Iterable[str]) -> set[str]:
 
 TOOLS_KNOW = {
     "commands",
-    "desk",
+    "tool_context",
     "read_dialog",
     "save_dialog",
     "scene.canvas",
@@ -248,7 +248,7 @@ def test_entries_have_no_underscore() -> None:
     assert not [name for name in (*backends(), *command_names()) if name.startswith("_")]
 
 
-def test_tools_know_their_desk_and_not_the_whole_window() -> None:
+def test_tools_know_their_context_and_not_the_whole_window() -> None:
     beyond = {
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in modules()
@@ -263,7 +263,7 @@ def test_tools_know_their_desk_and_not_the_whole_window() -> None:
         if name_of(path).startswith("viewer.app.tools.")
         for node in ast.walk(parse(path))
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute)
-        if node.value.attr == "desk" and node.attr.startswith("_")
+        if node.value.attr == "context" and node.attr.startswith("_")
     }
     assert beyond | private == set()
     page = (PACKAGE.parent / "docs" / "developing" / "adding-a-tool.md").read_text(encoding="utf-8")

@@ -33,7 +33,7 @@ from imgui_bundle import imgui
 from viewer.app.commands import Command
 TITLE = "Below {name}"
 class Tool:
-    def __init__(self, desk): self.desk, self.is_on = desk, False
+    def __init__(self, context): self.context, self.is_on = context, False
     def toggle(self): self.is_on = not self.is_on
     def is_below(self): return self.is_on
     def below(self, ui):
@@ -116,7 +116,7 @@ def test_tools_stand_beside_each_other_under_the_timeline(screen: Screen, tmp_pa
     folder = tmp_path / "tools"
     folder.mkdir()
     for name, key, pressed in (
-        ("one", "A", "self.desk.note('one is pressed')"),
+        ("one", "A", "self.context.note('one is pressed')"),
         ("two", "B", "raise ValueError('two is pressed')"),
     ):
         (folder / f"{name}.py").write_text(BELOW.format(name=name, key=key, pressed=pressed))

@@ -105,7 +105,7 @@ def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Pat
 FAILING = {
     "at_import": "TITLE = 'At import'\nraise ValueError('import')\n",
     "at_parsing": "TITLE = (\n",
-    "at_making": "TITLE = 'At making'\ndef Tool(desk): raise ValueError('making')\n",
+    "at_making": "TITLE = 'At making'\ndef Tool(context): raise ValueError('making')\n",
     "in_panel": """
         def panel(self, ui):
             imgui.begin_child("begun")
@@ -124,11 +124,11 @@ FAILING = {
     "in_click": "def on_click(self, click): raise ValueError('click')\n",
     "in_command": "def act(self): raise ValueError('command')\n",
     "in_work": """
-        def act(self): self.desk.run("Working", self.work, print)
+        def act(self): self.context.run("Working", self.work, print)
         def work(self): raise ValueError("work")
         """,
     "in_result": """
-        def act(self): self.desk.run("Working", lambda: 1, self.take)
+        def act(self): self.context.run("Working", lambda: 1, self.take)
         def take(self, result): raise ValueError("result")
         """,
 }  # fmt: skip
@@ -138,10 +138,10 @@ from viewer.app.commands import Command
 from viewer.errors import InputError
 TITLE = {name!r}
 class Tool:
-    def __init__(self, desk):
-        self.desk = desk
-        desk.reveal()
-    def act(self): self.desk.take_clicks()
+    def __init__(self, context):
+        self.context = context
+        context.reveal()
+    def act(self): self.context.take_clicks()
 """
 UNBALANCED = {
     "push_id() and pop_id()": "imgui.push_id('begun')",
@@ -291,7 +291,10 @@ def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
 ) -> None:
     folder = tmp_path / "tools"
     folder.mkdir()
-    pin = "    def on_click(self, click):\n        self.desk.change('Pin', Kept((Place(click.picked.{}),)))\n"
+    pin = (
+        "    def on_click(self, click):\n"
+        "        self.context.change('Pin', Kept((Place(click.picked.{}),)))\n"
+    )
     kinds = {"array": "tuple[Place, ...] = ()", "place": "tuple[Place, ...] = ()", "listed": "list = ()"}
     for name, kind in kinds.items():
         code = HEAD.format(name=name) + pin.format("position" if name == "array" else "place")
@@ -323,21 +326,23 @@ PLACE = np.eye(4)
 PLACE[:3, :3] = [[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]]
 PLACE[:3, 3] = 100, 0, 3
 class Tool:
-    def __init__(self, desk):
-        self.desk, self.made = desk, {}
+    def __init__(self, context):
+        self.context, self.made = context, {}
     def numbers(self, pose):
         if pose.index not in self.made:
             self.made[pose.index] = {"rising": pose.cloud.positions[:, 1] * 5.0}
         return self.made[pose.index]
-    def lay(self): self.desk.lay(self.numbers)
+    def lay(self): self.context.lay(self.numbers)
     def color_plainly(self):
-        self.desk.change("Colour", look=replace(self.desk.document.look, color_by="plain", light="flat"))
-    def move(self): self.desk.lay(self.numbers, lambda index: Rigid(PLACE))
-    def wrong(self): self.desk.lay(lambda pose: {"rising": np.zeros(3)})
+        look = replace(self.context.document.look, color_by="plain", light="flat")
+        self.context.change("Colour", look=look)
+    def move(self): self.context.lay(self.numbers, lambda index: Rigid(PLACE))
+    def wrong(self): self.context.lay(lambda pose: {"rising": np.zeros(3)})
     def tell(self):
-        viewport = self.desk.viewport
-        look, size = viewport.request.look, viewport.renderer.bytes_of(self.desk.pose)
-        self.desk.note(f"{look.color_by}, {size} bytes, at {self.desk.motion(self.desk.pose).matrix[0, 3]:g}")
+        viewport = self.context.viewport
+        look, size = viewport.request.look, viewport.renderer.bytes_of(self.context.pose)
+        right = self.context.motion(self.context.pose).matrix[0, 3]
+        self.context.note(f"{look.color_by}, {size} bytes, at {right:g}")
 COMMANDS = {"Tools": (
     Command("lay", "Lay", Tool.lay, "Alt+A"),
     Command("move", "Move", Tool.move, "Alt+B"),

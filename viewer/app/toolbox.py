@@ -24,7 +24,6 @@ from ..scan.pose import Pose
 from ..task import Cancelled, Task
 from . import failures, tools
 from .commands import Command, Commands, Entry, Item, Listing, Menu
-from .desk import Click, Desk, FrameSpan
 from .failures import Failures
 from .followed import Followed
 from .laid import Numbers, NumbersOf, PlaceOf
@@ -34,6 +33,7 @@ from .scene.canvas import Canvas, ViewPlace
 from .scene.viewport import Viewport
 from .session import Session
 from .settings import chosen
+from .tool_context import Click, FrameSpan, ToolContext
 from .ui import Ui
 
 _BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
@@ -46,9 +46,9 @@ class Slot:
     user's mistake that these led to when they were declared last.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
-        self.title = desk.name
+    def __init__(self, context: ToolContext) -> None:
+        self.context = context
+        self.title = context.name
         self.tool: Any = None
         self.mistakes: dict[str, str] = {}
 
@@ -62,7 +62,7 @@ class Toolbox:
 
     clicking: the name of the tool that clicks in the view go to; None where they only move the view.
     is_dragging: whether the drag in the view is that tool's. label_places: of labels over the view.
-    session, playback, viewport, followed, note, redraw: what their desks offer them.
+    session, playback, viewport, followed, note, redraw: what tools reach through their contexts.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Toolbox:
         self.clicking: str | None = None
         self.is_dragging = False
         self._is_declined = False  # the last click, by the tool that had it
-        self._slots = {name: Slot(Desk(self, name)) for name in tools.tool_names()}
+        self._slots = {name: Slot(ToolContext(self, name)) for name in tools.tool_names()}
         for slot in self._slots.values():
             try:
                 self._open(slot, commands)
@@ -98,18 +98,18 @@ class Toolbox:
                 )
 
     def _open(self, slot: Slot, commands: Commands) -> None:
-        name = slot.desk.name
+        name = slot.context.name
         module = _imported(name)
         slot.title = module.TITLE
         if hasattr(module, "Settings"):
-            slot.desk.settings = usable(module.Settings(), self._remembered.get(name, {}))
+            slot.context.settings = usable(module.Settings(), self._remembered.get(name, {}))
         for menu, entries in getattr(module, "COMMANDS", {}).items():
             if isinstance(entries, (Command, Listing, Menu)):
                 what = f"COMMANDS['{menu}'] is a {type(entries).__name__} and has to be a tuple of such"
                 raise TypeError(f"{what}: a comma is missing after it")
             commands.add(menu, [self._bound(slot, entry) for entry in entries], name)
         commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))
-        slot.tool = module.Tool(slot.desk)
+        slot.tool = module.Tool(slot.context)
 
     def _bound(self, slot: Slot, entry: Entry[Any]) -> Entry[Any]:
         """An entry of a menu that speaks to the slot's tool, and does nothing while that is off."""
@@ -171,12 +171,12 @@ class Toolbox:
 
     def _switch_off(self, slot: Slot, error: BaseException) -> None:
         slot.tool = None
-        self.session.laid.take_away(slot.desk.name)
-        if self.clicking == slot.desk.name:
+        self.session.laid.take_away(slot.context.name)
+        if self.clicking == slot.context.name:
             self.clicking = None
-        slot.desk.cancel_work()
+        slot.context.cancel_work()
         words = f"{slot.title} is switched off until the next start: {failures.reason(error)}"
-        self._failures.tell(f"The tool '{slot.desk.name}'", error, words)
+        self._failures.tell(f"The tool '{slot.context.name}'", error, words)
 
     def lay(self, name: str, numbers: NumbersOf | None, place: PlaceOf | None) -> None:
         """Lay over the open scan what a tool gives, or nothing; what it gives wrong switches it off."""
@@ -200,7 +200,7 @@ class Toolbox:
         """The sections of the panel: title, whether to open it and scroll to its end, what declares it."""
         for name, slot in self._slots.items():
             if slot.has("panel"):
-                is_revealed, slot.desk.is_revealed = slot.desk.is_revealed, False
+                is_revealed, slot.context.is_revealed = slot.context.is_revealed, False
                 yield f"{slot.title}###{name}", is_revealed, partial(self._declare, slot, "panel")
 
     def drawn_below(self) -> Iterator[tuple[str, Callable[[Ui], object]]]:
@@ -340,32 +340,32 @@ class Toolbox:
     @property
     def tasks(self) -> list[Task]:
         """Work that runs beside the window for tools."""
-        return [work.task for slot in self._slots.values() for work in slot.desk.works]
+        return [work.task for slot in self._slots.values() for work in slot.context.works]
 
     def advance(self) -> bool:
         """Let tools take in what was done for them, and go on; whether there is something to show."""
         changed = False
         for slot in self._slots.values():
-            for work in slot.desk.take_done():
+            for work in slot.context.take_done():
                 changed = True
                 self._do(slot, work.finish, self._tell_problem)
             if self._call(slot, "advance", _BUDGET_MS):
                 changed = True
-                slot.desk.redraw()
+                slot.context.redraw()
         return changed
 
     def remembered(self) -> dict[str, Mapping[str, Any]]:
         """Tool's name -> values of its `Settings` that are not the defaults, as they were where it is off."""
         kept = dict(self._remembered)
         for name, slot in self._slots.items():
-            if slot.desk.settings is not None:
-                kept[name] = chosen(slot.desk.settings)
+            if slot.context.settings is not None:
+                kept[name] = chosen(slot.context.settings)
         return {name: values for name, values in kept.items() if values}
 
     def close(self) -> None:
         """Cancel what runs for tools."""
         for slot in self._slots.values():
-            slot.desk.cancel_work()
+            slot.context.cancel_work()
 
 
 def _checked(numbers: Numbers, pose: Pose) -> Numbers:

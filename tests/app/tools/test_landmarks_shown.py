@@ -12,8 +12,8 @@ from viewer.analysis.landmarks import Landmark
 from viewer.analysis.measures import Measure
 from viewer.analysis.spot import Spot
 from viewer.analysis.track import Known, Track
-from viewer.app.desk import Desk
 from viewer.app.session import Session
+from viewer.app.tool_context import ToolContext
 from viewer.app.tools.landmarks import Settings, Tool
 from viewer.app.tools.landmarks.corners import regions_of
 from viewer.app.tools.landmarks.shown import ShownLandmarks
@@ -86,9 +86,9 @@ def tool_on(session: Session) -> Tool:
     box = SimpleNamespace(
         session=session, playback=playback, clicking="landmarks", redraw=lambda: None, followed=followed
     )
-    desk = Desk(box, "landmarks")  # type: ignore[arg-type]
-    desk.settings = Settings()
-    return Tool(desk)
+    context = ToolContext(box, "landmarks")  # type: ignore[arg-type]
+    context.settings = Settings()
+    return Tool(context)
 
 
 def test_corners_of_regions_are_listed_below_them_and_bear_no_names_of_their_own() -> None:

@@ -11,9 +11,9 @@ from imgui_bundle import ImVec2
 
 from viewer.analysis.measure import Measurement, Reading
 from viewer.analysis.spot import Spot
-from viewer.app.desk import Desk
 from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
+from viewer.app.tool_context import ToolContext
 from viewer.app.tools.measuring import Tool
 from viewer.app.tools.measuring.words import snap_words
 from viewer.camera import Camera
@@ -40,7 +40,7 @@ def test_it_says_where_the_ends_are(ids: tuple[int | None, int | None], words: s
 
 def test_two_ends_make_a_measurement_of_the_document() -> None:
     session = Session("scan")
-    measuring = Tool(Desk(SimpleNamespace(session=session), "measuring"))  # type: ignore[arg-type]
+    measuring = Tool(ToolContext(SimpleNamespace(session=session), "measuring"))  # type: ignore[arg-type]
     first, second = end(3), replace(end(4), position=(1, 0, 0))
     measuring.set_end(first)
     assert (measuring.begun, measuring.made.all) == (first, ())

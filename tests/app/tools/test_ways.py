@@ -27,8 +27,8 @@ def track_at(place: tuple[int, int, int]) -> Track:
 @pytest.fixture
 def ways() -> Ways:
     followed = SimpleNamespace(tracks={name: track_at(place) for name, place in PLACES.items()})
-    desk: Any = SimpleNamespace(followed=followed, timeline=TIMES)
-    return Ways(desk)
+    context: Any = SimpleNamespace(followed=followed, timeline=TIMES)
+    return Ways(context)
 
 
 def test_what_is_asked_for_again_is_the_same(ways: Ways) -> None:

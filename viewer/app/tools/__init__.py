@@ -4,7 +4,7 @@ A tool's module has
 
     a docstring         its first line says what the tool does
     TITLE               its name, which its section in the panel has
-    Tool                a class, made with a `Desk` (see viewer/app/desk.py) when the window opens
+    Tool                a class, made with a `ToolContext` (viewer/app/tool_context.py) when the window opens
 
 and, where it has some,
 
@@ -12,7 +12,7 @@ and, where it has some,
                         take the Tool; those with a `short` title stand on the toolbar
     MOUSE               (how, what) of the mouse, for the list of keys
     Settings            a frozen dataclass (see viewer/params.py) of what comes back at the next start, as
-                        `desk.settings`
+                        `context.settings`
 
 The Tool has any of
 
@@ -24,8 +24,8 @@ The Tool has any of
     is_bare()               whether that is a few words only: the drawer is then as low as they are
     dialog()                declares windows of its own, over everything
     prompt()                what to say at the top of the view while it has the clicks
-    on_click(click)         a click in the view while it has the clicks (`desk.take_clicks`); False: it is not
-                            taken, and a double click turns the view about what is there, as without a tool
+    on_click(click)         a click in the view while it has the clicks (`context.take_clicks`); False: the
+                            tool does not take it, and a double click turns the view about that place
     on_press(mouse)         the left button goes down in the view while it has the clicks, at a place on the
                             screen; True: a drag from there is its own, and does not move the view
     on_drag(click, ends)    a drag of its own has come to what `click` tells, without its spacing; ends: the
@@ -40,12 +40,12 @@ The Tool has any of
     advance(budget)         each turn of the window's loop, for so many milliseconds at most; True: to be
                             drawn, and called again at once
 
-What a user would be sorry to lose is in the document (`desk.document`, `desk.change`), what is under way in
-the Tool. A tool that raises, or leaves widgets begun, is told and switched off until the next start, all else
-goes on; only an InputError in a command, a click, a widget of `panel` or `dialog` or in what was run beside
-the window is the user's mistake, and told alone. Names that begin with an underscore are no tools. No list of
-tools exists anywhere else; a folder that is appended to this package's `__path__` is scanned too, and of two
-tools of one name the first folder's is used and the other told.
+What a user would be sorry to lose is in the document (`context.document`, `context.change`), what is under
+way in the Tool. A tool that raises, or leaves widgets begun, is told and switched off until the next start,
+all else goes on; only an InputError in a command, a click, a widget of `panel` or `dialog` or in what was run
+beside the window is the user's mistake, and told alone. Names that begin with an underscore are no tools. No
+list of tools exists anywhere else; a folder that is appended to this package's `__path__` is scanned too, and
+of two tools of one name the first folder's is used and the other told.
 """
 
 from __future__ import annotations

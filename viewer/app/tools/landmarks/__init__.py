@@ -22,8 +22,8 @@ from ....output.overlays import DrawnMarks
 from ....params import param
 from ....scan.times import frame_in_words
 from ...commands import Command, Menu
-from ...desk import Click, Desk, FrameSpan
 from ...scene.canvas import Canvas, ViewPlace
+from ...tool_context import Click, FrameSpan, ToolContext
 from ...ui import Ui
 from . import overlay, panel
 from .corners import regions_of
@@ -55,14 +55,14 @@ class Tool:
     coordinates that the scan is shown in; None while none is. open_regions: those whose corners are listed.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self.context = context
         self.selected, self.corrects = "", False
         self.open_regions: set[str] = set()
         self.dragged: Vector | None = None
-        self.follower = Following(desk)
-        self.notebook = Notebook(desk)
-        self.exchange = Exchange(desk, self.begin)
+        self.follower = Following(context)
+        self.notebook = Notebook(context)
+        self.exchange = Exchange(context, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on
         self._regions: tuple[tuple[object, ...], Mapping[str, str]] | None = None
         self._shown: tuple[tuple[object, ...], ShownLandmarks] | None = None
@@ -77,17 +77,17 @@ class Tool:
     @property
     def made(self) -> Landmarks:
         """The landmarks of the open scan."""
-        return self.desk.document.part(Landmarks)
+        return self.context.document.part(Landmarks)
 
     @property
     def frame(self) -> int:
         """The frame that is shown."""
-        return self.desk.index if self.desk.pose is None else self.desk.pose.index
+        return self.context.index if self.context.pose is None else self.context.pose.index
 
     @property
     def shown(self) -> ShownLandmarks:
         """The landmarks in the frame that is shown."""
-        of = self.made.all, self.desk.followed.tracks, self.frame
+        of = self.made.all, self.context.followed.tracks, self.frame
         if self._shown is None or not _same(self._shown[0], of):
             self._shown = of, ShownLandmarks.of(*of)
         return self._shown[1]
@@ -103,14 +103,14 @@ class Tool:
     @property
     def positions(self) -> NDArray[np.float64]:
         """(N, 3): where they are in the picture, NaN where that is not known."""
-        pose = self.desk.pose
+        pose = self.context.pose
         found = self.shown.positions
-        return found if pose is None else self.desk.motion(pose).points(found)
+        return found if pose is None else self.context.motion(pose).points(found)
 
     @property
     def seen(self) -> NDArray[np.bool_]:
         """(N,): which are in the picture with nothing before them; found once a picture."""
-        viewport, shown = self.desk.viewport, self.shown
+        viewport, shown = self.context.viewport, self.shown
         surface, request = viewport.surface, viewport.request
         if surface is None or request is None or not viewport.is_there:
             return shown.is_there
@@ -154,29 +154,29 @@ class Tool:
     @property
     def is_active(self) -> bool:
         """Whether clicks in the view place landmarks."""
-        return self.desk.has_clicks and not self.notebook.is_pinning
+        return self.context.has_clicks and not self.notebook.is_pinning
 
     def toggle(self) -> None:
         """Take up the tool or put it away."""
         was_active = self.is_active
         self.abandon()
         if was_active:
-            self.desk.leave_clicks()
+            self.context.leave_clicks()
         else:
-            self.desk.take_clicks()
-            self.desk.reveal()
+            self.context.take_clicks()
+            self.context.reveal()
 
     def pin_note(self) -> None:
         """Have the next click pin a note."""
         self.abandon()
         self.notebook.is_pinning = True
-        self.desk.take_clicks()
+        self.context.take_clicks()
 
     def on_escape(self) -> bool:
         """Put the tool away; whether it was taken up."""
-        was_active = self.desk.has_clicks
+        was_active = self.context.has_clicks
         self.abandon()
-        self.desk.leave_clicks()
+        self.context.leave_clicks()
         return was_active
 
     def abandon(self) -> None:
@@ -201,7 +201,7 @@ class Tool:
         """Set the next one at what was clicked; raises InputError where it cannot be."""
         if self.notebook.is_pinning:
             self.notebook.pin(click)
-            self.desk.leave_clicks()
+            self.context.leave_clicks()
             return True
         target = self.target
         if target is None and self._pressed:
@@ -218,10 +218,10 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         spot = moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
         if click.through_gap:
-            self.desk.note("No data there; placed on the nearest surface in front.")
+            self.context.note("No data there; placed on the nearest surface in front.")
         self.corrects = self.corrects and bool(landmark.keys)
         self.selected = landmark.name
-        self.desk.change(name, self.made.with_landmark(landmark.with_key(spot)), merge=merge)
+        self.context.change(name, self.made.with_landmark(landmark.with_key(spot)), merge=merge)
 
     def on_press(self, mouse: ImVec2) -> bool:
         """Take hold of the one under the mouse, where one is."""
@@ -241,7 +241,7 @@ class Tool:
         """Show the one that is dragged where it would be, and set it where it is let go."""
         landmark, picked = self.made.named(self._pressed), click.picked
         self.dragged = None if ends or picked is None else picked.place
-        self.desk.redraw()
+        self.context.redraw()
         if ends and landmark is not None:
             if picked is None:
                 raise InputError(f"No surface there: {landmark.name} stays where it was.")
@@ -253,7 +253,9 @@ class Tool:
         number = self.shown.number(self.selected)
         if number is None or not self.shown.is_there[number]:
             return False
-        click = self.desk.seen_at(vector(self.positions[number]), (right, up)) if self.seen[number] else None
+        click = (
+            self.context.seen_at(vector(self.positions[number]), (right, up)) if self.seen[number] else None
+        )
         if click is None or click.pose.index != self.shown.frame:
             raise InputError(f"{self.selected} is hidden in this view: turn the view to move it.")
         if click.picked is not None:
@@ -263,15 +265,15 @@ class Tool:
 
     def take_mirrored(self) -> None:
         """Set the next one where the mirror image of its partner is, on the surface that is seen there."""
-        target, proposal, pose = self.target, self.proposal, self.desk.pose
+        target, proposal, pose = self.target, self.proposal, self.context.pose
         if target is None or proposal is None or pose is None:
             raise InputError(
                 "No mirror place is known: place its mirror partner and a few other pairs first."
             )
-        place = self.desk.motion(pose).points(proposal.position)
-        click = self.desk.seen_at(vector(place))
+        place = self.context.motion(pose).points(proposal.position)
+        click = self.context.seen_at(vector(place))
         deviations, share = _OFF
-        most = deviations * np.nan_to_num(proposal.sigma) + share * self.desk.viewport.bounds(pose).radius
+        most = deviations * np.nan_to_num(proposal.sigma) + share * self.context.viewport.bounds(pose).radius
         if click is None or click.picked is None or np.linalg.norm(click.picked.position - place) > most:
             raise InputError(f"The mirror place of {target.name} is hidden in this view: turn the view.")
         self._set(target, click, "Place landmark")
@@ -303,18 +305,18 @@ class Tool:
             self._look_at(number)
         elif landmark.keys:
             nearest = min(landmark.keys, key=lambda key: abs(key.frame - self.frame))
-            self.desk.seek(nearest.frame)
+            self.context.seek(nearest.frame)
 
     def _look_at(self, number: int) -> None:
         """Bring one into the middle of the view, where it is not seen."""
-        camera, place = self.desk.document.camera, vector(self.positions[number])
+        camera, place = self.context.document.camera, vector(self.positions[number])
         if camera is not None and not self.seen[number]:
-            self.desk.change("Look at landmark", camera=camera.centered(place), pivot=place)
+            self.context.change("Look at landmark", camera=camera.centered(place), pivot=place)
 
     def begin(self, template: Template | None) -> None:
         """Have the landmarks of a template placed, or such of new names; and take up the tool."""
         made = replace(self.made, template="") if template is None else self.made.begun_with(template)
-        self.desk.change("Choose template", made)
+        self.context.change("Choose template", made)
         self.selected = ""
         if not self.is_active:
             self.toggle()
@@ -322,7 +324,7 @@ class Tool:
     def change_selected(self, name: str, landmark: Landmark) -> None:
         """Change the selected one. name: of the step of the history."""
         self.corrects = False
-        self.desk.change(name, self.made.with_landmark(landmark))
+        self.context.change(name, self.made.with_landmark(landmark))
 
     def skip(self) -> None:
         """Leave out the next one, or place it after all."""
@@ -344,17 +346,17 @@ class Tool:
             return
         if self.made.named(name) is not None:
             raise InputError(f"A landmark '{name}' exists already. Choose another name.")
-        self.desk.change("Rename landmark", self.made.renamed(self.selected, name))
+        self.context.change("Rename landmark", self.made.renamed(self.selected, name))
         self.selected = name
 
     def pair(self, partner: str) -> None:
         """Have the selected one and another be mirror images of each other; "": of none."""
-        self.desk.change("Set mirror partner", self.made.paired(self.selected, partner))
+        self.context.change("Set mirror partner", self.made.paired(self.selected, partner))
 
     def delete(self) -> None:
         """Delete the selected one."""
         if self.made.named(self.selected) is not None:
-            self.desk.change("Delete landmark", self.made.without_landmark(self.selected))
+            self.context.change("Delete landmark", self.made.without_landmark(self.selected))
             self.selected, self.corrects = "", False
 
     def take_key_away(self) -> None:
@@ -393,13 +395,15 @@ class Tool:
     def drawn(self, frame: int) -> DrawnMarks:
         """The landmarks over a frame of pictures that are saved."""
         is_now = frame == self.frame
-        shown = self.shown if is_now else ShownLandmarks.of(self.made.all, self.desk.followed.tracks, frame)
-        has_names: bool = self.desk.settings.names
+        shown = (
+            self.shown if is_now else ShownLandmarks.of(self.made.all, self.context.followed.tracks, frame)
+        )
+        has_names: bool = self.context.settings.names
         return DrawnMarks(drawn_landmarks(shown, has_names, self.regions))
 
     def spans(self) -> list[FrameSpan]:
         """The gaps, for the timeline."""
-        of = self.made.all, self.desk.followed.tracks
+        of = self.made.all, self.context.followed.tracks
         if not _same(self._spans[0], of):
             self._spans = of, gap_spans(*of, self.regions)
         return self._spans[1]
@@ -410,7 +414,7 @@ class Tool:
 
     def advance(self, budget: float) -> bool:
         """Have landmarks followed; whether something new was found."""
-        return self.follower.advance(self.desk.settings.follow)
+        return self.follower.advance(self.context.settings.follow)
 
 
 def _same(before: tuple[object, ...], now: tuple[object, ...]) -> bool:
@@ -442,7 +446,7 @@ COMMANDS = {
     "Tools": (
         Command(
             "landmarks", "Place landmarks", Tool.toggle, "K",
-            is_on=lambda tool: tool.is_active, can=lambda tool: tool.desk.document.camera is not None,
+            is_on=lambda tool: tool.is_active, can=lambda tool: tool.context.document.camera is not None,
             short="Landmarks", icon=icons.ICON_FA_LOCATION_DOT,
         ),
         Menu("Landmarks", (

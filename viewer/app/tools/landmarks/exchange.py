@@ -30,9 +30,9 @@ from ....files import working_folder
 from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ....scan.times import frame_in_words
-from ...desk import Desk
 from ...read_dialog import ReadDialog
 from ...save_dialog import SaveDialog
+from ...tool_context import ToolContext
 
 _USUAL = ".mrk.json"
 _SAMPLED = 8  # frames whose bounds stand for those of all
@@ -41,22 +41,24 @@ _SAMPLED = 8  # frames whose bounds stand for those of all
 class Exchange:
     """Reads and saves landmarks of the open scan. templates: by name; those that were read too."""
 
-    def __init__(self, desk: Desk, begin: Callable[[Template], None]) -> None:
+    def __init__(self, context: ToolContext, begin: Callable[[Template], None]) -> None:
         """begin: has the landmarks of a template placed."""
-        self._desk, self._begin = desk, begin
+        self._context, self._begin = context, begin
         self.templates: dict[str, Template] = dict(templates())
         written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
         about = f"The ending sets the format: {_USUAL}, {', '.join(written)}"
-        self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, desk.redraw, written)
+        self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, context.redraw, written)
         about = "A file of landmarks, or a template"
         self._reading = ReadDialog(
-            "Import landmarks", about, ".json", self._read, desk.redraw, landmark_suffixes()
+            "Import landmarks", about, ".json", self._read, context.redraw, landmark_suffixes()
         )
         about = "Saves names, mirror partners and measures, for use in other scans"
-        self._template_saving = SaveDialog("Save template", about, ".json", self._save_template, desk.redraw)
+        self._template_saving = SaveDialog(
+            "Save template", about, ".json", self._save_template, context.redraw
+        )
         about = "A file that 'Save as template...' has written"
         self._template_reading = ReadDialog(
-            "Choose template", about, ".json", self._read_template, desk.redraw
+            "Choose template", about, ".json", self._read_template, context.redraw
         )
         self._doubted: Path | None = None  # file whose landmarks seem to be of another scan
 
@@ -67,7 +69,7 @@ class Exchange:
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self._saving.ask(self._desk.free_file(f"_landmarks{_USUAL}"))
+        self._saving.ask(self._context.free_file(f"_landmarks{_USUAL}"))
 
     def ask_to_read(self) -> None:
         """Open the dialog that reads landmarks or a template."""
@@ -101,20 +103,20 @@ class Exchange:
         self._begin(template)
 
     def _save_template(self, file: Path) -> None:
-        refuse_input(file, self._desk.timeline)
-        made = self._desk.document.part(Landmarks)
+        refuse_input(file, self._context.timeline)
+        made = self._context.document.part(Landmarks)
         template = template_of(file.name.removesuffix(".json"), made.all, made.measures)
         save_template(file, template)
         self.templates[template.name] = template
         told = f"{len(template.landmarks)} landmarks and {len(template.measures)} measures"
-        self._desk.note(f"Saved {file}, {told}.")
+        self._context.note(f"Saved {file}, {told}.")
 
     def _read_landmarks(self, path: Path) -> None:
         """Have a file read beside the window. One that seems to be of another scan is taken at the second
         time."""
-        timeline, desk = self._desk.timeline, self._desk
-        frame = desk.index if desk.pose is None else desk.pose.index
-        unit, known, is_sure = desk.unit, desk.document.part(Landmarks).all, path == self._doubted
+        timeline, context = self._context.timeline, self._context
+        frame = context.index if context.pose is None else context.pose.index
+        unit, known, is_sure = context.unit, context.document.part(Landmarks).all, path == self._doubted
         self._doubted = path
 
         def read() -> tuple[LandmarkSet, tuple[Landmark, ...]]:
@@ -127,25 +129,25 @@ class Exchange:
         def take(result: tuple[LandmarkSet, tuple[Landmark, ...]]) -> None:
             found, landmarks = result
             self._doubted = None
-            if self._desk.timeline is timeline:
+            if self._context.timeline is timeline:
                 self._add(path, found, landmarks)
 
-        desk.run(f"Reading {path.name}", read, take)
+        context.run(f"Reading {path.name}", read, take)
 
     def _add(self, path: Path, found: LandmarkSet, landmarks: tuple[Landmark, ...]) -> None:
-        self._desk.change("Import landmarks", self._desk.document.part(Landmarks).with_read(landmarks))
-        self._desk.reveal()
+        self._context.change("Import landmarks", self._context.document.part(Landmarks).with_read(landmarks))
+        self._context.reveal()
         for text in found.told:
-            self._desk.note(f"{path.name}: {text}.")
+            self._context.note(f"{path.name}: {text}.")
         if beside := told_beside(landmarks):
-            self._desk.note(f"{path.name}: {beside}")
-        self._desk.note(f"Imported {len(landmarks)} landmarks from {path.name}.")
+            self._context.note(f"{path.name}: {beside}")
+        self._context.note(f"Imported {len(landmarks)} landmarks from {path.name}.")
 
     def _save(self, file: Path) -> None:
-        timeline, desk = self._desk.timeline, self._desk
+        timeline, context = self._context.timeline, self._context
         refuse_input(file, timeline)
-        landmarks, tracks = desk.document.part(Landmarks).all, desk.followed.tracks
-        frame, unit = desk.index if desk.pose is None else desk.pose.index, desk.unit
+        landmarks, tracks = context.document.part(Landmarks).all, context.followed.tracks
+        frame, unit = context.index if context.pose is None else context.pose.index, context.unit
         is_one, is_whole = holds_one_moment(file), all(track.is_whole for track in tracks.values())
 
         def save() -> str | None:
@@ -157,9 +159,9 @@ class Exchange:
         def tell(remark: str | None) -> None:
             frames = frame_in_words(frame) if is_one else f"{len(timeline)} frames"
             gaps = "" if is_one or is_whole else "; some frames are not tracked yet, and have no data in it"
-            desk.note(f"Saved {file}, {frames}{gaps}." + (f" {remark}" if remark else ""))
+            context.note(f"Saved {file}, {frames}{gaps}." + (f" {remark}" if remark else ""))
 
-        desk.run(f"Saving {file.name}", save, tell)
+        context.run(f"Saving {file.name}", save, tell)
 
 
 def _bounds(found: LandmarkSet, timeline: Timeline, frame: int) -> Bounds:

@@ -11,20 +11,20 @@ from ....analysis.tracking import Tracker
 from ....document.landmarks import Landmarks
 from ....scan.timeline import Timeline
 from ....task import Task
-from ...desk import Desk
+from ...tool_context import ToolContext
 
 _CALM = 0.2  # seconds without a change of the landmarks before they are tracked anew
 
 
 class Following:
-    """Has the landmarks of the open scan tracked, and tells all tools (`desk.followed`).
+    """Has the landmarks of the open scan tracked, and tells all tools (`context.followed`).
 
     is_stopped: whether the user has cancelled it, until landmarks change or `resume` is called. pending: how
     many of the tracks have frames that nobody has looked at yet.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self._context = context
         self.is_stopped = False
         self.pending = 0
         self._timeline: Timeline | None = None
@@ -38,7 +38,7 @@ class Following:
     @property
     def is_running(self) -> bool:
         """Whether landmarks are being tracked."""
-        return any(work.task is self._task for work in self._desk.works)
+        return any(work.task is self._task for work in self._context.works)
 
     def resume(self) -> None:
         """Go on after the user has cancelled it."""
@@ -49,7 +49,7 @@ class Following:
 
         is_wanted: whether anything is to be tracked now.
         """
-        timeline, landmarks = self._desk.timeline, self._desk.document.part(Landmarks).all
+        timeline, landmarks = self._context.timeline, self._context.document.part(Landmarks).all
         if self._task is not None and not self.is_running:
             self.is_stopped |= self._task.cancelled
             self._is_done, self._task = not self._task.cancelled, None
@@ -62,11 +62,11 @@ class Following:
             self._go_on(self._tracker, is_wanted)
         is_same = timeline is self._timeline  # else what is there is of the scan before
         found: Mapping[str, Track] = self._tracker.tracks if self._tracker and is_same else {}
-        changed = self._desk.followed.take_tracks(found)
+        changed = self._context.followed.take_tracks(found)
         if changed:
             self.pending = sum(not track.is_whole for track in found.values())
         is_left = self.pending > 0 and not (self._is_done or self.is_stopped)
-        self._desk.followed.is_following = self.is_running or (is_wanted and is_left)
+        self._context.followed.is_following = self.is_running or (is_wanted and is_left)
         return changed
 
     def _take_up(self, timeline: Timeline, landmarks: Sequence[Landmark]) -> None:
@@ -76,12 +76,12 @@ class Following:
         self._tracker, self._is_done, self.is_stopped = None, False, False
         self._begins_at = time.monotonic() + _CALM
         if any(landmark.keys for landmark in landmarks):
-            self._looked_at = self._desk.index
+            self._looked_at = self._context.index
             self._tracker = Tracker(timeline, landmarks, first=self._looked_at, known=known)
 
     def _go_on(self, tracker: Tracker, is_wanted: bool) -> None:
-        if self._desk.index != self._looked_at:
-            self._looked_at = self._desk.index
+        if self._context.index != self._looked_at:
+            self._looked_at = self._context.index
             tracker.look_at(self._looked_at)
         waits = self.is_stopped or self._is_done or time.monotonic() < self._begins_at
         if is_wanted and self._task is None and not waits:
@@ -93,4 +93,4 @@ class Following:
                 for _ in tracker.run():
                     pass
 
-            self._task = self._desk.run("Tracking landmarks", follow, lambda _: None)
+            self._task = self._context.run("Tracking landmarks", follow, lambda _: None)

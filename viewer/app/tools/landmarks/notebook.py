@@ -13,8 +13,8 @@ from ....errors import InputError
 from ....geometry import vector
 from ....scan.times import frame_in_words
 from ... import widgets
-from ...desk import Click, Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
+from ...tool_context import Click, ToolContext
 
 _COLOR = 0xF2E36B
 _CORNER = ImVec2(1.0, 3.4)  # where notes on the frame begin, in heights of the font
@@ -23,18 +23,18 @@ _CORNER = ImVec2(1.0, 3.4)  # where notes on the frame begin, in heights of the 
 class Notebook:
     """The notes of the open scan. is_pinning: whether the next click pins one."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self._context = context
         self.is_pinning = False
         self._takes_keyboard = False  # the field of the last one
 
     @property
     def _notes(self) -> tuple[Note, ...]:
-        return self._desk.document.part(Landmarks).notes
+        return self._context.document.part(Landmarks).notes
 
     def _change(self, name: str, notes: tuple[Note, ...], merge: object = None) -> None:
-        made = replace(self._desk.document.part(Landmarks), notes=notes)
-        self._desk.change(name, made, merge=merge)
+        made = replace(self._context.document.part(Landmarks), notes=notes)
+        self._context.change(name, made, merge=merge)
 
     def pin(self, click: Click) -> None:
         """Add a note at what was clicked, in its frame; raises InputError where nothing is."""
@@ -51,11 +51,11 @@ class Notebook:
     def _add(self, note: Note) -> None:
         self._change("Add note", (*self._notes, note))
         self._takes_keyboard = True
-        self._desk.reveal()
+        self._context.reveal()
 
     def draw_over(self, frame: int, canvas: Canvas, view: ViewPlace) -> None:
         """Draw the notes of a frame over the picture: at their places, those on the frame in a corner."""
-        pose, labels, below = self._desk.pose, [], view.corner + _CORNER * canvas.em
+        pose, labels, below = self._context.pose, [], view.corner + _CORNER * canvas.em
         for note in self._notes:
             if note.frame not in (None, frame) or pose is None:
                 continue
@@ -63,7 +63,7 @@ class Notebook:
                 plate = Label([note.text or "..."], np.array([(below.x, below.y)]), _COLOR)
                 below = plate.draw_at(below)
                 continue
-            place = view.on_screen(vector(self._desk.motion(pose).points(np.array(note.position))))
+            place = view.on_screen(vector(self._context.motion(pose).points(np.array(note.position))))
             if place is not None and view.box.clipped(place, place) is not None:
                 canvas.point(place, _COLOR)
                 labels.append(Label([note.text or "..."], np.array([(place.x, place.y)]), _COLOR))
@@ -98,9 +98,9 @@ class Notebook:
             self._change("Edit note", edited, merge=("note", number))
 
     def _go_to(self, note: Note) -> None:
-        camera, pose = self._desk.document.camera, self._desk.pose
+        camera, pose = self._context.document.camera, self._context.pose
         if note.frame is not None:
-            self._desk.seek(note.frame)
+            self._context.seek(note.frame)
         if note.position is not None and camera is not None and pose is not None:
-            place = vector(self._desk.motion(pose).points(np.array(note.position)))
-            self._desk.change("Look at note", camera=camera.centered(place), pivot=place)
+            place = vector(self._context.motion(pose).points(np.array(note.position)))
+            self._context.change("Look at note", camera=camera.centered(place), pivot=place)

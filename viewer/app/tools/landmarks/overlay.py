@@ -39,7 +39,7 @@ def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlac
     selected = shown.number(tool.selected)
     if selected is not None and selected in drawn:
         canvas.ring(ImVec2(*places[selected].tolist()), _CHOSEN, float(alphas[selected]))
-    if tool.desk.settings.names and len(drawn):
+    if tool.context.settings.names and len(drawn):
         _draw_names(tool, drawn, places, alphas, canvas, view)
     if tool.is_active:
         _draw_under_way(tool, canvas, view)
@@ -79,9 +79,9 @@ def _label(
 
 def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:
     """The mirrored place of the next one, the one that is dragged, and the loupe."""
-    pose, proposal = tool.desk.pose, tool.proposal
+    pose, proposal = tool.context.pose, tool.proposal
     if proposal is not None and pose is not None:
-        there = view.on_screen(vector(tool.desk.motion(pose).points(proposal.position)))
+        there = view.on_screen(vector(tool.context.motion(pose).points(proposal.position)))
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
             label = Label(["mirror place: A sets it"], np.array([(there.x, there.y)]), _GHOST, faint=True)
@@ -89,5 +89,5 @@ def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:
     if tool.dragged is not None and (there := view.on_screen(tool.dragged)) is not None:
         canvas.ring(there, _CHOSEN)
     is_placing = tool.target is not None or tool.is_free or tool.dragged is not None
-    if view.is_hovered and is_placing and tool.desk.settings.loupe:
+    if view.is_hovered and is_placing and tool.context.settings.loupe:
         canvas.loupe(imgui.get_mouse_pos())

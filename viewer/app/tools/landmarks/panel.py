@@ -63,8 +63,8 @@ def draw(tool: Tool, ui: Ui) -> None:
         tool.notebook.add_to_frame(tool.frame)
     ui.tooltip("Add a note to this whole frame", "note_at_frame")
     tool.notebook.draw_list()
-    settings = tool.desk.settings
-    tool.desk.settings = widgets.edit(settings, type(settings)(), rest="More landmark options")
+    settings = tool.context.settings
+    tool.context.settings = widgets.edit(settings, type(settings)(), rest="More landmark options")
 
 
 def _draw_template(tool: Tool) -> None:
@@ -146,7 +146,7 @@ def _draw_row(tool: Tool, number: int, height: float) -> None:
     name = widgets.fitted(printable(landmark.title), right - left - gap.x)
     draw_list.add_text(ImVec2(left, corner.y), imgui.get_color_u32(imgui.Col_.text), name)
     draw_list.add_text(ImVec2(right, corner.y), faint, state)
-    words = widgets.fitted(place_words(shown, number, tool.desk.scale), room)
+    words = widgets.fitted(place_words(shown, number, tool.context.scale), room)
     below = corner.y + imgui.get_text_line_height_with_spacing()
     draw_list.add_text(ImVec2(left, below), faint, words)
 
@@ -188,9 +188,9 @@ def _draw_partner(tool: Tool, landmark: Landmark) -> None:
 
 def _draw_following(tool: Tool) -> None:
     """Say how far landmarks are followed through time."""
-    if len(tool.desk.timeline) < 2 or not tool.desk.followed.tracks:
+    if len(tool.context.timeline) < 2 or not tool.context.followed.tracks:
         return
-    tracks, pending = tool.desk.followed.tracks, tool.follower.pending
+    tracks, pending = tool.context.followed.tracks, tool.follower.pending
     if tool.follower.is_running:
         widgets.faint(f"Tracking {pending} of {len(tracks)} landmarks through all frames ...")
     elif pending and tool.follower.is_stopped:

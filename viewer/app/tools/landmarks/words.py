@@ -12,7 +12,7 @@ from ....analysis.landmarks import Landmark
 from ....analysis.track import Known, Track
 from ....output.overlays import STATE_MARKS
 from ....scan.units import Scale
-from ...desk import FrameSpan
+from ...tool_context import FrameSpan
 from .shown import ShownLandmarks
 
 _GAP_COLOR = STATE_MARKS[Known.GAP].color

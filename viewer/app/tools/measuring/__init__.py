@@ -22,10 +22,10 @@ from ....files import working_folder
 from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ...commands import Command, Menu
-from ...desk import Click, Desk
 from ...read_dialog import ReadDialog
 from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
+from ...tool_context import Click, ToolContext
 from ...ui import Ui
 from . import overlay, panel
 from .words import distance_words
@@ -41,13 +41,13 @@ class Tool:
     where holes are filled. saving, reading: dialogs that name a file.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self.context = context
         self.filled = False
         about = "All distances, as a table of comma separated values"
-        self.saving = SaveDialog("Export distances", about, ".csv", self._save, desk.redraw)
+        self.saving = SaveDialog("Export distances", about, ".csv", self._save, context.redraw)
         about = "A table that 'Export distances...' has written of this scan"
-        self.reading = ReadDialog("Import distances", about, ".csv", self._read, desk.redraw)
+        self.reading = ReadDialog("Import distances", about, ".csv", self._read, context.redraw)
         self.begun: Spot | None = None
         self._seen: tuple[object, dict[Spot, bool]] = None, {}
         self._told: list[str] = []
@@ -57,29 +57,29 @@ class Tool:
     @property
     def made(self) -> Measurements:
         """The measurements of the open scan."""
-        return self.desk.document.part(Measurements)
+        return self.context.document.part(Measurements)
 
     def delete(self, number: int) -> None:
         """Take away the one at this place, counted from 0."""
-        self.desk.change("Delete distance", self.made.without(number))
+        self.context.change("Delete distance", self.made.without(number))
 
     def clear(self) -> None:
         """Take away all."""
-        self.desk.change("Clear distances", Measurements())
+        self.context.change("Clear distances", Measurements())
 
     @property
     def is_active(self) -> bool:
         """Whether clicks in the view set ends."""
-        return self.desk.has_clicks
+        return self.context.has_clicks
 
     def toggle(self) -> None:
         """Take up the tool or put it away; a measurement that was begun goes with it."""
         self.begun = None
         if self.is_active:
-            self.desk.leave_clicks()
+            self.context.leave_clicks()
         else:
-            self.desk.take_clicks()
-            self.desk.reveal()
+            self.context.take_clicks()
+            self.context.reveal()
         log.debug("measuring %s", "begins" if self.is_active else "ends")
 
     def on_escape(self) -> bool:
@@ -107,10 +107,10 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         end = Spot.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
-            self.desk.note("No data there; placed on the nearest surface in front.")
+            self.context.note("No data there; placed on the nearest surface in front.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
         self.set_end(end)
-        _learn_topology(self.desk.timeline, click.pose.index)
+        _learn_topology(self.context.timeline, click.pose.index)
         return True
 
     def panel(self, ui: Ui) -> None:
@@ -139,46 +139,46 @@ class Tool:
             self.begun = first or end
             return
         made = Measurement(first, end)
-        self.desk.change("Measure", self.made.added(made))
-        self.desk.reveal()
+        self.context.change("Measure", self.made.added(made))
+        self.context.reveal()
         log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
 
     def readings(self) -> list[Reading]:
         """The measurements as they stand in the frame that is shown; none before the first."""
-        pose, one_topology = self.desk.pose, self.desk.timeline.one_topology
+        pose, one_topology = self.context.pose, self.context.timeline.one_topology
         if pose is None:
             return []
-        motion = self.desk.motion(pose)
+        motion = self.context.motion(pose)
         return [reading_of(measurement, pose, one_topology, motion) for measurement in self.made.all]
 
     def watch(self, readings: Sequence[Reading]) -> None:
         """Tell when measurements that followed their points no longer can; note in the log what they read."""
-        scan, timeline = self.desk.scan, self.desk.timeline
+        scan, timeline = self.context.scan, self.context.timeline
         one_topology = timeline.one_topology
         if readings and self._learned is not timeline:  # opened again, with measurements of before
             self._learned = timeline
-            _learn_topology(timeline, self.desk.index)
+            _learn_topology(timeline, self.context.index)
         if one_topology:
             self._followed = scan
         elif self._followed == scan and one_topology is False:
             self._followed = ""
             if readings:
-                self.desk.note("Not all frames have the same points: distances stay fixed in space.")
-        told = [f"{distance_words(reading, self.desk.scale)}, {reading.motion}" for reading in readings]
+                self.context.note("Not all frames have the same points: distances stay fixed in space.")
+        told = [f"{distance_words(reading, self.context.scale)}, {reading.motion}" for reading in readings]
         if told != self._told:
             self._told = told
             log.debug("measurements: %s", "; ".join(told) or "none")
 
     def is_seen(self, end: Spot) -> bool:
         """Whether an end is in the picture and not behind what that shows; found once a picture."""
-        surface, shown = self.desk.viewport.surface, self.desk.viewport.request
-        if surface is None or shown is None or not self.desk.viewport.is_there:
+        surface, shown = self.context.viewport.surface, self.context.viewport.request
+        if surface is None or shown is None or not self.context.viewport.is_there:
             return True
         if self._seen[0] is not shown:
             self._seen = shown, {}
         known = self._seen[1]
         if end not in known:
-            slack = spot_slack(end, self.desk.viewport.bounds(shown.pose).radius)
+            slack = spot_slack(end, self.context.viewport.bounds(shown.pose).radius)
             known[end] = is_seen(surface, end.position, slack)
         return known[end]
 
@@ -187,28 +187,28 @@ class Tool:
     def copy(self) -> None:
         """Put a table of all into the clipboard, for spreadsheets."""
         imgui.set_clipboard_text(to_text(self._table(), "\t"))
-        self.desk.note(f"Copied {len(self.made.all)} distances as a table.")
+        self.context.note(f"Copied {len(self.made.all)} distances as a table.")
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self.saving.ask(self.desk.free_file("_distances.csv"))
+        self.saving.ask(self.context.free_file("_distances.csv"))
 
     def _save(self, file: Path) -> None:
-        timeline, pose = self.desk.timeline, self.desk.pose
+        timeline, pose = self.context.timeline, self.context.pose
         refuse_input(file, timeline)
-        is_still = pose is None or self.desk.motion(pose).is_identity
+        is_still = pose is None or self.context.motion(pose).is_identity
         if not (timeline.one_topology and len(timeline) > 1 and is_still):
             save_rows(file, self._table())
-            self.desk.note(f"Saved {file}")
+            self.context.note(f"Saved {file}")
             return
-        made, scale = self.made.all, self.desk.scale
+        made, scale = self.made.all, self.context.scale
 
         def save_all_frames() -> None:
             rows = readings_in_frames(made, len(timeline), timeline.visit, one_topology=True)
             save_rows(file, table(rows, timeline.name, scale.unit, scale.factor))
 
         told = f"Saved {file}, in all {len(timeline)} frames"
-        self.desk.run(f"Saving {file.name}", save_all_frames, lambda _: self.desk.note(told))
+        self.context.run(f"Saving {file.name}", save_all_frames, lambda _: self.context.note(told))
 
     def ask_to_read(self) -> None:
         """Open the dialog that reads measurements back."""
@@ -223,22 +223,24 @@ class Tool:
         file is such a table."""
         if not is_measurement_table(path):
             return False
-        pose, timeline = self.desk.pose, self.desk.timeline
-        if pose is not None and not self.desk.motion(pose).is_identity:
-            self.desk.note("The scan is moved: turn off Remove head motion, then open the table again.")
+        pose, timeline = self.context.pose, self.context.timeline
+        if pose is not None and not self.context.motion(pose).is_identity:
+            self.context.note("The scan is moved: turn off Remove head motion, then open the table again.")
             return True
-        work = partial(read_measurements, path, timeline.name, self.desk.unit, len(timeline), timeline.pose)
-        self.desk.run(f"Reading {path.name}", work, self._add)
+        work = partial(
+            read_measurements, path, timeline.name, self.context.unit, len(timeline), timeline.pose
+        )
+        self.context.run(f"Reading {path.name}", work, self._add)
         return True
 
     def _add(self, read: Sequence[Measurement]) -> None:
         known = {_places(measurement) for measurement in self.made.all}
         new = tuple(measurement for measurement in read if _places(measurement) not in known)
         if new:
-            self.desk.change("Import distances", Measurements((*self.made.all, *new)))
-            self.desk.reveal()
+            self.context.change("Import distances", Measurements((*self.made.all, *new)))
+            self.context.reveal()
         there = f", {len(read) - len(new)} exist already" if len(new) < len(read) else ""
-        self.desk.note(f"Imported {len(new)} distances{there}.")
+        self.context.note(f"Imported {len(new)} distances{there}.")
 
     def _table(self) -> list[list[object]]:
         """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
@@ -247,8 +249,8 @@ class Tool:
             rows.append((number, Reading(made, reading.fixed)))
             if reading.measurement != made:
                 rows.append((number, reading))
-        scale = self.desk.scale
-        return table(rows, self.desk.timeline.name, scale.unit, scale.factor)
+        scale = self.context.scale
+        return table(rows, self.context.timeline.name, scale.unit, scale.factor)
 
 
 def _places(measurement: Measurement) -> tuple[object, ...]:
@@ -277,7 +279,7 @@ COMMANDS = {
     "Tools": (
         Command(
             "measure", "Measure distance", Tool.toggle, "M",
-            is_on=lambda tool: tool.is_active, can=lambda tool: tool.desk.document.camera is not None,
+            is_on=lambda tool: tool.is_active, can=lambda tool: tool.context.document.camera is not None,
             short="Distances", icon=icons.ICON_FA_RULER,
         ),
         Menu("Distances", (

@@ -46,7 +46,7 @@ def _draw_one(
     seen = view.box.clipped(there[0], there[-1]) if there else None
     if seen is None:
         return None
-    text = f"{number}:  {distance_words(reading, measuring.desk.scale)}"
+    text = f"{number}:  {distance_words(reading, measuring.context.scale)}"
     line = np.array([(place.x, place.y) for place in seen])
     return Label([text], line, LINE_COLOR, faint=alpha < 1)
 

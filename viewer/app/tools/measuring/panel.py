@@ -42,15 +42,15 @@ def _draw_row(measuring: Tool, number: int, reading: Reading) -> bool:
     """Number and distance, what the ends snapped to below; whether it is to be deleted."""
     right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
     imgui.align_text_to_frame_padding()
-    imgui.text(f"{number + 1}:  {distance_words(reading, measuring.desk.scale)}")
-    widgets.tooltip(_details(reading, measuring.desk.scale))
+    imgui.text(f"{number + 1}:  {distance_words(reading, measuring.context.scale)}")
+    widgets.tooltip(_details(reading, measuring.context.scale))
     imgui.same_line(right - 1.3 * imgui.get_frame_height())
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
     words = snap_words(reading)
-    if len(measuring.desk.timeline) > 1:
+    if len(measuring.context.timeline) > 1:
         words += f", {reading.motion}"
     imgui.text_disabled(widgets.fitted(words, imgui.get_content_region_avail().x))
-    if reading.fixed and len(measuring.desk.timeline) > 1:
+    if reading.fixed and len(measuring.context.timeline) > 1:
         widgets.tooltip(f"Fixed in space: {reading.fixed}")
     return is_deleted
 

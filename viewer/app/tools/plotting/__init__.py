@@ -21,9 +21,9 @@ from ....output.overlays import NOTHING_DRAWN, DrawnMarks
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
 from ...commands import Command, Menu
-from ...desk import Click, Desk
 from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
+from ...tool_context import Click, ToolContext
 from ...ui import Ui
 from . import panel, plot
 from .adding import Adding
@@ -47,19 +47,19 @@ class Tool:
     points at in the table, by name.
     """
 
-    def __init__(self, desk: Desk) -> None:
-        self.desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self.context = context
         self.shown = Shown()
-        self.ways = Ways(desk)
-        self.lines = MeasureLines(desk)
+        self.ways = Ways(context)
+        self.lines = MeasureLines(context)
         self.adding = Adding()
-        self.lasso = Lasso(desk)
-        self.measurer = Measurer(desk)
+        self.lasso = Lasso(context)
+        self.measurer = Measurer(context)
         self.pointed: str | None = None
         self.renaming = Renaming()
         self.saving = SaveDialog(
             "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
-            PLOT_SUFFIXES[0], self._save, desk.redraw, PLOT_SUFFIXES[1:],
+            PLOT_SUFFIXES[0], self._save, context.redraw, PLOT_SUFFIXES[1:],
         )  # fmt: skip
         self._words = Kept()
         self._fitted: object = None  # what the axes were fitted to last
@@ -67,28 +67,28 @@ class Tool:
     @property
     def settings(self) -> Settings:
         """The choices whatever the scan."""
-        settings: Settings = self.desk.settings
+        settings: Settings = self.context.settings
         return settings
 
     @settings.setter
     def settings(self, settings: Settings) -> None:
-        self.desk.settings = settings
+        self.context.settings = settings
 
     @property
     def choices(self) -> CurveChoices:
         """The choices about the open scan."""
-        return self.desk.document.part(CurveChoices)
+        return self.context.document.part(CurveChoices)
 
     def choose(self, step: str, **changes: Any) -> None:
         """Change choices about the open scan. step: what Undo calls it."""
-        self.desk.change(
+        self.context.change(
             step, replace(self.choices, **changes), merge=(step, *changes) if "noise" in changes else None
         )
 
     @property
     def landmarks(self) -> Landmarks:
         """The landmarks of the open scan, and the measures of them."""
-        return self.desk.document.part(Landmarks)
+        return self.context.document.part(Landmarks)
 
     @property
     def placed(self) -> list[str]:
@@ -98,14 +98,14 @@ class Tool:
     @property
     def times(self) -> NDArray[np.float64]:
         """(T,) seconds, of the scan's frames."""
-        return self.desk.timeline.times
+        return self.context.timeline.times
 
     # --- the drawer -------------------------------------------------------------------
 
     def toggle(self) -> None:
         """Show the curves, or put them away."""
         self.settings = replace(self.settings, is_open=not self.settings.is_open)
-        self.desk.redraw()
+        self.context.redraw()
 
     def is_below(self) -> bool:
         """Whether curves are shown under the timeline."""
@@ -122,11 +122,11 @@ class Tool:
     def update(self) -> None:
         """Find what is plotted now."""
         ways = self.ways.trajectories(self.settings, self.choices)
-        count, series = len(self.times), self.desk.followed.series
+        count, series = len(self.times), self.context.followed.series
         fitting = {
             name: one for name, one in series.items() if len(one.times) == count
         }  # not of a scan before
-        self.shown.take(fitting, self.choices, self.settings, self.desk.scale, ways)
+        self.shown.take(fitting, self.choices, self.settings, self.context.scale, ways)
 
     def fit(self) -> None:
         """Have the axes show all of the curves."""
@@ -134,8 +134,13 @@ class Tool:
 
     def takes_fit(self, shown: CurvePlot) -> bool:
         """Whether the axes are to be fitted, once: to other curves, or to ones that are still being found."""
-        kind = self.desk.scan, self.settings.mode, self.settings.order, *(line.label for line in shown.drawn)
-        now = (shown, kind) if self.desk.followed.is_busy else (None, kind)
+        kind = (
+            self.context.scan,
+            self.settings.mode,
+            self.settings.order,
+            *(line.label for line in shown.drawn),
+        )
+        now = (shown, kind) if self.context.followed.is_busy else (None, kind)
         is_due = self._fitted is None or self._fitted != now
         self._fitted = now
         return is_due
@@ -151,13 +156,13 @@ class Tool:
         if any(one.name == measure.name for one in self.landmarks.measures):
             raise InputError(f"A measure '{measure.name}' exists already.")
         measures = (*self.landmarks.measures, measure)
-        self.desk.change("Add measure", replace(self.landmarks, measures=measures))
+        self.context.change("Add measure", replace(self.landmarks, measures=measures))
         self.settings = replace(self.settings, is_open=True)
 
     def delete(self, name: str) -> None:
         """Take away a measure."""
         measures = tuple(one for one in self.landmarks.measures if one.name != name)
-        self.desk.change("Delete measure", replace(self.landmarks, measures=measures))
+        self.context.change("Delete measure", replace(self.landmarks, measures=measures))
 
     def rename(self, old: str, new: str) -> None:
         """Give a measure another name. Raises InputError for one that is taken."""
@@ -167,7 +172,7 @@ class Tool:
         if any(one.name == new for one in self.landmarks.measures):
             raise InputError(f"A measure '{new}' exists already. Choose another name.")
         made = self.landmarks.with_measure_renamed(old, new)
-        self.desk.change("Rename measure", made, self.choices.with_measure_renamed(old, new))
+        self.context.change("Rename measure", made, self.choices.with_measure_renamed(old, new))
 
     def measure_distance(self) -> None:
         """Measure the distance of the two landmarks that stand last among those that are placed."""
@@ -222,10 +227,10 @@ class Tool:
 
     def drawn(self, frame: int) -> DrawnMarks:
         """The ways of landmarks and what is measured over a frame, for pictures that are saved."""
-        pose = self.desk.pose
+        pose = self.context.pose
         if pose is None:
             return NOTHING_DRAWN
-        radius = self.desk.viewport.bounds(pose).radius
+        radius = self.context.viewport.bounds(pose).radius
         found = self.ways.drawn(self.settings, self.choices, frame, radius)
         if self.is_below() and self.shown.plot is not None:
             found = replace(found, plot=self.shown.plot.drawn_below())
@@ -248,7 +253,7 @@ class Tool:
         """Show the scan with the motion of the rigid references removed, or as it was recorded."""
         self.settings = replace(self.settings, hold=not self.settings.hold)
         if self.settings.hold and self.ways.still(self.choices) is None and self.ways.problem:
-            self.desk.note(self.ways.problem)
+            self.context.note(self.ways.problem)
 
     def show_lines(self) -> None:
         """Draw what is measured in the view, or not."""
@@ -264,17 +269,17 @@ class Tool:
         """Put what is plotted into the clipboard, as a table for spreadsheets."""
         if self.shown.plot is not None:
             imgui.set_clipboard_text(to_text(self.shown.plot.rows(), "\t"))
-            self.desk.note(f"Copied {len(self.shown.plot.lines)} curves as a table.")
+            self.context.note(f"Copied {len(self.shown.plot.lines)} curves as a table.")
 
     def copy_numbers(self) -> None:
         """Put amplitude, onset, peak and duration of each curve into the clipboard, as a table."""
         rows = [NUMBER_COLUMNS, *number_rows(self.shown.curves)]
         imgui.set_clipboard_text(to_text(rows, "\t"))
-        self.desk.note(f"Copied the numbers of {len(self.shown.curves)} curves as a table.")
+        self.context.note(f"Copied the numbers of {len(self.shown.curves)} curves as a table.")
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
-        self.saving.ask(self.desk.free_file(f"_measures{PLOT_SUFFIXES[0]}"))
+        self.saving.ask(self.context.free_file(f"_measures{PLOT_SUFFIXES[0]}"))
 
     def _save(self, file: Path) -> None:
         """Save what is plotted; beside a table, the numbers of the movements as another one."""
@@ -283,7 +288,7 @@ class Tool:
             raise InputError("There are no curves to save.")
         files = [file, numbers_file(file)] if file.suffix.lower() == ".csv" else [file]
         for path in files:
-            refuse_input(path, self.desk.timeline)
+            refuse_input(path, self.context.timeline)
 
         def save() -> None:
             shown.save(file)
@@ -291,7 +296,7 @@ class Tool:
                 save_rows(path, [NUMBER_COLUMNS, *number_rows(curves)])
 
         words = f"Saved {' and '.join(map(str, files))}"
-        self.desk.run(f"Saving {file.name}", save, lambda _: self.desk.note(words))
+        self.context.run(f"Saving {file.name}", save, lambda _: self.context.note(words))
 
 
 def _with_plot(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:

@@ -13,8 +13,8 @@ from ....analysis.spot import Spot, moved_spot
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
-from ...desk import Click, Desk
 from ...scene.canvas import Canvas, ViewPlace
+from ...tool_context import Click, ToolContext
 
 FEWEST, MOST = 6, 16  # corners of a region
 _OFF = 0.03  # of its width, that the outline may run off the line from corner to corner
@@ -25,15 +25,15 @@ _TITLE = "Region"
 class Lasso:
     """The lasso. through: whether regions hold what is before and behind them as well."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, context: ToolContext) -> None:
         self.through = False
-        self._desk = desk
+        self._context = context
         self._places: list[Vector] = []  # that were drawn over, where the scan is shown
 
     @property
     def is_drawn(self) -> bool:
         """Whether drags in the view draw one, now or next."""
-        return self._desk.has_clicks
+        return self._context.has_clicks
 
     @property
     def is_under_way(self) -> bool:
@@ -43,13 +43,13 @@ class Lasso:
     def toggle(self) -> None:
         """Have the next drag draw one, or not."""
         if not self.put_away():
-            self._desk.take_clicks()
+            self._context.take_clicks()
 
     def put_away(self) -> bool:
         """Let drags be as without it; whether they were not."""
         was_drawn = self.is_drawn
         self._places.clear()
-        self._desk.leave_clicks()
+        self._context.leave_clicks()
         return was_drawn
 
     def abandon(self) -> None:
@@ -60,7 +60,7 @@ class Lasso:
         """The drag has come to a place. Raises InputError where it ends and has gone round nothing."""
         if click.picked is not None:
             self._places.append(click.picked.place)
-        self._desk.redraw()
+        self._context.redraw()
         if ends:
             places = without_overlap(np.array(self._places).reshape(-1, 3))
             self._places.clear()
@@ -68,7 +68,7 @@ class Lasso:
 
     def _add(self, places: NDArray[np.float64]) -> None:
         """Add a region: landmarks at its corners, its area and its outline."""
-        made = self._desk.document.part(Landmarks)
+        made = self._context.document.part(Landmarks)
         spots = [self._spot(place) for place in (places[corners_of(places)] if len(places) > 2 else ())]
         found = [spot for spot in spots if spot is not None]
         if len(found) < 3:
@@ -82,12 +82,12 @@ class Lasso:
             Measure(f"{name}, perimeter", "perimeter", names, options),
         )
         made = replace(made, all=(*made.all, *landmarks), measures=(*made.measures, *measures))
-        self._desk.change("Add region", made)
+        self._context.change("Add region", made)
         self.put_away()
 
     def _spot(self, place: NDArray[np.float64]) -> Spot | None:
         """The spot at a place that was drawn over; None where nothing was measured there."""
-        click = self._desk.seen_at(vector(place))
+        click = self._context.seen_at(vector(place))
         if click is None or click.picked is None or not click.picked.measured:
             return None
         return moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)

@@ -16,8 +16,8 @@ from ....output.overlays import DIM_LINE, DrawnPath, rounded
 from ....output.plots import color_of_curve
 from ....rigid import Rigid
 from ....scan.units import Scale
-from ...desk import Desk
 from ...scene.canvas import Canvas, Label, ViewPlace
+from ...tool_context import ToolContext
 from .seen import seen_in_view
 from .shown import Kept
 from .words import with_note, with_spread
@@ -39,18 +39,18 @@ class ShownLine:
 class MeasureLines:
     """The lines of the measures that are plotted, in the frame that is shown; found once a picture."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self._context = context
         self._kept = Kept()
 
     def shown(self, measures: tuple[Measure, ...], hidden: tuple[str, ...]) -> tuple[ShownLine, ...]:
         """The lines of measures but for hidden ones, where they are in the picture."""
-        desk, pose = self._desk, self._desk.pose
+        context, pose = self._context, self._context.pose
         if pose is None:
             return ()
-        request = desk.viewport.request if desk.viewport.is_there else None
-        motion = desk.motion(pose)
-        inputs = measures, hidden, desk.followed.series, desk.followed.tracks, pose, motion
+        request = context.viewport.request if context.viewport.is_there else None
+        motion = context.motion(pose)
+        inputs = measures, hidden, context.followed.series, context.followed.tracks, pose, motion
         placed = self._kept.of("placed", inputs, lambda: self._placed(measures, hidden, pose.index, motion))
         return self._kept.of("lines", (placed, request), lambda: self._with_seen(placed))
 
@@ -64,7 +64,7 @@ class MeasureLines:
     def _with_seen(self, placed: Sequence[tuple[str, int, NDArray[np.float64]]]) -> tuple[ShownLine, ...]:
         if not placed:
             return ()
-        seen = seen_in_view(self._desk, np.concatenate([places for *_, places in placed]))
+        seen = seen_in_view(self._context, np.concatenate([places for *_, places in placed]))
         parts = np.split(seen, ends_of([places for *_, places in placed]))
         return tuple(ShownLine(*one, part) for one, part in zip(placed, parts, strict=True))
 
@@ -73,7 +73,7 @@ class MeasureLines:
     ) -> Iterator[tuple[str, int, NDArray[np.float64]]]:
         """The lines of measures but for hidden ones in a frame: the measure, its colour, and places (P, 3) as
         the scan has them."""
-        series, tracks = self._desk.followed.series, self._desk.followed.tracks
+        series, tracks = self._context.followed.series, self._context.followed.tracks
         numbers = {name: number for number, name in enumerate(series)}
         for measure in measures:
             if measure.name in hidden or measure.name not in series:
@@ -101,7 +101,7 @@ class MeasureLines:
             path = DrawnPath(rounded(places, radius), (color,))
             if name in untold:
                 untold.discard(name)
-                value = value_in_words(self._desk.followed.series[name], frame, self._desk.scale)
+                value = value_in_words(self._context.followed.series[name], frame, self._context.scale)
                 path = replace(path, name=name, value=value)
             drawn.append(path)
         return tuple(drawn)
@@ -115,7 +115,7 @@ class MeasureLines:
         view: ViewPlace,
     ) -> None:
         """Draw the lines, and the values of a few. pointed: the measure that the mouse points at, by name."""
-        pose, labels = self._desk.pose, []
+        pose, labels = self._context.pose, []
         shown = self.shown(measures, hidden)
         if not shown:
             return
@@ -129,7 +129,7 @@ class MeasureLines:
             canvas.path(on_screen, [line.color] * len(alphas), alphas, dots=False)
             if line.measure in told and pose is not None and np.isfinite(on_screen).all():
                 told.discard(line.measure)
-                series, scale = self._desk.followed.series[line.measure], self._desk.scale
+                series, scale = self._context.followed.series[line.measure], self._context.scale
                 if view.shows(on_screen):
                     text = f"{line.measure}: {value_in_words(series, pose.index, scale)}"
                     labels.append(Label([text], on_screen, line.color, faint=not line.seen.any()))

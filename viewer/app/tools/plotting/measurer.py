@@ -13,7 +13,7 @@ from ....analysis.track import Track
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....task import Task
-from ...desk import Desk
+from ...tool_context import ToolContext
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +41,10 @@ Found = dict[str, tuple[Inputs, Series]]  # by the name of the measure
 
 class Measurer:
     """Finds the series of measures, each again where its landmarks were tracked anew, and tells all tools
-    (`desk.followed`). is_running: whether measures of surfaces are being found."""
+    (`context.followed`). is_running: whether measures of surfaces are being found."""
 
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+    def __init__(self, context: ToolContext) -> None:
+        self._context = context
         self._found: Found = {}
         self._asked: dict[str, Inputs] = {}  # those of surfaces that were asked for last, found or not
         self._begun: Found = {}  # of those that are being found, as far as they are
@@ -54,7 +54,7 @@ class Measurer:
     @property
     def is_running(self) -> bool:
         """Whether measures of surfaces are being found."""
-        return any(work.task is self._task for work in self._desk.works)
+        return any(work.task is self._task for work in self._context.works)
 
     def advance(self, budget: float, noise: float) -> bool:
         """Find what is left to find, for so many milliseconds; whether there is something new, or left.
@@ -62,7 +62,7 @@ class Measurer:
         While landmarks are being tracked, measures of them stand as they were until they are found anew.
         """
         ends = time.perf_counter() + budget / 1e3
-        wanted = self._wanted(self._desk.document.part(Landmarks).measures, noise)
+        wanted = self._wanted(self._context.document.part(Landmarks).measures, noise)
         self._take_over(wanted)
         missing = [one for name, one in wanted.items() if not one.is_like(self._inputs(name))]
         quick = [one for one in missing if not kind_of(one.measure).needs_surface]
@@ -70,7 +70,7 @@ class Measurer:
             one = quick.pop(0)
             self._found[one.measure.name] = one, series_of(one.measure, one.named, None, noise)
         self._measure_surfaces([one for one in missing if kind_of(one.measure).needs_surface], noise)
-        self._desk.followed.is_measuring = self.is_running
+        self._context.followed.is_measuring = self.is_running
         self._found = {
             name: known for name, known in self._found.items()
             if name in wanted and (wanted[name].is_like(known[0]) or wanted[name] in quick)
@@ -78,7 +78,7 @@ class Measurer:
         begun, known = self._begun, self._found
         begun = {name: one for name, one in begun.items() if name in wanted and wanted[name].is_like(one[0])}
         found = {name: (known | begun)[name][1] for name in wanted if name in known or name in begun}
-        return self._desk.followed.take_series(found) or bool(quick)
+        return self._context.followed.take_series(found) or bool(quick)
 
     def _inputs(self, name: str) -> Inputs | None:
         known = self._found.get(name)
@@ -97,7 +97,7 @@ class Measurer:
 
     def _wanted(self, measures: Sequence[Measure], noise: float) -> dict[str, Inputs]:
         """The measures whose landmarks are all placed, with their tracks; what is no measure is told once."""
-        tracks, wanted = self._desk.followed.tracks, {}
+        tracks, wanted = self._context.followed.tracks, {}
         for measure in measures:
             names = dict.fromkeys(measure.landmarks)
             if names and all(name in tracks for name in names) and self._is_one(measure):
@@ -110,7 +110,7 @@ class Measurer:
         except InputError as error:
             if measure.name not in self._refused:
                 self._refused.add(measure.name)
-                self._desk.note(str(error))
+                self._context.note(str(error))
             return False
         return True
 
@@ -124,9 +124,9 @@ class Measurer:
         if self._task is not None:
             self._task.cancel()
         self._asked = {one.measure.name: one for one in ready}
-        timeline, measures = self._desk.timeline, [one.measure for one in ready]
+        timeline, measures = self._context.timeline, [one.measure for one in ready]
         tracks = {name: track for one in ready for name, track in one.named.items()}
-        now = self._desk.index
+        now = self._context.index
         frames = sorted(range(len(timeline)), key=lambda frame: (abs(frame - now), frame))
 
         def tell(found: Mapping[str, Series]) -> None:
@@ -140,4 +140,4 @@ class Measurer:
             return all_series(measures, tracks, timeline, noise, frames, tell, keep=True)
 
         self._begun = {}
-        self._task = self._desk.run("Measuring surfaces", measure, take)
+        self._task = self._context.run("Measuring surfaces", measure, take)

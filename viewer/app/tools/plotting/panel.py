@@ -79,7 +79,7 @@ def _draw_measures(tool: Tool) -> None:
 
 def _draw_noise(tool: Tool) -> None:
     """The scanner's noise, which adds to how uncertain measures are."""
-    scale, noise = tool.desk.scale, tool.choices.noise
+    scale, noise = tool.context.scale, tool.choices.noise
     widgets.label(
         "Scanner noise (SD)",
         "Standard deviation of a coordinate. Scan4D adds it to the uncertainty of measures",
@@ -136,7 +136,7 @@ def _draw_ways(tool: Tool) -> None:
 
 def _draw_colors(tool: Tool) -> None:
     """The colours of speeds, from rest to the fastest."""
-    em, scale = imgui.get_font_size(), tool.desk.scale
+    em, scale = imgui.get_font_size(), tool.context.scale
     low = imgui.get_cursor_screen_pos()
     step = imgui.get_content_region_avail().x / _BAR_STEPS
     table = color_table(SPEED_MAP)

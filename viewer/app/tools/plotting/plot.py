@@ -56,13 +56,13 @@ def draw(tool: Tool, ui: Ui) -> None:
     size = ImVec2(room.x - table - imgui.get_style().item_spacing.x, room.y)
     frame = _draw_plot(tool, plot, size)
     imgui.same_line()
-    _draw_table(tool, tool.desk.index if frame is None else frame, ImVec2(table, room.y))
+    _draw_table(tool, tool.context.index if frame is None else frame, ImVec2(table, room.y))
 
 
 def _why_none(tool: Tool) -> str:
     settings, mode = tool.settings, tool.settings.mode
     if tool.shown.plot is not None:
-        if tool.desk.followed.is_busy:
+        if tool.context.followed.is_busy:
             return "Scan4D is measuring the frames."
         if not settings.derivative:
             return "No measure has a value in any frame."
@@ -70,10 +70,10 @@ def _why_none(tool: Tool) -> str:
         return f"{words} needs {count} frames in a row with a value."
     if not tool.landmarks.measures:
         return "No measures yet: add one in the panel, such as the distance between two landmarks."
-    if not tool.desk.followed.series:
+    if not tool.context.followed.series:
         return (
             "Scan4D is measuring the frames."
-            if tool.desk.followed.is_busy
+            if tool.context.followed.is_busy
             else "No measure has a value yet: place its landmarks."
         )
     if not tool.shown.curves:
@@ -234,8 +234,8 @@ def _draw_line(tool: Tool, plot: CurvePlot, line: PlotLine, number: int) -> None
 def _draw_playhead(tool: Tool, plot: CurvePlot) -> int | None:
     """The line at the frame that is shown, which a drag or a click moves; returns the frame that is pointed
     at."""
-    times, desk, em = plot.x, tool.desk, imgui.get_font_size()
-    index = min(desk.index, len(times) - 1)
+    times, context, em = plot.x, tool.context, imgui.get_font_size()
+    index = min(context.index, len(times) - 1)
     color = imgui.get_style_color_vec4(imgui.Col_.text)
     flags = implot.DragToolFlags_.no_fit.value
     moved, x, _, is_over, is_held = implot.drag_line_x(
@@ -245,8 +245,8 @@ def _draw_playhead(tool: Tool, plot: CurvePlot) -> int | None:
     at = nearest(times, implot.get_plot_mouse_pos().x)
     is_clicked = is_hovered and imgui.is_mouse_released(0) and widgets.is_click()
     wanted = nearest(times, x) if moved else at if is_clicked else index
-    if wanted != desk.index:
-        desk.seek(wanted)
+    if wanted != context.index:
+        context.seek(wanted)
     return at if is_hovered and not (is_over or is_held) else None
 
 
@@ -257,7 +257,7 @@ def nearest(times: np.ndarray, time: float) -> int:
 
 def _draw_now(tool: Tool, plot: CurvePlot) -> None:
     """A point on each line at the frame that is shown."""
-    index = min(tool.desk.index, len(plot.x) - 1)
+    index = min(tool.context.index, len(plot.x) - 1)
     for number, line in enumerate(plot.drawn):
         implot.set_axes(_X, _Y[plot.units.index(line.unit)])
         here = slice(index, index + 1)
@@ -325,7 +325,7 @@ def _draw_name(tool: Tool, curve: Curve) -> None:
         widgets.unhidden(curve.name), False, imgui.SelectableFlags_.span_all_columns.value
     )
     if is_clicked and curve.movement:
-        tool.desk.seek(nearest(curve.times, curve.movement.peak))
+        tool.context.seek(nearest(curve.times, curve.movement.peak))
     if imgui.is_item_hovered():
         tool.pointed = curve.name
     widgets.tooltip("Click to go to the peak")

@@ -7,13 +7,13 @@ from numpy.typing import NDArray
 
 from ....analysis.pick import are_seen
 from ....output.overlays import LINE_SLACK
-from ...desk import Desk
+from ...tool_context import ToolContext
 
 
-def seen_in_view(desk: Desk, places: NDArray[np.float64]) -> NDArray[np.bool_]:
+def seen_in_view(context: ToolContext, places: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether places (N, 3), where the scan is shown, have nothing before them in the picture, (N,); all of
     them where there is no picture."""
-    viewport, pose = desk.viewport, desk.pose
+    viewport, pose = context.viewport, context.pose
     if viewport.surface is None or pose is None or not viewport.is_there:
         return np.ones(len(places), bool)
     slack = LINE_SLACK * viewport.bounds(pose).radius

@@ -16,8 +16,8 @@ from ....look import color_table
 from ....output.overlays import DIM_LINE, NOTHING_DRAWN, DrawnMarks, DrawnPath, rounded, runs_of
 from ....output.plots import color_of_way
 from ....rigid import STILL, Rigid
-from ...desk import Desk
 from ...scene.canvas import Canvas, ViewPlace
+from ...tool_context import ToolContext
 from .choices import ANCHORS, CurveChoices, Settings
 from .seen import seen_in_view
 from .shown import Kept
@@ -31,10 +31,10 @@ class Ways:
     """The ways of the landmarks that are ticked. problem: why they are not held still, "" where nothing is
     wrong. fastest: the speed that has the last colour, scan units a second."""
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, context: ToolContext) -> None:
         self.problem = ""
         self.fastest = 0.0
-        self._desk = desk
+        self._context = context
         self._kept = Kept()
         self._all: tuple[Trajectory, ...] = ()  # that were asked for last, with what is found of them:
         self._by_speed: list[list[int]] | None = None  # colours
@@ -44,13 +44,13 @@ class Ways:
 
     def still(self, choices: CurveChoices) -> Still | None:
         """The motion of each frame that holds the scan still; None where the anchors do not tell one."""
-        tracks, anchors = self._desk.followed.tracks, self._anchors(choices)
+        tracks, anchors = self._context.followed.tracks, self._anchors(choices)
         return self._kept.of(
             ("still", anchors), tuple(tracks[name] for name in anchors), lambda: self._found(tracks, anchors)
         )
 
     def _anchors(self, choices: CurveChoices) -> tuple[str, ...]:
-        return tuple(name for name in choices.anchors if name in self._desk.followed.tracks)
+        return tuple(name for name in choices.anchors if name in self._context.followed.tracks)
 
     def _found(self, tracks: Mapping[str, Track], anchors: tuple[str, ...]) -> Still | None:
         try:
@@ -62,20 +62,20 @@ class Ways:
     def hold(self, settings: Settings, choices: CurveChoices) -> bool:
         """Have the scan held still where that is chosen; whether that has changed something."""
         still = self.still(choices) if settings.hold else None
-        wanted = None if still is None else (self._desk.timeline, still)
+        wanted = None if still is None else (self._context.timeline, still)
         if wanted == self._laid:
             return False
         self._laid = wanted
-        self._desk.lay(place=None if still is None else lambda index: still[index] or STILL)
+        self._context.lay(place=None if still is None else lambda index: still[index] or STILL)
         return True
 
     def trajectories(self, settings: Settings, choices: CurveChoices) -> dict[str, Trajectory]:
         """The ways of the landmarks that are ticked, by name."""
-        tracks, smoothing = self._desk.followed.tracks, settings.smoothing
+        tracks, smoothing = self._context.followed.tracks, settings.smoothing
         still = self.still(choices) if settings.coordinates == ANCHORS and choices.traced else None
         found = {}
         for name in choices.traced:
-            if (track := tracks.get(name)) is not None and len(track.times) == len(self._desk.timeline):
+            if (track := tracks.get(name)) is not None and len(track.times) == len(self._context.timeline):
                 found[name] = self._kept.of(
                     (name, smoothing), (track, still), partial(_way_of, track, smoothing, still)
                 )
@@ -88,7 +88,7 @@ class Ways:
 
     def draw(self, settings: Settings, choices: CurveChoices, canvas: Canvas, view: ViewPlace) -> None:
         """Draw them, as they lie about the pose that is shown."""
-        pose, desk = self._desk.pose, self._desk
+        pose, context = self._context.pose, self._context
         if not settings.trajectories or pose is None:
             return
         found = self.trajectories(settings, choices)
@@ -97,11 +97,11 @@ class Ways:
         held = self._held(settings, choices, pose.index)
         if held is None:
             return
-        motion = desk.motion(pose).after(held)
-        shown = desk.viewport.request if desk.viewport.is_there else None
+        motion = context.motion(pose).after(held)
+        shown = context.viewport.request if context.viewport.is_there else None
         places = motion.points(np.concatenate([one.positions for one in self._all]))
         if self._seen[0] != (shown, self._all):
-            self._seen = (shown, self._all), seen_in_view(desk, places)
+            self._seen = (shown, self._all), seen_in_view(context, places)
         alphas = np.split(np.where(self._seen[1], 1.0, DIM_LINE), len(found))
         on_screen = np.split(view.all_on_screen(places), len(found))
         for each in zip(on_screen, self._colors(settings), alphas, strict=True):

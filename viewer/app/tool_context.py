@@ -1,4 +1,4 @@
-"""A desk: what a tool knows of the window, and can ask it for."""
+"""What a tool knows of the window, and can ask it for."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ class Click:
     picked: what is seen there, with its spacing; None where nothing is. Its `place` is where the surface is
     at the pixel, its `point` the point of the scan that is seen there, None where a hole is filled. pose:
     that the picture shows. through_gap: whether the very pixel shows something farther, through a gap.
-    motion: of the pose, see `Desk.lay`; places of `picked` are where it is moved to. pixel: of the picture,
-    the one that shows the surface that is meant, (column, row).
+    motion: of the pose, see `ToolContext.lay`; positions of `picked` are in the moved scan. pixel: of the
+    picture, the one that shows the surface that is meant, (column, row).
     """
 
     picked: Picked | None
@@ -77,7 +77,7 @@ class Work:
         self.then(result)
 
 
-class Desk:
+class ToolContext:
     """The window as one tool sees it.
 
     name: of the tool's module. settings: the tool's `Settings`, which it replaces by others; None where it

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import pytest
 from moving_hills import MovingHills
 
-from viewer.app.desk import Work
+from viewer.app.tool_context import Work
 from viewer.errors import InputError
 from viewer.scan.timeline import Timeline
 from viewer.task import Task, checkpoint, in_background
