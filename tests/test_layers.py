@@ -19,6 +19,7 @@ LAYERS = (
     {
         "errors", "csv_text", "files", "folders", "geometry", "bounds", "params", "resources", "rigid",
         "imports", "srgb", "camera", "look", "view", "task", "helper", "native", "signals", "unfinished",
+        "compiled", "threads",
     },
     {"scan"},
     {"mesh", "codewords"},

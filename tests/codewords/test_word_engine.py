@@ -62,7 +62,7 @@ def test_encoded_scenes_are_drawn_the_same(exact: bool) -> None:
 @given(stream=streams(), processors=st.integers(1, 9))
 def test_threads_share_a_picture(stream: WordStream, processors: int) -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("viewer.scan.octree.threads._SHARE", 1)
+        patch.setattr("viewer.threads._SHARE", 1)
         patch.setattr("os.cpu_count", lambda: processors)
         assert same(draw_words(stream), draw_words_plainly(stream))
 

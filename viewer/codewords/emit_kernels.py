@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan.octree.compiled import compiled
+from ..compiled import compiled
 from .outline_kernels import exact_rows
 from .project_kernels import DIFFUSE, NORMAL_I, NORMAL_J, SIZE, SPECULAR, X, Y
 

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..scan.octree.threads import ranges, threads_for, together
 from ..scan.points import NOTHING
+from ..threads import ranges, threads_for, together
 from .lighting import LIGHT_BYTES
 from .stream import WordStream
 from .tables import BITMAP

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan.octree.compiled import compiled
+from ..compiled import compiled
 
 PLANE_COLUMNS = 15
 Whole = int | np.integer

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan.octree.compiled import compiled
+from ..compiled import compiled
 from .outline_kernels import is_outline_seen, project_outline, seen_range
 
 X, Y, SIZE, NORMAL_I, NORMAL_J, DIFFUSE, SPECULAR = range(7)

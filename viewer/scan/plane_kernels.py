@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .octree.compiled import compiled
+from ..compiled import compiled
 
 _SWEEPS = 12  # of Jacobi's rotations, at most; four or five are enough as a rule
 _SETTLED = 1e-30  # the square of what lies off the diagonal, of a matrix of trace 1

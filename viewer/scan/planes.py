@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..task import checkpoint
-from .octree.threads import together
+from ..threads import together
 
 Vectors = NDArray[np.float64]  # (N, 3)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan.octree.compiled import compiled
+from ..compiled import compiled
 from ..scan.plane_kernels import fit_plane
 
 _BITS = 21  # of each coordinate in a code

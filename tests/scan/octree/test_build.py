@@ -154,7 +154,7 @@ def test_threads_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     positions = np.round(rng.normal(size=(20_000, 3)), 2)
     cloud = PointCloud.from_arrays(positions, colors=rng.integers(0, 255, (20_000, 3), np.uint8))
     alone = build(cloud, Stop("delta", delta=0.0))
-    monkeypatch.setattr("viewer.scan.octree.threads._SHARE", 1000)
+    monkeypatch.setattr("viewer.threads._SHARE", 1000)
     monkeypatch.setattr("os.cpu_count", lambda: 3)
     together = build(cloud, Stop("delta", delta=0.0))
     assert alone.depth == together.depth

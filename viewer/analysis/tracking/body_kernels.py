@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scan.octree.compiled import compiled
+from ...compiled import compiled
 from .surface_kernels import Cells, fit_at, nearest_within
 
 _FACING = 0.5  # cosine of the angle between the normals of a node and of the surface that it is drawn to

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scan.octree.compiled import compiled
+from ...compiled import compiled
 from .surface_kernels import Cells, fit_at, nearest_within, solve_in_place
 
 RIGID = 6  # unknowns: of the place, and of the turn

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scan.octree.compiled import compiled
+from ...compiled import compiled
 from ...scan.plane_kernels import fit_plane
 
 NEAREST = 20  # points that a parabola is fitted to

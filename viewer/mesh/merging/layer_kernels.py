@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...scan.octree.compiled import compiled
+from ...compiled import compiled
 
 _EDGE = 1e-6  # of a triangle: how far outside of it a place still counts, so that none falls between two
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...srgb import LIGHT_STEPS, bytes_from_light, light_from_bytes
+from ...threads import together
 from ..points import PointCloud
 from .cube import Grid
 from .discs import discs_of
 from .octree import Attributes
-from .threads import together
 
 _LIGHT = light_from_bytes(np.arange(256, dtype=np.uint8)).astype(np.int64)
 _ENCODED = bytes_from_light(np.arange(16 * LIGHT_STEPS + 1) / 16).astype(np.uint32)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ...params import describe, param
 from ...task import checkpoint
+from ...threads import ranges, shares, together
 from ..points import PointCloud
 from .attributes import Sorted, attributes_of
 from .cube import Cube, Grid
 from .octree import DEEPEST, Octree
-from .threads import ranges, shares, together
 
 STOPS = ("delta", "depth", "occupancy")
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from ...compiled import compiled
 
 _HALF_DIAGONAL = math.sqrt(3) / 2  # of a cube of edge 1
 

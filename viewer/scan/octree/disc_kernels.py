@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from ...compiled import compiled
 from .octree import DEEPEST
 
 _CHILDREN = np.bitwise_count(np.arange(256, dtype=np.uint8)).astype(np.int64)

@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from ...compiled import compiled
 from ..points import NOTHING
-from .compiled import compiled
 from .octree import DEEPEST
 
 _BLOCK = 4096  # points that are fetched and then worked on

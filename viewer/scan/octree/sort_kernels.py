@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .compiled import compiled
+from ...compiled import compiled
 from .octree import DEEPEST
 
 BUCKET_BITS = 12  # of a code: the first four levels

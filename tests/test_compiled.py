@@ -9,7 +9,7 @@ import pytest
 
 NOWHERE = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"  # no folder can be written
 KERNEL = """
-from viewer.scan.octree.compiled import compiled
+from viewer.compiled import compiled
 
 @compiled
 def twice(number):
@@ -26,7 +26,7 @@ def run(folder: Path, cache: Path | None, limit: str = "") -> tuple[int, int]:
 
 def output(script: str, folder: Path, cache: Path | None) -> str:
     """What a script prints, in a process of its own that may keep what it compiles in `cache`."""
-    paths = os.pathsep.join([str(folder), str(Path(__file__).parents[3])])
+    paths = os.pathsep.join([str(folder), str(Path(__file__).parents[1])])
     environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
     environment |= {"NUMBA_CACHE_DIR": str(cache or "")}
     done = subprocess.run(
@@ -52,7 +52,7 @@ def announced(folder: Path, cache: Path | None, limit: str = "") -> list[str]:
     of its own."""
     script = f"""{limit}
 import kernel
-from viewer.scan.octree.threads import together
+from viewer.threads import together
 from viewer.task import Task, listening
 
 heard = []

@@ -1,4 +1,4 @@
-"""Work of compiled loops, shared out among threads where there is enough of it."""
+"""Threads for kernels, where there are enough points."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from contextvars import copy_context
 import numpy as np
 from numpy.typing import NDArray
 
-_SHARE = 100_000  # points that a thread is worth beginning for
+_SHARE = 100_000  # points that pay for the start of a thread
 
 
 def threads_for(points: int) -> int:
-    """How many threads to use for so many points."""
+    """The number of threads for so many points."""
     return max(1, min(os.cpu_count() or 1, points // _SHARE))
 
 
 def together(points: int, works: Iterable[Callable[[], object]]) -> None:
-    """Do all of some work on `points` points, on as many threads as that is worth; in any order."""
+    """Run all works on `points` points, in any order, on as many threads as pay."""
     count = threads_for(points)
     if count == 1:
         for work in works:
@@ -36,5 +36,5 @@ def ranges(borders: NDArray[np.integer]) -> list[tuple[int, int]]:
 
 
 def shares(points: int) -> list[tuple[int, int]]:
-    """(first, last + 1) of a share of the points for each thread."""
+    """(first, last + 1) of the points of each thread."""
     return ranges(np.linspace(0, points, threads_for(points) + 1).astype(np.int64))

@@ -1,7 +1,8 @@
-"""Loops compiled by numba, kept on disk where that can be done.
+"""Functions that numba compiles. The machine code is cached on disk where a folder can be written.
 
-They stand in modules named *_kernels, which are imported inside functions, as numba takes a while.
-Threads are Python's (threads.py), over loops that let go of the interpreter.
+Kernels stand in modules named *_kernels. Other modules import them inside functions, as numba takes a
+while to import. Kernels release the interpreter's lock, so that Python's threads (`threads.py`) run them
+side by side.
 """
 
 from __future__ import annotations
@@ -14,30 +15,30 @@ from typing import Any, TypeVar, cast
 from numba import njit
 from numba.core.caching import FunctionCache, NullCache
 
-from ...task import announce, over
+from .task import announce, over
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """The function compiled at its first call; meanwhile other threads go on.
+    """Compile a function at its first call. Other threads go on meanwhile.
 
-    The result is kept beside the source, or in the user's cache folder where that cannot be written. Where
-    neither can be, or the disk is full, each process compiles for itself. Either is announced.
+    Numba stores the result beside the source, or in the user's cache folder if it cannot write there. If it
+    can write neither, or the disk is full, each process compiles for itself. A task announces either.
     """
     dispatcher: Any = njit(nogil=True)(function)
     try:
-        dispatcher._cache = _Kept(function)
+        dispatcher._cache = _DiskCache(function)
     except RuntimeError:  # of numba, where no folder can be written
-        dispatcher._cache = _NotKept()
+        dispatcher._cache = _NoCache()
     return cast(F, dispatcher)
 
 
-class _Kept(FunctionCache):
-    """A cache on disk of what was compiled: damaged files are none, unwritable ones are passed over.
+class _DiskCache(FunctionCache):
+    """The cache of a function on disk. It ignores damaged files, and folders that it cannot write.
 
-    stamp: tells whether it is of this source; besides the file's own, that of what is imported from others,
-    functions and numbers, as these are compiled in too and numba looks at the file alone.
+    stamp: identifies the source. Numba looks at the file alone. The stamp also holds the numbers of the
+    module and the stamps of imported kernels, which are compiled in as well.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -47,7 +48,8 @@ class _Kept(FunctionCache):
         used = {
             name: value._cache.stamp
             for name, value in known
-            if isinstance(getattr(value, "_cache", None), _Kept) and value.__module__ != function.__module__
+            if isinstance(getattr(value, "_cache", None), _DiskCache)
+            and value.__module__ != function.__module__
         }
         self.stamp = (self._impl.locator.get_source_stamp(), numbers, used)
         self._cache_file._source_stamp = self.stamp
@@ -69,8 +71,8 @@ class _Kept(FunctionCache):
             super().save_overload(*args)
 
 
-class _NotKept(NullCache):
-    """No place on any disk."""
+class _NoCache(NullCache):
+    """No cache: no folder can be written."""
 
     def load_overload(self, *_: Any) -> None:
         announce("Preparing")
