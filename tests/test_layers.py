@@ -19,7 +19,7 @@ LAYERS = (
     {
         "errors", "csv_text", "files", "folders", "geometry", "bounds", "params", "resources", "rigid",
         "imports", "srgb", "camera", "look", "view", "task", "helper", "native", "signals", "unfinished",
-        "compiled", "threads",
+        "compiled", "threads", "extensions",
     },
     {"scan"},
     {"mesh", "codewords"},
@@ -170,11 +170,13 @@ def test_imports_point_down_the_layers() -> None:
     assert upward == []
 
 
-FOUND = re.compile(r"(importlib\.)?import_module\(f'\{(__name__|__package__|tools\.__name__)\}\.\{")
+FOUND = re.compile(
+    r"(importlib\.)?import_module\((f'\{(__name__|__package__|package|tools\.__name__)\}\.\{|extension\.module)"
+)
 
 
 def test_modules_found_by_folder_are_all_that_is_imported_by_name() -> None:
-    """`import_module` gets the folder's own name and what was found in it, no other text."""
+    """`import_module` gets a folder's name and what was found in it, or an extension, no other text."""
     odd = [
         f"{path.relative_to(PACKAGE)}: {ast.unparse(node)}"
         for path in modules()

@@ -1,4 +1,4 @@
-"""Renderer backends: one file or package each, found by scanning this folder.
+"""Renderer backends: a file or package each in this folder, or in another package (viewer/extensions.py).
 
 A backend answers one question: which surface does each pixel see? Its module holds one subclass of
 `Backend`. The module's docstring says what the backend does; the panel shows its first line.
@@ -7,8 +7,6 @@ Names that begin with an underscore are no backends. No other list of backends e
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping
@@ -19,6 +17,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any, NamedTuple, Protocol
 
 from ..errors import InputError, unknown_name
+from ..extensions import load_modules
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..look import COLOR_BY, ValueKind
@@ -218,17 +217,25 @@ class Backend(ABC):
 @cache
 def backends() -> dict[str, Backend]:
     """All backends by name, in alphabetical order."""
-    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
-    return {name: _class_of(importlib.import_module(f"{__name__}.{name}"))(name) for name in names}
+    found: dict[str, Backend] = {}
+
+    def add(name: str, module: ModuleType) -> None:
+        found[name] = _class_of(module)(name)
+
+    load_modules("backends", __name__, __path__, add)
+    return dict(sorted(found.items()))
 
 
 def _class_of(module: ModuleType) -> type[Backend]:
-    """The backend that a module holds."""
-    (found,) = (
+    """The backend that a module holds. Raises InputError where it does not define exactly one."""
+    classes = [
         one for one in vars(module).values()
         if isinstance(one, type) and issubclass(one, Backend) and one.__module__ == module.__name__
-    )  # fmt: skip
-    return found
+    ]  # fmt: skip
+    if len(classes) != 1:
+        what = f"{module.__name__} defines {len(classes)} subclasses of Backend"
+        raise InputError(what, hint="Define exactly one in this module")
+    return classes[0]
 
 
 def backend(name: str) -> Backend:

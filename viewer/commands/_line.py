@@ -13,7 +13,7 @@ from ..imports import uncollected
 from ..signals import ending_as_interrupts, ignore_from_now_on
 from ..task import listening
 from ..unfinished import remove_leftovers
-from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, escaped, quietly
+from ._console import NAMES_AS_THEY_ARE, Delays, PlainOutput, ReaderGone, complain, escaped, quietly, warn
 from ._parsing import parsed
 
 _MOST_SHOWN = 2000  # characters of a message
@@ -54,23 +54,30 @@ def _run(words: Sequence[str]) -> int:
         return int(stop.code or 0)
 
 
-class _Told(logging.Handler):
-    """A handler that tells on standard error what is logged."""
+class _OnStandardError(logging.Handler):
+    """A handler that prints what is logged: warnings, which are for users; with `debug`, everything."""
+
+    def __init__(self, debug: bool) -> None:
+        super().__init__(logging.INFO if debug else logging.WARNING)
+        self.debug = debug
 
     def emit(self, record: logging.LogRecord) -> None:
-        complain(f"scan4d: {self.format(record)}")
+        if record.levelno == logging.WARNING:
+            warn(self.format(record))
+        elif self.debug:
+            complain(f"scan4d: {self.format(record)}")
 
 
 @contextmanager
-def _logged(is_told: bool) -> Iterator[None]:
-    """Meanwhile what is logged, such as failures in the window with their tracebacks, is told; else lost."""
+def _logged(debug: bool) -> Iterator[None]:
+    """Meanwhile warnings in the log go to standard error; with `debug` all of it, such as failures in the
+    window with their tracebacks."""
     log = logging.getLogger(__name__.partition(".")[0])
-    handler = _Told() if is_told else logging.NullHandler()
+    handler = _OnStandardError(debug)
     level, propagate = log.level, log.propagate
     log.addHandler(handler)
     log.propagate = False
-    if is_told:
-        log.setLevel(logging.INFO)
+    log.setLevel(handler.level)
     try:
         yield
     finally:

@@ -15,6 +15,7 @@ import numpy as np
 from ..backends import Backend
 from ..backends import backends as all_backends
 from ..errors import NoOpenGLError
+from ..extensions import package_of
 from ..params import Parameter
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
@@ -46,6 +47,7 @@ def declaration(backend: Backend, obstacle: str | None) -> dict[str, Any]:
         "name": backend.name,
         "title": backend.title,
         "help": backend.help,
+        "package": package_of(type(backend).__module__),
         "needs": list(backend.needs(_NO_POINTS, backend.params())),
         "rows": backend.rows,
         "blends": backend.blends,
@@ -77,6 +79,8 @@ def _as_text(backend: Backend) -> str:
     rows = {p.name: (p.name, _value(p.default), _domain(p), p.help) for p in backend.parameters}
     widths = [max(map(len, column)) for column in list(zip(*rows.values(), strict=True))[:-1]]
     lines, heading = [f"{backend.name}: {backend.help}"], ""
+    if package := package_of(type(backend).__module__):
+        lines.append(f"  From the package {package}")
     for parameter in sorted(backend.parameters, key=lambda p: not p.basic):
         group = "" if parameter.basic else f"  For research: {parameter.group or 'other'}"
         if group != heading:

@@ -10,9 +10,13 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator
 
 from .. import __version__
+from ..analysis.measures.kinds import measure_kinds
+from ..backends import backends
 from ..errors import NoOpenGLError
+from ..extensions import check_import, extension_problems, installed_extensions
 from ..gpu.context import REQUIRED_EXTENSIONS, Attempts, Gpu, headless
 from ..gpu.shader_cache import shader_cache
+from ..scan.formats import known_suffixes
 
 # What decides how large pictures and poses may be, and how work is cut up.
 _LIMITS = (
@@ -56,6 +60,7 @@ def run(args: Namespace) -> int:
         "Devices (--device)": list(_devices()),
         "Window": [("display", display() or "none: neither DISPLAY nor WAYLAND_DISPLAY is set")],
         "Software": _software(),
+        "Extensions of other packages": list(_from_other_packages()),
     }
     for title, rows in sections.items():
         if rows:
@@ -130,6 +135,22 @@ def _software() -> list[tuple[str, str]]:
         ("system", platform.platform()),
         *_libraries(),
     ]
+
+
+def _from_other_packages() -> Iterator[tuple[str, str]]:
+    """Extensions of other packages: where each comes from, or why it cannot be used."""
+    extensions = installed_extensions()
+    if not extensions:
+        return
+    backends(), measure_kinds(), known_suffixes()
+    for extension in extensions:
+        if extension.kind == "tools":
+            check_import(extension)
+        found = f"{extension.package}, module {extension.module}"
+        yield (
+            f"{extension.kind.removesuffix('s')} {extension.name}",
+            extension_problems().get(extension, found),
+        )
 
 
 def _libraries() -> Iterator[tuple[str, str]]:

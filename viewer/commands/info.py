@@ -17,9 +17,12 @@ from numpy.typing import NDArray
 from ..codewords.stream import SUFFIX, WordStream, read_stream
 from ..codewords.words import FIELDS, decode_words
 from ..errors import shortened
+from ..scan.formats import package_reading
 from ..scan.points import PointCloud, finite_rows
 from ..scan.pose import Pose
+from ..scan.range_folders import RangeFrames
 from ..scan.range_view import RangeView
+from ..scan.sources import FrameSource
 from ..scan.timeline import Timeline
 from ._console import escaped
 from ._scans import SCAN_HELP, first_readable, open_timeline, report
@@ -58,6 +61,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         "name": timeline.name,
         "poses": len(timeline),
         "unit": timeline.unit,
+        "package": _package_reading(timeline.source),
         "times": {
             "first": float(times[0]),
             "last": float(times[-1]),
@@ -78,6 +82,13 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
             for name, values in _attributes(pose.overview).items()
         },
     }  # fmt: skip
+
+
+def _package_reading(source: FrameSource) -> str:
+    """Name and version of the package that reads the scan; "" for Scan4D itself."""
+    if isinstance(source, RangeFrames):
+        return source.package
+    return package_reading(source.files[0]) if source.files else ""
 
 
 class _Found:
@@ -166,6 +177,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         points += f" ({facts['dropped']:,} with a NaN or infinite coordinate left out)"
     rows = [
         ("scan", facts["name"]),
+        *([("read by", facts["package"])] if facts["package"] else []),
         ("poses", poses),
         ("pose", f"{facts['pose']}, {facts['label']}"),
         *([("unreadable", f"{broken} of {broken + 1} poses that were tried")] if broken else []),

@@ -19,11 +19,9 @@ Modules whose name starts with an underscore are helpers.
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache, partial
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -32,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError, explained, shortened
+from ...extensions import load_modules, package_of
 from ...files import whole_file
 from ..faces import Faces
 from ..points import PointCloud
@@ -68,6 +67,12 @@ def writable_suffixes(views: bool = False) -> list[str]:
 def scan_suffixes() -> list[str]:
     """Every suffix of which one file can be written for all poses of a scan, sorted."""
     return sorted(suffix for suffix, module in _formats().items() if hasattr(module, "write_poses"))
+
+
+def package_reading(path: Path) -> str:
+    """Name and version of the package that reads a file of this suffix; "" for Scan4D itself."""
+    module = _formats().get(path.suffix.lower())
+    return package_of(module.__name__) if module else ""
 
 
 def frame_count(path: Path | str) -> int:
@@ -221,9 +226,23 @@ def _writing(path: Path, module: ModuleType) -> Iterator[Path]:
 
 @cache
 def _formats() -> dict[str, ModuleType]:
-    names = [m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")]
-    modules = [import_module(f"{__name__}.{name}") for name in names]
-    return {suffix: module for module in modules for suffix in module.SUFFIXES}
+    found: dict[str, ModuleType] = {}
+
+    def add(_: str, module: ModuleType) -> None:
+        if not hasattr(module, "SUFFIXES"):
+            if not hasattr(module, "find"):
+                raise InputError(
+                    "it has neither SUFFIXES nor find", hint="See viewer/scan/formats/__init__.py"
+                )
+            return  # for folders: see viewer/scan/range_folders
+        if not isinstance(module.SUFFIXES, tuple):
+            raise InputError(f"SUFFIXES is a {type(module.SUFFIXES).__name__}, expected a tuple of suffixes")
+        if taken := [suffix for suffix in module.SUFFIXES if suffix in found]:
+            raise InputError(f"{found[taken[0]].TITLE} reads '{taken[0]}' already", hint="Use other suffixes")
+        found.update(dict.fromkeys(module.SUFFIXES, module))
+
+    load_modules("readers", __name__, __path__, add)
+    return found
 
 
 def _readable(path: Path) -> ModuleType:

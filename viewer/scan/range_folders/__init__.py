@@ -16,13 +16,13 @@ Modules whose name starts with an underscore are helpers.
 from __future__ import annotations
 
 import os
-import pkgutil
+from dataclasses import replace
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
 from ...errors import InputError, explained
+from ...extensions import load_modules, package_of
 from ..formats import one_message
 from ._source import RangeFrames
 
@@ -41,7 +41,7 @@ def find_range_frames(folder: Path) -> RangeFrames | None:
     for kind in _kinds():
         with one_message(folder, f"cannot be read as {kind.TITLE}"):
             if (frames := kind.find(folder, names)) is not None:
-                return frames
+                return replace(frames, package=package_of(kind.__name__))
     return None
 
 
@@ -57,7 +57,12 @@ def lacking_part(folder: Path) -> str:
 
 @cache
 def _kinds() -> tuple[ModuleType, ...]:
-    """The special ones first."""
-    names = [module.name for module in pkgutil.iter_modules(__path__) if not module.name.startswith("_")]
-    kinds = [import_module(f"{__name__}.{name}") for name in names]
+    """The kinds of folders, the special ones first."""
+    kinds: list[ModuleType] = []
+
+    def add(_: str, module: ModuleType) -> None:
+        if hasattr(module, "find"):  # others read files: see viewer/scan/formats
+            kinds.append(module)
+
+    load_modules("readers", __name__, __path__, add)
     return tuple(sorted(kinds, key=lambda kind: getattr(kind, "GENERAL", False)))

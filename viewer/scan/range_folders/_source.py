@@ -26,7 +26,8 @@ class RangeFrames:
     name: the scan's. labels: a file's name for each frame, at least one. read: the views of a frame one after
     the other, which may raise anything. files: all that is read, images first, as scans of one camera share
     calibration and poses, and the first file tells them apart. unit: of all views, as the files tell it.
-    recorded: the times that were stored with the frames, (T,) seconds, or None.
+    recorded: the times that were stored with the frames, (T,) seconds, or None. package: that
+    reads them; "" for Scan4D itself.
     """
 
     name: str
@@ -35,6 +36,7 @@ class RangeFrames:
     files: tuple[Path, ...]
     unit: str | None
     recorded: Callable[[], NDArray[np.float64] | None] = lambda: None
+    package: str = ""
 
     def __len__(self) -> int:
         return len(self.labels)

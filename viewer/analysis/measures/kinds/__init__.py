@@ -10,16 +10,16 @@ panel, the command line, series over time and the table in the docs are made of 
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
-from importlib import import_module
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....errors import InputError, unknown_name
+from ....extensions import load_modules
 from ....mesh.geodesic import Line
 from .. import Measure, Quantity
 from ..surface import Found, PoseSurface, Refused
@@ -58,9 +58,15 @@ class MeasureKind:
 @cache
 def measure_kinds() -> Mapping[str, MeasureKind]:
     """All kinds by name."""
-    names = sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_"))
-    modules = [import_module(f"{__name__}.{name}") for name in names]
-    return {kind.name: kind for module in modules for kind in module.KINDS}
+    found: dict[str, MeasureKind] = {}
+
+    def add(_: str, module: ModuleType) -> None:
+        if taken := found.keys() & {kind.name for kind in module.KINDS}:
+            raise InputError(f"there is a measure '{min(taken)}' already", hint="Rename the new one")
+        found.update((kind.name, kind) for kind in module.KINDS)
+
+    load_modules("measures", __name__, __path__, add)
+    return found
 
 
 def kind_of(measure: Measure) -> MeasureKind:
