@@ -25,8 +25,8 @@ from viewer.splatting import lists
 
 if TYPE_CHECKING:
     from viewer.backends import Backend
+    from viewer.drawing.renderer import Renderer
     from viewer.picture.surface import Surface
-    from viewer.renderer import Renderer
 
 pytest_plugins = ["parts"]
 
@@ -101,7 +101,7 @@ def data_dir() -> Path:
 @pytest.fixture(scope="session")
 def renderer() -> Renderer:
     """A headless renderer on whatever OpenGL there is; all GPU tests share it."""
-    from viewer.frame import shared_renderer
+    from viewer.drawing.frame import shared_renderer
 
     return shared_renderer()
 
@@ -113,7 +113,8 @@ def draw(renderer: Renderer) -> Callable[..., Surface]:
     from scenes import of_variant
 
     from viewer.backends import backend
-    from viewer.frame import Request, render_frame
+    from viewer.drawing.frame import render_frame
+    from viewer.drawing.request import Request
     from viewer.picture.surface import Surface
 
     def draw(

@@ -132,7 +132,7 @@ GIVEN = {"whole_file", "temporary_file", "_writing"}  # what gives a file that i
 WRITERS = {  # what is called with such a file
     "scan/formats", "analysis/landmarks/files", "output/export.py",
 }  # fmt: skip
-ELSEWHERE = {"timing.py", "commands/_line.py"}  # they write into /proc, and open the standard streams
+ELSEWHERE = {"drawing/timing.py", "commands/_line.py"}  # they write into /proc, and open the standard streams
 NO_PATHS = ("self.", "window.", "app.window.", "side_kernels.")  # whose methods have names of those of paths
 NAMES = {"mkdir", "makedirs", "touch", "mkstemp", "mkdtemp", "mktemp", "mkfifo", "link", "symlink"}
 

@@ -15,11 +15,12 @@ from viewer import cli
 from viewer.camera import Camera
 from viewer.commands import render as render_command
 from viewer.commands._scans import read_poses
+from viewer.drawing.frame import bring, is_prepared, render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, bring, is_prepared, render_frame
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.pose import Pose

@@ -71,6 +71,6 @@ def render(
     camera: None fits the pose from the front. backend: None for the default of the scan. layers: numbers for
     its points, and its motion. params: the backend's parameters. Raises InputError, NoOpenGLError.
     """
-    from . import frame
+    from .drawing import frame
 
     return frame.render(pose, camera, size, backend, look, params, layers)

@@ -14,10 +14,11 @@ from viewer.bench.report.page import three_digits
 from viewer.bench.scenes.subjects import Subject
 from viewer.bench.scenes.viewpoints import viewpoints
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 
 DOCS = Path(__file__).resolve().parents[1]

@@ -9,7 +9,7 @@ from scenes import NOTHING, sphere
 
 from viewer.analysis.visible_ids import visible_ids
 from viewer.camera import Camera
-from viewer.frame import Request
+from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers

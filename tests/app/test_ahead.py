@@ -16,8 +16,8 @@ from viewer.app.playing.player import Pace
 from viewer.app.session import Session
 from viewer.camera import Camera
 from viewer.document.document import Document
-from viewer.frame import prepare_ahead
-from viewer.renderer import Renderer
+from viewer.drawing.frame import prepare_ahead
+from viewer.drawing.renderer import Renderer
 from viewer.rigid import STILL
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

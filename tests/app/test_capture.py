@@ -24,8 +24,8 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.journal import Journal, journals, saved
 from viewer.document.recording import Recording, fingerprint
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import read_description
 from viewer.output.legend import Marks

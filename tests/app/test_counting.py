@@ -13,7 +13,8 @@ from viewer.app.scene.counting import Counting, words
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
-from viewer.frame import Request, shared_renderer
+from viewer.drawing.frame import shared_renderer
+from viewer.drawing.request import Request
 from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "sphere", sphere(30_000))

@@ -19,7 +19,8 @@ from viewer.app.scene.viewport import Viewport
 from viewer.app.session import Session
 from viewer.backends import Backend
 from viewer.camera import Camera
-from viewer.frame import Request, shared_renderer
+from viewer.drawing.frame import shared_renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.scan import formats
 from viewer.scan.open import open_scan

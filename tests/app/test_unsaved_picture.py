@@ -9,8 +9,9 @@ from scenes import sphere
 import viewer
 from viewer.app.output.unsaved_picture import UnsavedPicture
 from viewer.camera import Camera
+from viewer.drawing.frame import shared_renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, shared_renderer
 from viewer.look import SAMPLES, Look
 from viewer.scan.pose import Pose
 

@@ -17,11 +17,12 @@ from viewer.app.scene import viewport as viewport_module
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import Backend, FrameView
 from viewer.camera import Camera
-from viewer.frame import Request, shared_renderer
+from viewer.drawing.frame import shared_renderer
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.gpu.pose import GpuPose
 from viewer.look import Look
 from viewer.picture.surface import NOTHING, Surface
-from viewer.renderer import Renderer
 from viewer.scan.open import DEMO, open_scan
 from viewer.scan.pose import Pose
 

@@ -22,7 +22,8 @@ from viewer.choice.goal import Goal
 from viewer.choice.model import ERROR_TERMS, TIME_TERMS, Law
 from viewer.choice.ways import DrawingWay
 from viewer.document.document import Document
-from viewer.frame import shared_renderer, view_of
+from viewer.drawing.frame import shared_renderer
+from viewer.drawing.request import view_of
 from viewer.look import Look
 from viewer.scan.open import open_scan
 from viewer.scan.pose import Pose

@@ -12,11 +12,12 @@ from scenes import every_backend, of_variant
 import viewer
 from viewer.analysis.pick import is_seen, pick
 from viewer.camera import Camera
+from viewer.drawing.frame import bring, render_frame, shared_renderer
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, bring, render_frame, shared_renderer
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.view import View, origin_near

@@ -15,11 +15,12 @@ from scenes import BUFFERS, NOTHING, rarely, sphere
 from viewer.backends import backend
 from viewer.backends import surfels as surfels_backend
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.gpu import gl
 from viewer.gpu.pose import GpuPose
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting import tiles

@@ -10,12 +10,13 @@ from scenes import NOTHING, sphere
 
 from viewer.backends import SHARES, backend, surfels
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame, reshade, supersample
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame, reshade, supersample
 from viewer.look import Look
 from viewer.picture.sample import is_sampled
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

@@ -12,10 +12,11 @@ from scenes import NOTHING, every_backend, every_backend_of_points, of_variant, 
 
 from viewer.backends import backend
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.picture.sample import is_sampled
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

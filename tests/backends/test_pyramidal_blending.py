@@ -13,12 +13,13 @@ from scipy.ndimage import binary_dilation, binary_erosion
 
 from viewer.bench.scenes.viewpoints import pod_camera, sample_near
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView

@@ -16,10 +16,10 @@ from test_instancing import CAMERAS, CLOUD, assert_agree, assert_equal
 from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.gpu import gl
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.splatting.packed import WAYS, _ByRow, draw_splats
 

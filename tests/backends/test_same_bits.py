@@ -11,9 +11,10 @@ from scenes import BUFFERS, sphere
 
 from viewer.backends import backends
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting.amplify import FEEDS

@@ -18,11 +18,12 @@ from viewer.bench.truth import tessellation
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.mesh.reference import footprint, trace, visible_pixels
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -19,11 +19,12 @@ from viewer.backends import backend
 from viewer.backends.voxels import Params
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.mesh.reference import trace
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.spacing import typical_spacing

@@ -10,11 +10,12 @@ from scenes import NOTHING, sphere, sphere_mesh, zbuffer
 from viewer.bench import baselines
 from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.mesh.reference import trace
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 
 SIZE = (160, 120)

@@ -21,10 +21,11 @@ from viewer.camera import Camera
 from viewer.choice import known
 from viewer.choice.model import CAP
 from viewer.choice.ways import SCALES
-from viewer.frame import Request, scaled_size
+from viewer.drawing.frame import scaled_size
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
+from viewer.drawing.timing import draw
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
-from viewer.timing import draw
 
 SIZE = (240, 160)
 CAMERA = Camera(eye=(0.5, 0.4, 4.0), fov_y=35)

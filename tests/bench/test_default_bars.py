@@ -16,10 +16,10 @@ import pytest
 from viewer.bench.metrics import Errors
 from viewer.bench.plan import Contender, Group
 from viewer.bench.run import Bench, BenchSettings
-from viewer.frame import backend_for
+from viewer.drawing.request import backend_for
 
 if TYPE_CHECKING:
-    from viewer.renderer import Renderer
+    from viewer.drawing.renderer import Renderer
 
 MESHES = ("bunny", "armadillo", "horse", "igea")
 QUICK = ("bunny", "bunny-bare")

@@ -25,8 +25,8 @@ from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
 
 if TYPE_CHECKING:
+    from viewer.drawing.renderer import Renderer
     from viewer.picture.surface import Surface
-    from viewer.renderer import Renderer
 
 SIZE = (96, 72)
 LOOK = Look(light="head")

@@ -27,9 +27,9 @@ from viewer.bench.report.results import DISTANCES, write_row
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.subjects import Moment, Subject
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
+from viewer.drawing.renderer import Renderer
 from viewer.mesh.reference import first_hits, trace
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 
 SIZE = (400, 300)

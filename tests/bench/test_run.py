@@ -17,13 +17,13 @@ from viewer.bench.report.results import Row
 from viewer.bench.run import LOOK, Bench, BenchSettings
 from viewer.bench.scenes.samples import on_torus
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
+from viewer.drawing.timing import draw
 from viewer.errors import InputError
-from viewer.frame import Request
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
-from viewer.timing import draw
 
 SETTINGS = BenchSettings(size=(120, 80), views=3, repeat=1, frames=2)
 DEFAULTS = tuple(plan(["torus"], DRAWS_POINTS, counts=(), noises=(), swept_scenes=0)[0].contenders)

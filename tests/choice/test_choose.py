@@ -18,7 +18,7 @@ from viewer.choice.goal import PIXELS, Goal
 from viewer.choice.model import Expected, Law, Model
 from viewer.choice.seen import ScanInView
 from viewer.choice.ways import SCALES, DrawingWay, ways
-from viewer.frame import Request, view_of
+from viewer.drawing.request import Request, view_of
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.view import View

@@ -8,7 +8,7 @@ import pytest
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
 from viewer.choice.seen import ScanInView
-from viewer.frame import Request, view_of
+from viewer.drawing.request import Request, view_of
 from viewer.gpu.chunks import in_coarse_order
 from viewer.mesh.reference import trace
 from viewer.scan.points import PointCloud

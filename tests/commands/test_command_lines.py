@@ -18,12 +18,13 @@ from command_line import Run
 from small_scans import ROOT, SMALL, finish, names, process
 
 import viewer
-from viewer import cli, frame
+from viewer import cli
 from viewer.backends import backends
 from viewer.commands import _drawing as drawing
 from viewer.commands import command_names
+from viewer.drawing import frame
+from viewer.drawing.renderer import Renderer
 from viewer.errors import NoOpenGLError
-from viewer.renderer import Renderer
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from command_line import Run
 from scenes import sphere
 from small_scans import cloud_at, names
 
-from viewer.frame import backend_for
+from viewer.drawing.request import backend_for
 from viewer.scan import formats
 from viewer.scan.estimate import estimate
 from viewer.scan.open import open_scan

@@ -13,7 +13,7 @@ import pytest
 from small_scans import SMALL, finish, process
 
 import viewer
-from viewer.renderer import Renderer
+from viewer.drawing.renderer import Renderer
 
 
 def test_doctor(renderer: Renderer) -> None:

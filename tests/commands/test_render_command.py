@@ -16,13 +16,13 @@ from small_scans import FRAMES, SMALL, front, names, stored
 from written import bits, film, picture
 
 import viewer
-from viewer import frame
 from viewer.app.scene.extent import Extent
 from viewer.camera import Camera
 from viewer.document.recording import Recording
+from viewer.drawing import frame
+from viewer.drawing.renderer import Renderer
 from viewer.look import SAMPLES, Look
 from viewer.picture.surface import NOTHING
-from viewer.renderer import Renderer
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.pods import first_camera
@@ -339,7 +339,7 @@ def test_stats(repeat: int | None, renderer: Renderer, run: Run, scans: Path, tm
 def test_repeat_draws_each_frame_so_often_after_two_warm_ups(
     run: Run, scans: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from viewer import timing
+    from viewer.drawing import timing
 
     drawn: list[bool] = []
     draw = timing.draw

@@ -22,15 +22,15 @@ from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.recording import Entry, Recording, fingerprint, matrix_of
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
-from viewer.frame import render_frame
 from viewer.geometry import vector
 from viewer.look import Look, rgba
 from viewer.output.export import marked, read_description
 from viewer.output.legend import Marks
 from viewer.output.overlays import LINE_COLOR, DrawnCurve, DrawnLandmark, DrawnPath, DrawnPlot
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan import formats
 from viewer.scan.open import open_scan

@@ -15,7 +15,7 @@ from written import film, picture
 from viewer.codewords.engine import draw_words, draw_words_plainly
 from viewer.codewords.settings import Params, words_of
 from viewer.codewords.stream import read_stream
-from viewer.frame import Request, view_of
+from viewer.drawing.request import Request, view_of
 from viewer.look import Look
 from viewer.scan import formats
 from viewer.scan.pose import Pose

@@ -20,7 +20,7 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_pose, anonymous_request, anonymous_unit, middle_of
 from viewer.document.recording import Entry, Recording, fingerprint, fingerprint_as
-from viewer.frame import Request
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.output.export import read_description
 from viewer.scan import formats

@@ -16,8 +16,8 @@ from viewer.camera import Camera
 from viewer.document import recording
 from viewer.document.landmarks import Note
 from viewer.document.recording import FORMAT, Entry, Recorder, Recording, fingerprint
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request
 from viewer.look import Look
 from viewer.output.export import write_png
 from viewer.output.legend import Marks

@@ -36,8 +36,9 @@ from viewer.document.document import Bookmark, Document
 from viewer.document.measurements import Measurements
 from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
+from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame, shared_renderer
 from viewer.look import Look
 from viewer.output.export import write_png
 from viewer.picture.surface import Surface

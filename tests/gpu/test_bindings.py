@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from viewer.drawing.renderer import Renderer
 from viewer.gpu import constants
 from viewer.gpu.bindings import Storage, Texture, UniformBlock, bindings_glsl
-from viewer.renderer import Renderer
 from viewer.resources import resource_path
 
 SHADERS = Path(str(resource_path("shaders")))

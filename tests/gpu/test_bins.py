@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.gpu import gl
 from viewer.gpu.bins import Bins
 from viewer.gpu.context import Gpu, Program
 from viewer.gpu.scatter import Visits, scatter
-from viewer.renderer import Renderer
 
 PARTS = Path(__file__).resolve().parent / "shaders"
 NONE, NO_KEY = 0xFFFFFFFF, 0x7F800000

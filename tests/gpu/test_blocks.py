@@ -10,11 +10,11 @@ import moderngl
 import numpy as np
 import pytest
 
+from viewer.drawing.renderer import Renderer
 from viewer.gpu import shader
 from viewer.gpu.bindings import UniformBlock
 from viewer.gpu.blocks import BlockBuffer, Mat4, Values, Vec4, block_of
 from viewer.params import param
-from viewer.renderer import Renderer
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,13 @@ from scenes import rarely
 from viewer.backends import backend
 from viewer.bounds import Bounds
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.gpu import chunks
 from viewer.gpu.chunks import in_coarse_order, in_file_order
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.view import View

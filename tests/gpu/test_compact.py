@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scenes import rarely
 
+from viewer.drawing.renderer import Renderer
 from viewer.gpu import gl
 from viewer.gpu.compact import MOST_WORDS, IndexList, list_flagged, prefix_sums, scan_words
 from viewer.gpu.context import Gpu, Program
-from viewer.renderer import Renderer
 
 PARTS = Path(__file__).resolve().parent / "shaders"
 BLOCK = 2048  # words of a work group on hardware; on software drivers up to 65536

@@ -13,11 +13,12 @@ from scenes import sphere
 
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import Scan4DError
-from viewer.frame import Request, render_frame
 from viewer.gpu.context import headless
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.splatting import fastest as module
 from viewer.splatting.amplify import FEEDS

@@ -15,13 +15,14 @@ from scenes import NOTHING, sphere
 from viewer.analysis.pick import pick
 from viewer.backends import FrameView, backends
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request, fallback
 from viewer.errors import InputError
-from viewer.frame import Request, fallback, render_frame
 from viewer.gpu.pose import GpuPose
 from viewer.look import COLOR_BY, Look, ValueKind, color_table
 from viewer.output.export import write_picture
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

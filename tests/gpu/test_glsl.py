@@ -29,7 +29,9 @@ from viewer.backends import Backend, backend, backends
 from viewer.bench import baselines
 from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame, supersample
+from viewer.drawing.frame import render_frame, supersample
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.gpu import chunks
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
@@ -39,7 +41,6 @@ from viewer.look import Look
 from viewer.picture.present import Presenter
 from viewer.picture.soften import soften
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.resources import resource_path
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

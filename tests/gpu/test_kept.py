@@ -11,9 +11,10 @@ from scenes import NOTHING, sphere
 
 from viewer.backends import backend
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting.kept import ClosedGaps, KeptPoints, stride_of

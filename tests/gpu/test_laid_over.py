@@ -17,13 +17,14 @@ from viewer.backends import backends
 from viewer.bench.judge import Judge
 from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_request
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame
 from viewer.look import Look
 from viewer.mesh.triangles import Mesh
 from viewer.output.export import write_picture
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.rigid import Rigid
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud

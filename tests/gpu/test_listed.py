@@ -9,11 +9,12 @@ import pytest
 
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame, supersample
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame, supersample
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

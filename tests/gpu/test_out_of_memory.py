@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from viewer.drawing.renderer import Renderer
 from viewer.errors import Scan4DError
-from viewer.renderer import Renderer
 
 ROOT = Path(__file__).resolve().parents[2]
 SHORT_OF_MEMORY = """
@@ -18,7 +18,8 @@ import resource, sys
 from pathlib import Path
 from viewer.camera import Camera
 from viewer.errors import Scan4DError
-from viewer.frame import Request, render_frame, shared_renderer
+from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.gpu import pyramid
 from viewer.gpu.context import Gpu
@@ -26,7 +27,6 @@ from viewer.gpu.pyramid import (
     Pyramid,
     sizes,
 )
-from viewer.renderer import Renderer
 
 FILTERS = {"box": BOX, "nearest": NEAREST, "tent": TENT, "binomial": BINOMIAL, "gaussian": GAUSSIAN}
 SIZES = [(1, 1), (2, 1), (1, 5), (7, 1), (5, 3), (16, 8), (33, 17), (255, 3)]

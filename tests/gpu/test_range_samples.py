@@ -15,6 +15,7 @@ from range_scenes import LENSES, looking_at, shape_view, sphere_view
 
 from viewer.bounds import Bounds
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.gpu import gl, range_samples
 from viewer.gpu.bindings import UniformBlock
@@ -25,7 +26,6 @@ from viewer.gpu.pose import GpuPose
 from viewer.gpu.pyramid import BINOMIAL, BOX, GAUSSIAN, NEAREST, TENT, Filter
 from viewer.gpu.range_samples import RangeSamples
 from viewer.gpu.view import ViewBlock
-from viewer.renderer import Renderer
 from viewer.scan.colors import linear_from_srgb8, srgb8
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import DepthKind, RangeView

@@ -7,8 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from viewer.drawing.renderer import Renderer
 from viewer.picture.sample import Sample, is_sampled
-from viewer.renderer import Renderer
 
 ROWS = np.arange(1 << 16, dtype=np.uint32)
 SHARES = [1, 0.84, 0.5, 0.25, 0.1, 0.01]

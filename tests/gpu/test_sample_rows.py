@@ -19,13 +19,14 @@ from viewer.analysis.spot import Spot
 from viewer.backends import Backend
 from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_request
+from viewer.drawing.frame import bring, is_prepared, render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, bring, is_prepared, render_frame
 from viewer.gpu.pose import GpuPose
 from viewer.look import Look, color_table
 from viewer.output.export import write_picture
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.layers import NO_LAYERS, Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from viewer.drawing.renderer import Renderer
 from viewer.gpu import shader
 from viewer.gpu.shader import ShaderError, Source
-from viewer.renderer import Renderer
 
 
 @pytest.fixture

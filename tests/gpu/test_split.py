@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.renderer import Renderer
+from viewer.drawing.renderer import Renderer
 
 PROBES = Path(__file__).resolve().parent / "shaders"
 

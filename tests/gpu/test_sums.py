@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.gpu.context import Gpu, Program
 from viewer.gpu.scatter import CellSums, FixedPoint, Visits
-from viewer.renderer import Renderer
 
 PARTS = Path(__file__).resolve().parent / "shaders"
 Array = NDArray[np.float64]

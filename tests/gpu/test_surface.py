@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 from scenes import DRAWS_POINTS, NOTHING, rarely, sphere
 
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame
 from viewer.gpu import gl
 from viewer.gpu.context import headless
 from viewer.look import Look, color_table
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.estimate import fake_color
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewer.renderer import Renderer
+from viewer.drawing.renderer import Renderer
 
 PROBE = str(Path(__file__).resolve().parent / "shaders" / "triangle.comp")
 

@@ -25,8 +25,8 @@ from viewer.scan.spacing import typical_spacing
 from viewer.srgb import bytes_from_linear, linear_from_bytes
 
 if TYPE_CHECKING:
+    from viewer.drawing.renderer import Renderer
     from viewer.picture.surface import Surface
-    from viewer.renderer import Renderer
 
 SIZE = (96, 72)
 CAMERA = Camera(eye=(2, 1.5, 3))

@@ -17,9 +17,10 @@ from viewer.bench.rounding import Rounding
 from viewer.bench.shots import RgbdImage, picture
 from viewer.bench.stability import Difference, Row, difference
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.splatting.amplify import FEEDS
 

@@ -24,16 +24,16 @@ import numpy as np
 from device import write_rows
 
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
+from viewer.drawing.timing import draw, pass_ms
 from viewer.errors import Scan4DError
-from viewer.frame import Request
 from viewer.gpu.bindings import Storage
 from viewer.gpu.context import Gpu
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
-from viewer.timing import draw, pass_ms
 
 COPY = str(Path(__file__).resolve().parent / "shaders" / "copy.comp")
 _SHADING = "shade"

@@ -25,13 +25,13 @@ from splats import ORDERS, sphere
 
 from viewer.backends import backends
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
+from viewer.drawing.timing import draw, pass_ms
 from viewer.errors import Scan4DError
-from viewer.frame import Request
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
-from viewer.timing import draw, pass_ms
 
 PASSES = ("one", "two")
 _SHADING = "shade"  # the pass that all pictures have

@@ -63,8 +63,8 @@ class Scan4D:
     splats = "backend surfels, head light"
 
     def __init__(self, size: tuple[int, int]) -> None:
+        from viewer.drawing.renderer import Renderer
         from viewer.picture.surface import Surface
-        from viewer.renderer import Renderer
 
         self._renderer = Renderer()
         self._surface = Surface(self._renderer.gpu, size)
@@ -90,7 +90,8 @@ class Scan4D:
     def picture(self, eye: tuple[float, float, float]) -> Array:
         """See Peer."""
         from viewer.camera import Camera
-        from viewer.frame import Request, render_frame
+        from viewer.drawing.frame import render_frame
+        from viewer.drawing.request import Request
 
         camera = Camera(eye=eye, target=MIDDLE, fov_y=FOV)
         render_frame(

@@ -18,9 +18,9 @@ import numpy as np
 
 from viewer.backends import FrameView, backend
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.gpu.pose import GpuPose
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.view import View

@@ -35,9 +35,10 @@ from points import cloud_of
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import NOTHING, PointCloud
 from viewer.scan.pose import Pose
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..frame import Request, shared_renderer
+from ..drawing.frame import shared_renderer
+from ..drawing.request import Request
 from ..gpu.pose import drawn_bounds
 from ..view import View
 from ..visibility.search import visible_points

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ..backends.auto_splats.neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from ..camera import Camera
+from ..drawing.frame import shared_renderer
 from ..errors import InputError
-from ..frame import shared_renderer
 from ..gpu.constants import UNKNOWN
 from ..picture.surface import Surface
 from ..scan.pods import first_camera

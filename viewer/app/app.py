@@ -19,10 +19,10 @@ from imgui_bundle import imgui
 from ..backends import backend
 from ..document.document import Document
 from ..document.saved_session import SavedSession, kept
+from ..drawing.renderer import Renderer
 from ..errors import InputError, Scan4DError
 from ..folders import user_folder
 from ..gpu.context import Gpu
-from ..renderer import Renderer
 from ..scan.open import DEMO, open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline

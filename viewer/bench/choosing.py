@@ -21,13 +21,14 @@ from ..choice.known import model_of
 from ..choice.model import CAP, Law, Measured, Model, fit
 from ..choice.seen import ScanInView
 from ..choice.ways import SCALES, DrawingWay, ways
+from ..drawing.frame import scaled_size
+from ..drawing.request import Request, view_of
+from ..drawing.timing import draw, undisturbed_ms
 from ..errors import InputError
-from ..frame import Request, scaled_size, view_of
 from ..look import Look
 from ..mesh.reference import first_hits
 from ..mesh.scene import Scene
 from ..picture.surface import Surface
-from ..timing import draw, undisturbed_ms
 from .plan import Group
 from .report.results import Row
 from .run import Bench, undisturbed

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..backends import backend
-from ..frame import backend_for
+from ..drawing.request import backend_for
 from ..params import Parameter
 from .baselines import FLOOR
 from .plan import Contender, Group

@@ -20,13 +20,14 @@ from ..analysis.pick import before_gap, pick
 from ..analysis.spot import Spot
 from ..backends import backend
 from ..camera import Camera
+from ..drawing.frame import render_frame
+from ..drawing.renderer import Renderer
+from ..drawing.request import Request
 from ..errors import InputError
-from ..frame import Request, render_frame
 from ..geometry import vector
 from ..mesh.reference import first_hits, trace
 from ..mesh.scene import Scene
 from ..picture.surface import Surface
-from ..renderer import Renderer
 from ..scan.pose import Pose
 from .plan import Group
 from .report import measurement

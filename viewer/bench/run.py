@@ -21,16 +21,16 @@ from typing import Literal
 from .. import __version__
 from ..backends import backend
 from ..camera import Camera
+from ..drawing.renderer import Renderer
+from ..drawing.request import Request
+from ..drawing.timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from ..errors import InputError
 from ..files import output_folder, whole_file
-from ..frame import Request
 from ..look import Look
 from ..mesh.range_mesh import triangulated
 from ..mesh.reference import footprint
 from ..picture.surface import Surface
-from ..renderer import Renderer
 from ..signals import Interrupts
-from ..timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
 from . import baselines, numerics
 from .baselines import CEILING, FLOOR, PLANE_POINTS, PRECOMPUTED, RANGE_MESH
 from .judge import Judge, Walk

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..backends import Backend
 from ..camera import Camera
-from ..frame import Request, render_frame
+from ..drawing.frame import render_frame
+from ..drawing.renderer import Renderer
+from ..drawing.request import Request
 from ..look import Look
 from ..picture.surface import Surface
-from ..renderer import Renderer
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from .scenes.samples import Arrays

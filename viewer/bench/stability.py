@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..backends import Backend, Limit
-from ..renderer import Renderer
+from ..drawing.renderer import Renderer
 from ..splatting.amplify import FEEDS
 from .rounding import IN_SOFTWARE, Rounding
 from .shots import PointView, RgbdImage, picture

@@ -8,8 +8,8 @@ from ..camera import Camera
 from ..choice.choose import Choice, choose_way
 from ..choice.goal import Goal, error_goal, in_unit, time_goal
 from ..choice.known import model_of
+from ..drawing.request import Request, view_of
 from ..errors import InputError
-from ..frame import Request, view_of
 from ..scan.pose import Pose
 from . import _drawing as drawing
 from ._console import warn

@@ -9,20 +9,20 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from .. import frame
 from ..backends import backend as find_backend
 from ..backends import missing_source
 from ..bounds import Bounds
 from ..camera import Camera
 from ..document.recording import Entry
+from ..drawing import frame
+from ..drawing.renderer import Renderer
+from ..drawing.request import Request, backend_for
 from ..errors import InputError
-from ..frame import Request, backend_for
 from ..gpu.context import headless
 from ..look import COLOR_BY, Look, drawable, is_open_range, with_range
 from ..output.export import numbered
 from ..output.legend import Legend
 from ..picture.surface import Surface
-from ..renderer import Renderer
 from ..scan.pods import first_camera
 from ..scan.pose import Pose
 from ..scan.ranges import ValueRanges

@@ -19,8 +19,8 @@ from ..document.recording import (
     new_salt,
     places_to_open,
 )
+from ..drawing.request import Request
 from ..errors import InputError
-from ..frame import Request
 from ..output.export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
 from ..output.legend import Legend, marks_of
 from ..scan.inputs import scan_inputs

@@ -8,10 +8,10 @@ from statistics import median
 from typing import Any
 
 from ..choice.choose import Automatic
-from ..frame import Request
+from ..drawing.renderer import Renderer
+from ..drawing.request import Request
+from ..drawing.timing import call_ms, pass_ms, peak_rss
 from ..picture.surface import Surface
-from ..renderer import Renderer
-from ..timing import call_ms, pass_ms, peak_rss
 
 _WARM_UPS = 2
 

@@ -17,8 +17,8 @@ from ..camera import Camera
 from ..codewords.engine import NO_WORD, CodePicture, draw_words
 from ..codewords.settings import Params, words_of
 from ..codewords.stream import SUFFIX, WordStream, read_stream, write_stream
+from ..drawing.request import Request, view_of
 from ..errors import InputError
-from ..frame import Request, view_of
 from ..look import Look, drawable, value_source
 from ..output.export import FILM_SUFFIX, check_output, film, numbered, write_arrays, write_png
 from ..params import parse

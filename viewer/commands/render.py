@@ -23,9 +23,11 @@ from ..choice.choose import Choice
 from ..choice.goal import Goal
 from ..document.anonymous import anonymous_request
 from ..document.recording import Entry, fingerprint, new_salt
+from ..drawing.frame import supersample
+from ..drawing.request import Request, backend_for
+from ..drawing.timing import draw
 from ..errors import InputError
 from ..files import whole_file
-from ..frame import Request, backend_for, supersample
 from ..look import SAMPLES, Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..output.legend import MARKS, Legend, marks_of
@@ -34,7 +36,6 @@ from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
 from ..scan.upright import Upright
-from ..timing import draw
 from . import _arguments as arguments
 from . import _drawing as drawing
 from . import _replay as replay

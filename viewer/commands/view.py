@@ -15,9 +15,10 @@ from pathlib import Path
 
 from ..document.recording import Recording, is_recording, place_of
 from ..document.saved_session import SavedSession, is_session
+from ..drawing.request import Request
+from ..drawing.timing import draw
 from ..errors import InputError, NoOpenGLError
 from ..files import output_folder, printable
-from ..frame import Request
 from ..look import Look
 from ..output.export import contact_sheet, film, thumbnail, write_png
 from ..scan.inputs import scan_inputs
@@ -25,7 +26,6 @@ from ..scan.listing import is_there, named_scans
 from ..scan.open import DEMO
 from ..scan.pods import first_camera
 from ..scan.timeline import Timeline
-from ..timing import draw
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..analysis.measure import Measurement
 from ..analysis.spot import Spot
 from ..camera import Camera
-from ..frame import Request
+from ..drawing.request import Request
 from ..geometry import up_vector, vector
 from ..look import Look, drawable, unnamed, value_source
 from ..scan.points import UNKNOWN_UNIT, PointCloud

@@ -13,8 +13,8 @@ from ..backends import backend, backends
 from ..camera import Camera
 from ..choice.goal import Goal
 from ..choice.ways import DrawingWay
+from ..drawing.request import Request, backend_for, colorable
 from ..errors import InputError, shortened
-from ..frame import Request, backend_for, colorable
 from ..geometry import UP, Vector, up_vector
 from ..look import Look
 from ..scan.layers import NO_LAYERS, Layers

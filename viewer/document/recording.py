@@ -37,9 +37,9 @@ from ..analysis.spot import slack_before, spot_slack
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..choice.choose import Automatic, Choice
+from ..drawing.request import Request
 from ..errors import InputError, shortened
 from ..files import open_plain, whole_file
-from ..frame import Request
 from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description

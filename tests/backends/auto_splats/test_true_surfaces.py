@@ -15,7 +15,7 @@ from viewer.bench.run import Bench, BenchSettings
 from viewer.bench.scenes import catalog
 
 if TYPE_CHECKING:
-    from viewer.renderer import Renderer
+    from viewer.drawing.renderer import Renderer
 
 pytestmark = [pytest.mark.backend("auto_splats"), pytest.mark.slow]
 

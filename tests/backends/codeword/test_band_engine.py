@@ -14,8 +14,8 @@ from viewer.backends.codeword.engine import draw_stream
 from viewer.codewords.encode import Elements, encode_elements
 from viewer.codewords.engine import CodePicture, draw_words, draw_words_plainly
 from viewer.codewords.stream import WordStream
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
-from viewer.renderer import Renderer
 
 
 def assert_same(one: CodePicture, other: CodePicture) -> None:

@@ -15,11 +15,12 @@ from viewer.camera import PROJECTIONS, Camera
 from viewer.codewords.engine import draw_words
 from viewer.codewords.settings import words_of
 from viewer.codewords.stream import FINE_DEPTHS
-from viewer.frame import Request, render_frame, view_of
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request, view_of
 from viewer.gpu.constants import NOTHING
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -29,10 +29,11 @@ from viewer.codewords.project_kernels import (
 from viewer.codewords.settings import elements_of, point_materials, word_lights, words_of
 from viewer.codewords.stream import strip_width
 from viewer.codewords.words import decode_words
-from viewer.frame import Request, render_frame, view_of
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request, view_of
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.gpu.constants import NOTHING
 from viewer.gpu.pose import GpuPose
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.view import View

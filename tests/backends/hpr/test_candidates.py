@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.gpu import gl
 from viewer.gpu.context import Gpu
-from viewer.renderer import Renderer
 from viewer.scan.points import NOTHING
 from viewer.visibility.candidates import UNLIMITED, Candidates
 from viewer.visibility.clipping import EVERYWHERE

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scenes import rarely, sphere
 
 from viewer.camera import Camera
-from viewer.frame import Renderer
+from viewer.drawing.frame import Renderer
 from viewer.gpu.pose import GpuPose
 from viewer.mesh.reference import visible
 from viewer.mesh.triangles import read_mesh

@@ -15,9 +15,9 @@ from viewer.backends.hpr import faces as faces_module
 from viewer.backends.hpr.faces import draw_faces
 from viewer.backends.hpr.splats import SectorSplats
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]

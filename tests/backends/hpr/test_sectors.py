@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from viewer.drawing.renderer import Renderer
 from viewer.gpu import gl
 from viewer.gpu.bindings import Storage
-from viewer.renderer import Renderer
 from viewer.scan.points import NOTHING
 from viewer.visibility.candidates import Candidates
 from viewer.visibility.sectors import Sectors

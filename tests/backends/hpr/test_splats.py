@@ -13,9 +13,9 @@ from sector_scenes import Scene
 
 from viewer.backends.hpr.splats import SectorSplats
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]

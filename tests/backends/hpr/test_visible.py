@@ -13,11 +13,12 @@ from scenes import rarely, sphere
 
 from viewer.backends.hpr import Params
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.visibility.exact import exact_visible_points

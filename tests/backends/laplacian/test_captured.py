@@ -17,10 +17,11 @@ from test_spline import ROUNDING, SHAPE, banded, speckled, two_views, unbanded
 from viewer.backends import backend
 from viewer.bench.seams import pods_facing, seam_visibility, seams
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.mesh.reference import trace
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.colors import linear_from_srgb8
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView

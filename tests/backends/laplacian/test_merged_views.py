@@ -13,12 +13,13 @@ from scenes import NOTHING, rarely, sphere, sphere_mesh
 
 from viewer.bench.seams import detail_psnr, pods_facing, seam_visibility, seams
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame
 from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView
 from viewer.simulate.scanner import Faults, around, capture, rig

@@ -12,10 +12,11 @@ from scipy import ndimage
 
 from viewer.backends import backend
 from viewer.backends.laplacian.spline import Pictures
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.mesh.merging.competition import competition_weights
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView
 

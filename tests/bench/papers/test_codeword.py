@@ -10,8 +10,8 @@ import pytest
 from viewer.bench.papers.marsik_2010 import codeword, words
 from viewer.bench.report.results import WORD_PIXELS, WORD_TABLES, WORD_TIMES, write_row
 from viewer.bench.run import Bench, BenchSettings
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
-from viewer.renderer import Renderer
 
 pytestmark = pytest.mark.backend("codeword")
 SIZE = (80, 60)

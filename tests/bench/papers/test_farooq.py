@@ -19,7 +19,7 @@ from viewer.bench.scenes import catalog
 from viewer.errors import InputError
 
 if TYPE_CHECKING:
-    from viewer.renderer import Renderer
+    from viewer.drawing.renderer import Renderer
 
 NONE = "\N{EN DASH}"
 PARAMS = {"fill": True, **{f"level_{k}": True for k in range(5)}, "primitive": "points", "hide": True}

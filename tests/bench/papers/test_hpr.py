@@ -25,9 +25,9 @@ from viewer.bench.report.results import GROWTH, SPEEDS, VISIBILITY, Row, write_r
 from viewer.bench.run import Bench, BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.subjects import Moment
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.mesh.triangles import Mesh
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.visibility.exact import SeenPoints, flipping, hull_rows

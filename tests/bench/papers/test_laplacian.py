@@ -18,10 +18,10 @@ from viewer.bench.report.results import ALONE, BAND_TIMES, PICTURE_SIZES, SEAMS,
 from viewer.bench.run import Bench, BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.bench.scenes.subjects import Moment, Subject
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

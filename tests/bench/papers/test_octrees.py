@@ -16,7 +16,7 @@ from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.bench.plan import Group
 from viewer.bench.report.results import Row
 from viewer.bench.run import Bench, BenchSettings
-from viewer.renderer import Renderer
+from viewer.drawing.renderer import Renderer
 from viewer.scan.octree.cube import Cube
 
 SETTINGS = BenchSettings(size=(96, 64), views=2, repeat=1)

@@ -21,7 +21,7 @@ from viewer.mesh.reference import trace
 from viewer.scan.pose import Pose
 
 if TYPE_CHECKING:
-    from viewer.renderer import Renderer
+    from viewer.drawing.renderer import Renderer
 
 WHERE = {
     "device": "a card", "driver": "4.6", "timer": "finish", "processors": 4, "version": "0.1.0",

@@ -15,10 +15,11 @@ from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.bench.run import BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.open import open_scan
 from viewer.splatting.amplify import FEEDS
 

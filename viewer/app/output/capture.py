@@ -18,9 +18,9 @@ from ...document.journal import Journal, journal_folder, journals, saved, writte
 from ...document.landmarks import Landmarks
 from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
+from ...drawing.request import Request
 from ...errors import InputError, explained
 from ...files import free_file, working_folder
-from ...frame import Request
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.labels import LabelPlaces
 from ...output.legend import Legend, Marks

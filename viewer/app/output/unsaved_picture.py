@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from ...frame import Request, bring, prepare, render_frame, supersample
+from ...drawing.frame import bring, prepare, render_frame, supersample
+from ...drawing.renderer import Renderer
+from ...drawing.request import Request
 from ...look import SAMPLES
 from ...picture.surface import Surface
-from ...renderer import Renderer
 from ...task import Task
 
 _UPLOAD_MS = 20.0  # that one slice may spend on uploading a pose

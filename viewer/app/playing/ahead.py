@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 from ...document.document import Document
-from ...frame import Request, is_prepared, prepare_ahead
-from ...renderer import Renderer
+from ...drawing.frame import is_prepared, prepare_ahead
+from ...drawing.renderer import Renderer
+from ...drawing.request import Request
 from ...scan.pose import Pose
 from ..session import Session
 from .playback import Playback

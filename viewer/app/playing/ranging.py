@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import Future
 from dataclasses import replace
 
-from ...frame import Request
+from ...drawing.request import Request
 from ...look import Look, is_open_range, with_range
 from ...scan.pose import Pose
 from ...scan.ranges import ValueRanges

@@ -14,8 +14,8 @@ from ...choice.goal import Goal, in_unit
 from ...choice.known import model_of
 from ...choice.model import Model
 from ...choice.seen import ScanInView
+from ...drawing.request import Request, view_of
 from ...errors import InputError
-from ...frame import Request, view_of
 from ...task import Task, in_background
 from ..playing.playback import Playback
 from ..session import Session

@@ -15,24 +15,15 @@ from numpy.typing import NDArray
 from ...analysis.pick import Picked, before_gap, pick
 from ...backends import backends
 from ...bounds import Bounds
+from ...drawing.frame import bring, is_prepared, prepare, render_frame, reshade, supersample
+from ...drawing.renderer import Renderer
+from ...drawing.request import Request, colorable, fallback
 from ...errors import Scan4DError
-from ...frame import (
-    Request,
-    bring,
-    colorable,
-    fallback,
-    is_prepared,
-    prepare,
-    render_frame,
-    reshade,
-    supersample,
-)
 from ...look import SAMPLES
 from ...output.labels import covered_cells
 from ...picture.present import Presenter
 from ...picture.soften import soften
 from ...picture.surface import Surface
-from ...renderer import Renderer
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
 from ..failures import failure_in_words

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 from ....camera import Camera
-from ....frame import Request
+from ....drawing.request import Request
+from ....drawing.timing import call_ms, draw
 from ....picture.surface import Surface
 from ....scan.formats.exr import write_views
 from ....scan.open import open_scan
 from ....scan.pose import Pose
 from ....scan.range_view import RangeView
 from ....simulate.scanner import Faults, around, capture, rig
-from ....timing import call_ms, draw
 from ....unfinished import temporary_folder
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed

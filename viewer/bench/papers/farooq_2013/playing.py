@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-from ....frame import Request, render_frame
+from ....drawing.frame import render_frame
+from ....drawing.request import Request
 from ....picture.surface import Surface
 from ....scan.formats.exr import write_views
 from ....scan.open import open_scan

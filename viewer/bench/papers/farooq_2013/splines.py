@@ -16,17 +16,17 @@ from numpy.typing import NDArray
 
 from ....backends import backend
 from ....camera import Camera
+from ....drawing.renderer import Renderer
+from ....drawing.request import Request
+from ....drawing.timing import call_ms, draw, pass_ms
 from ....errors import InputError
-from ....frame import Request
 from ....look import Look
 from ....mesh.reference import Reference, footprint, trace
 from ....picture.surface import Surface
-from ....renderer import Renderer
 from ....scan.pose import Pose
 from ....scan.range_view import RangeView
 from ....simulate.scanner import Faults, around, capture, rig
 from ....srgb import bytes_from_linear
-from ....timing import call_ms, draw, pass_ms
 from ...metrics import Errors, Mask, scanned
 from ...plan import Group
 from ...report.pictures import Image, titled_row

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from ....backends import backend
 from ....camera import Camera
+from ....drawing.renderer import Renderer
+from ....drawing.request import Request
+from ....drawing.timing import draw
 from ....files import output_folder, whole_file
-from ....frame import Request
 from ....look import Look
 from ....picture.surface import Surface
-from ....renderer import Renderer
 from ....scan.points import PointCloud
 from ....scan.pose import Pose
-from ....timing import draw
 from ....visibility.exact import exact_visible_points
 from ....visibility.search import MODES, calibrated, visible_points
 from ...report.pictures import Image, titled_row

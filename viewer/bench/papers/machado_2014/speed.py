@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from ....backends import backend
-from ....frame import Request
+from ....drawing.request import Request
+from ....drawing.timing import draw
 from ....picture.surface import Surface
 from ....resources import resource_path
 from ....scan.pose import Pose
-from ....timing import draw
 from ....visibility.search import MODES, calibrated, chosen_search, visible_points
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed

@@ -20,12 +20,13 @@ from ....codewords import settings as words
 from ....codewords.engine import draw_words
 from ....codewords.stream import WordStream
 from ....codewords.tables import PAPER, Steps, shape_table
+from ....drawing.frame import render_frame
+from ....drawing.request import Request, view_of
+from ....drawing.timing import draw
 from ....errors import InputError
-from ....frame import Request, render_frame, view_of
 from ....gpu.constants import NOTHING
 from ....picture.surface import Surface
 from ....scan.pose import Pose
-from ....timing import draw
 from ...plan import Group
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed

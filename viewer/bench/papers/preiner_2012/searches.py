@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from ....camera import Camera
-from ....frame import Request
+from ....drawing.request import Request
+from ....drawing.timing import draw
 from ....picture.surface import Surface
 from ....scan.pose import Pose
-from ....timing import draw
 from ...plan import Group
 from ...report.results import Row
 from ...run import LOOK, Bench, undisturbed

@@ -12,11 +12,12 @@ from scenes import every_backend, of_variant, sphere
 
 from viewer.backends import backend
 from viewer.camera import Camera
-from viewer.frame import Request, render_frame, sample_shifts, supersample
+from viewer.drawing.frame import render_frame, sample_shifts, supersample
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.look import SAMPLES, Look
 from viewer.picture.mean import PictureMean
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.srgb import LIGHT_PARTS, bytes_from_light, light_from_bytes

@@ -12,14 +12,15 @@ import viewer
 from viewer.backends import CHANGES, Backend, Derives, FrameView
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
+from viewer.drawing.frame import bring, is_prepared, render_frame
+from viewer.drawing.renderer import Renderer, Want
+from viewer.drawing.request import Request, backend_for, fallback
 from viewer.errors import InputError
-from viewer.frame import Request, backend_for, bring, fallback, is_prepared, render_frame
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
 from viewer.look import Look
 from viewer.params import param
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer, Want
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

@@ -13,13 +13,13 @@ from scenes import sphere
 
 from viewer.backends import Backend, Derives, FrameView
 from viewer.backends import backend as find_backend
+from viewer.drawing.renderer import Renderer, Want
 from viewer.errors import InputError
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
 from viewer.look import Look
 from viewer.params import param
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer, Want
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.task import checkpoint

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING
 from scenes import looking_down_z, plane
 
 from viewer.backends import CHANGES, FrameView, points
-from viewer.frame import Request
+from viewer.drawing.request import Request
+from viewer.drawing.timing import call_ms, draw, pass_ms
 from viewer.gpu.pose import GpuPose
 from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
-from viewer.timing import call_ms, draw, pass_ms
 
 if TYPE_CHECKING:
-    from viewer.renderer import Renderer
+    from viewer.drawing.renderer import Renderer
 
 
 class Watched(points.PointSquares):

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from .frame import Request, render_frame
-from .picture.surface import Surface
+from ..picture.surface import Surface
+from .frame import render_frame
 from .renderer import Renderer
+from .request import Request
 
 _PROCESS = Path("/proc/self")  # Linux
 

@@ -11,11 +11,12 @@ from scenes import sphere
 
 from viewer.backends import backend, backends
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame, reshade
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
-from viewer.frame import Request, render_frame, reshade
 from viewer.look import Look
 from viewer.picture.surface import Surface
-from viewer.renderer import Renderer
 from viewer.scan.layers import Layers
 from viewer.scan.pose import Pose
 

@@ -11,19 +11,19 @@ from concurrent import futures
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from .backends import Backend, Derived, Derives
-from .errors import InputError
-from .gpu.context import Gpu, headless
-from .gpu.pose import GpuPose
-from .helper import Job, Workers
-from .look import Look, wants_normals
-from .scan.cache import default_budget
-from .scan.estimate import estimate
-from .scan.points import PointCloud
-from .scan.pose import Life, Pose
-from .scan.spacing import spacings
-from .task import Task
-from .view import View
+from ..backends import Backend, Derived, Derives
+from ..errors import InputError
+from ..gpu.context import Gpu, headless
+from ..gpu.pose import GpuPose
+from ..helper import Job, Workers
+from ..look import Look, wants_normals
+from ..scan.cache import default_budget
+from ..scan.estimate import estimate
+from ..scan.points import PointCloud
+from ..scan.pose import Life, Pose
+from ..scan.spacing import spacings
+from ..task import Task
+from ..view import View
 
 _GIGABYTE = 1 << 30
 _VIEWS = 4  # of a pose that what is derived by camera is kept for

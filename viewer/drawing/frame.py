@@ -4,47 +4,31 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from .backends import Backend, FrameView, backends, missing_source
-from .backends import backend as find_backend
-from .camera import Camera
-from .gpu.context import Gpu
-from .gpu.pose import GpuPose, drawn_bounds
-from .look import SAMPLES, Look, drawable
-from .picture.frame_view import Before
-from .picture.mean import PictureMean
-from .picture.shade import shade
-from .picture.stats import Stats
-from .picture.surface import Surface
+from ..backends import FrameView, missing_source
+from ..backends import backend as find_backend
+from ..camera import Camera
+from ..gpu.context import Gpu
+from ..gpu.pose import GpuPose
+from ..look import SAMPLES, Look
+from ..picture.frame_view import Before
+from ..picture.mean import PictureMean
+from ..picture.shade import shade
+from ..picture.stats import Stats
+from ..picture.surface import Surface
+from ..scan.layers import NO_LAYERS, Layers
+from ..scan.pods import first_camera
+from ..scan.points import PointCloud
+from ..scan.pose import Pose
+from ..view import View
 from .renderer import Renderer, Want
-from .scan.layers import NO_LAYERS, Layers
-from .scan.pods import first_camera
-from .scan.points import PointCloud
-from .scan.pose import Pose
-from .view import View, origin_near
+from .request import FALLBACK, Request, backend_for, colorable, fallback, view_of
 
-FALLBACK = "points"
 _BUDGET_MS = 15.0  # of a frame for what a backend can go on with in the next
-
-
-@dataclass(frozen=True, eq=False)
-class Request:
-    """Order for a picture. backend: a name, or one that is not in the folder of backends; None
-    for the default of the scan (see `backend_for`).
-
-    params: the backend's own `Params`; None for its defaults. layers: over the pose.
-    """
-
-    pose: Pose
-    camera: Camera
-    backend: str | Backend | None = None
-    params: Any = None
-    look: Look = field(default_factory=Look)
-    layers: Layers = NO_LAYERS
 
 
 def render_frame(
@@ -75,7 +59,7 @@ def render_frame(
 
     pose = renderer.resident(request.pose)
     request.layers.check(request.pose)
-    backend, params = chosen = _chosen(request)
+    backend, params = chosen = request.chosen
     view = view_of(request, surface.size)
     pose.center(view.origin)
     prepared = renderer.prepare(pose, backend, params, request.look, wait, view)
@@ -135,7 +119,7 @@ def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
     wanted = {
         "pose": pose,
         "camera": view_of(request, surface.size).key,
-        "parameters": _chosen(request),
+        "parameters": request.chosen,
         "size": surface.size,
     }
     same_numbers = layers is request.layers or not (layers.scalars or request.layers.scalars)
@@ -245,7 +229,7 @@ def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms
     A window calls it again and again before `render_frame`, so that it is stopped by neither.
     """
     pose = renderer.resident(request.pose)
-    backend, params = _chosen(request)
+    backend, params = request.chosen
     if not backend.draws_samples(request.pose, params) and not renderer.merge(pose):
         return False
     pose.center(view_of(request, size).origin)
@@ -255,14 +239,14 @@ def bring(renderer: Renderer, request: Request, size: tuple[int, int], budget_ms
 def is_prepared(renderer: Renderer, request: Request, size: tuple[int, int] | None = None) -> bool:
     """Whether nothing has to be merged, estimated or derived for a picture of this size, pixels; or what has
     to be cannot, which drawing it will tell. size: None leaves out what is derived for one view alone."""
-    by_camera = size is not None and _chosen(request)[0].derived_by_camera
+    by_camera = size is not None and request.chosen.backend.derived_by_camera
     return renderer.is_prepared(_want(request, view_of(request, size) if by_camera and size else None))
 
 
 def prepare(renderer: Renderer, request: Request, size: tuple[int, int]) -> bool:
     """Have workers make what a picture of this size needs, before anything else; whether it is there. Raises
     what that has failed with."""
-    pose, (backend, params) = renderer.resident(request.pose), _chosen(request)
+    pose, (backend, params) = renderer.resident(request.pose), request.chosen
     view = view_of(request, size)
     return renderer.prepare(pose, backend, params, request.look, wait=False, view=view) is not None
 
@@ -273,64 +257,8 @@ def prepare_ahead(renderer: Renderer, requests: Iterable[Request], afresh: bool 
     renderer.prepare_ahead((_want(request, None) for request in requests), afresh)
 
 
-def fallback(request: Request) -> Request:
-    """Request for plain points that touch, of which nothing is prepared: drawn while the other picture is."""
-    points = find_backend(FALLBACK)
-    suited = points.suits(request.pose)
-    params = points.params(suited.params if suited else None)
-    plain = colorable(replace(request, backend=FALLBACK, params=params))
-    return replace(plain, look=_unlit(plain.look))
-
-
-def colorable(request: Request) -> Request:
-    """The request with other colours where neither its pose nor its backend has the number that gives
-    them."""
-    names = request.layers.names(request.pose.overview.scalars)
-    look = drawable(request.look, names, _chosen(request)[0].values)
-    return request if look is request.look else replace(request, look=look)
-
-
-def view_of(request: Request, size: tuple[int, int]) -> View:
-    """The view that a request shows its pose by, in a picture of this size, pixels."""
-    pose, camera, place = request.pose, request.camera, request.layers.place
-    origin = origin_near(camera, size, pose.origin, place)
-    bounds = drawn_bounds(pose, camera)
-    return View.of(camera, size, origin, bounds, place).straightened(bounds)
-
-
 def _want(request: Request, view: View | None) -> Want:
-    return Want(request.pose, *_chosen(request), request.look, view)
-
-
-def _chosen(request: Request) -> tuple[Backend, Any]:
-    """The backend of a request and its parameters."""
-    if isinstance(request.backend, Backend):
-        backend, params = request.backend, request.backend.params()
-    else:
-        name, params = backend_for(request.pose, request.backend)
-        backend = find_backend(name)
-    return backend, params if request.params is None else request.params
-
-
-def _unlit(look: Look) -> Look:
-    """The look without what needs normals, for as long as they are being estimated."""
-    color_by = "auto" if look.color_by == "normal" else look.color_by
-    return replace(look, light="auto", color_by=color_by)
-
-
-def backend_for(
-    pose: Pose, name: str | None = None, values: Mapping[str, object] | None = None
-) -> tuple[str, Any]:
-    """(backend name, its parameters) for a scan: what the user named, the rest by default.
-
-    name: None takes the backend that says it suits the pose best, as it was read: a default never waits for
-    an estimate. values: parameters by name. Raises InputError for unknown names.
-    """
-    if name is not None:
-        return name, find_backend(name).params(values)
-    suited = [(one, found) for one in backends().values() if (found := one.suits(pose)) is not None]
-    best, (_, params) = max(suited, key=lambda each: each[1].rank)
-    return best.name, best.params({**params, **(values or {})})
+    return Want(request.pose, *request.chosen, request.look, view)
 
 
 def render(
