@@ -171,7 +171,7 @@ def test_unknown_backend_lists_the_known() -> None:
 
 @pytest.mark.parametrize("color", ["#ff 00 ", "#\uff10fffff", "#fffffff", "ffffff", "#12345\n"])
 def test_what_is_no_colour_is_refused(color: str) -> None:
-    with pytest.raises(InputError, match="is no colour"):
+    with pytest.raises(InputError, match="is not a colour"):
         Look(background=color)
 
 
@@ -179,7 +179,7 @@ def test_look_is_declared_like_a_backend() -> None:
     look = parse(Look, {"light": "fixed", "eye_dome": "on", "low": "0.5", "background": "#ffffff80"})
     assert look == Look(light="fixed", eye_dome=True, low=0.5, background="#ffffff80")
     assert {p.name for p in describe(Look)} >= {"color_by", "light", "color_map"}
-    with pytest.raises(InputError, match="no colour"):
+    with pytest.raises(InputError, match="not a colour"):
         Look(background="white")
 
 

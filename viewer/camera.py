@@ -109,7 +109,7 @@ class Camera:
     def from_json(cls, data: dict[str, Any]) -> Camera:
         """The camera of a JSON object as `to_json` gives it; raises InputError."""
         if not isinstance(data, dict):
-            raise InputError("a camera is a JSON object")
+            raise InputError("a camera must be a JSON object")
         known = list(cls.__dataclass_fields__)
         for name in data:
             if name not in known:
@@ -245,7 +245,7 @@ class Camera:
     def at_distance(self, distance: float) -> Camera:
         """Move to another distance from the target (scan units), in the same direction."""
         if not (math.isfinite(distance) and distance > 0):
-            raise InputError(f"a camera's distance is positive, not {distance}")
+            raise InputError(f"a camera's distance must be positive, not {distance}")
         eye = np.array(self.target) + self.rotation()[2] * distance
         height = self.height and self.height * distance / self.distance
         return replace(self, eye=vector(eye), height=height)

@@ -64,14 +64,14 @@ class Look:
 
     quality: str = param(
         "balanced",
-        "Anti-aliasing of still pictures. fast: one sample a pixel; balanced: the mean of 5; fine: the "
+        "Anti-aliasing of still pictures. fast: one sample per pixel; balanced: the mean of 5; fine: the "
         "mean of 17",
         choices=tuple(SAMPLES), words=QUALITY_WORDS, title="Anti-aliasing", basic=True,
     )  # fmt: skip
     color_by: str = param(
         "auto",
-        f"Source of the colour: {', '.join(COLOR_BY)}, a scalar's name, #N for scalar N, or a number "
-        "that the renderer computes",
+        f"What the colour shows: {', '.join(COLOR_BY)}, the name of a scalar, #N for the Nth scalar, "
+        "or a quantity that the renderer computes",
         title="Colour by",
         words=COLOR_WORDS,
         group="Colour",
@@ -88,8 +88,8 @@ class Look:
     )
     range: str = param(
         "sequence",
-        "Values that the colour map spans. sequence: those of all frames, so that a colour means one "
-        "value; frame: those of each frame",
+        "Range of values of the colour map. sequence: the range of all frames, so that a colour "
+        "always means the same value; frame: the range of each frame",
         choices=tuple(RANGE_WORDS), words=RANGE_WORDS, group="Colour", unless=_UNRANGED, basic=True,
     )  # fmt: skip
     low: float | None = param(
@@ -112,7 +112,7 @@ class Look:
     background: str = param("#1a1c20", "Background colour, #rrggbb or #rrggbbaa", group="Colour", basic=True)
     holes: bool = param(
         False,
-        f"Paint holes red: empty places of up to {2 * HOLE_REACH} pixels inside the subject",
+        f"Paint holes red: empty areas of up to {2 * HOLE_REACH} pixels inside the subject",
         title="Show holes",
         group="Colour",
         key="G",
@@ -139,7 +139,7 @@ class Look:
     )
     shininess: float = param(24.0, "Exponent of Phong lighting", low=1, high=200, group="Light", unless=_FLAT)
     eye_dome: bool | None = param(
-        None, "Darken edges where the depth steps back; auto: if the picture has no other light",
+        None, "Darken the edges at depth steps; auto: if the picture has no other light",
         type=bool, title="Edge shading (eye-dome)", group="Light", basic=True,
     )  # fmt: skip
     eye_dome_strength: float = param(
@@ -261,7 +261,7 @@ def light_direction(look: Look) -> tuple[float, float, float]:
 def rgba(text: str, name: str = "colour") -> tuple[int, int, int, int]:
     """The bytes of '#rrggbb' or '#rrggbbaa'; raises InputError."""
     if not re.fullmatch("#([0-9a-fA-F]{6}|[0-9a-fA-F]{8})", text):
-        raise InputError(f"'{shortened(text)}' is no colour", name, "Use #rrggbb or #rrggbbaa")
+        raise InputError(f"'{shortened(text)}' is not a colour", name, "Use #rrggbb or #rrggbbaa")
     values = bytes.fromhex(text[1:])
     return values[0], values[1], values[2], values[3] if len(values) == 4 else 255
 

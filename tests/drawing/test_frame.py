@@ -80,7 +80,10 @@ def test_the_window_gets_points_until_what_it_asked_for_is_ready(renderer: Rende
     request = Request(Pose(0, 0.0, "x", BARE), Camera.orbit(BARE.bounds()), "surfels")
     assert render_frame(own, request, surface, wait=False), "more is to come"
     assert surface.stats.backend == "points"
-    assert surface.stats.skipped == {"surfels": "what it needs is being prepared", **_points_skips(surface)}
+    assert surface.stats.skipped == {
+        "surfels": "Scan4D is still preparing what it needs",
+        **_points_skips(surface),
+    }
     while render_frame(own, request, surface, wait=False):
         time.sleep(0.01)
     assert surface.stats.backend == "surfels"

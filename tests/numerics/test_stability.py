@@ -48,12 +48,12 @@ BETWEEN = {
     *(f"scaled by 10^{power}" for power in (-4, -2, 4)),
     *(f"a sphere of 10^{n} times the size, {place}" for n in (4, 6) for place in ("inside", "around")),
     "rotated by a quarter turn", "fitted, scaled by 10^-6", "float32 input", "telephoto x10^3",
-    "zoomed in on 10^-3 of the scan", "zoomed in on 10^-3 of a splat", "zoomed out x10^6",
-    "normals within 10^-4 of y", "points x1000, all over again",
+    "zoomed in to 1/1000 of the scan's width", "zoomed in to 1/1000 of a splat's width", "zoomed out x10^6",
+    "normals within 10^-4 of y", "the list of points 1000 times",
 }  # fmt: skip
 LONG = {
     ("8192x1 pixels", "hpr"),
-    *(("points of a body x1000", name) for name in variants() if name.startswith("surfels")),
+    *(("a body, each point 1000 times", name) for name in variants() if name.startswith("surfels")),
 }
 
 

@@ -61,13 +61,14 @@ class Limit:
 
 # Reasons of limits that several backends have.
 AROUND_ALL = (
-    "octants divide the upright cube around all points, sectors the directions to them: other or turned "
-    "points give other octants and sectors"
+    "octants divide the upright cube around all points, and sectors divide the directions to them: added "
+    "or turned points change both"
 )
 NO_SPACING = (
-    "points are drawn as large as their spacing, which is unknown for one point or a line seen end on"
+    "each point is drawn as large as the spacing of the points, which is unknown for a single point or a "
+    "line seen end on"
 )
-NO_DETAIL = "octants and sectors divide the whole scan: a tiny detail lies within few of them"
+NO_DETAIL = "octants and sectors divide the whole scan: a tiny detail lies in only a few of them"
 
 
 def share_param(default: float | None = 1.0, auto: str = "", group: str = "") -> Any:
@@ -118,7 +119,7 @@ class Backend(ABC):
     """
 
     title: str  # its name in the panel
-    good_for: str = ""  # what a user chooses it for, in a few words: "Range images; fills holes"
+    good_for: str = ""  # what a user chooses it for, in a few words: "Draws range images and fills holes"
     params_class: type[Any]  # frozen dataclass of parameters, see viewer/params.py
     rows: str = "points"  # what a row of its pictures stands for: one of `ROWS`
     blends: bool = False  # a pixel may show several points
@@ -252,7 +253,7 @@ def missing_source(
     tells which backend does, or lists what there is."""
     finders = [one.name for one in backends().values() if name in one.values]
     if finders:
-        what = f"'{name}' is not found by the backend {drawn_by}, but by {' and '.join(finders)}"
+        what = f"the backend {drawn_by} does not compute '{name}', but {' and '.join(finders)} can"
         return InputError(what, where, f"Use --backend {finders[0]}")
     error = unknown_name("colour source", name, [*COLOR_BY, *scalars, *drawn_by.values])
     return InputError(error.what, where, error.hint)

@@ -22,7 +22,7 @@ class Params:
 
     point_size: int = param(
         1,
-        "Edge of a point's square; 0: the distance to the next point",
+        "Edge length of a point's square; 0: the spacing of the points",
         low=0,
         high=LARGEST_SQUARE,
         unit="px",
@@ -31,7 +31,8 @@ class Params:
     )
     hide_hidden: bool = param(
         False,
-        "Leave out points behind a surface that other points form. An estimate from the points alone",
+        "Leave out points behind a surface that other points form. Scan4D estimates this from the "
+        "points alone",
         key="Shift+V",
         title="Hide what lies behind",
         sweep=(False, True),
@@ -44,7 +45,7 @@ class PointSquares(Backend):
     """The backend `points`."""
 
     title = "Points"
-    good_for = "Fastest; exact positions"
+    good_for = "Fastest, with exact positions"
     params_class = Params
     accumulates = True
 

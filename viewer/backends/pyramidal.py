@@ -13,27 +13,27 @@ from ..projection.settings import ProjectionParams
 from ..scan.pose import Pose
 from . import NO_SPACING, Backend, FrameView, Limit, Suited
 
-_BY_CELLS = (
-    "whole cells fill a pixel; at their edges the last bit decides which cells, and what encloses the pixel"
-)
+_BY_CELLS = "whole cells fill a pixel; at the edges of cells the last bit decides which cells these are"
 
 
 class Pyramidal(Backend):
     """The backend `pyramidal`."""
 
     title = "Filled surface"
-    good_for = "Range images; fills holes"
+    good_for = "Draws range images and fills holes"
     params_class = ProjectionParams
     blends = True
     fills = True
     limits = {
-        "eye inside the cloud": Limit(0.01, _BY_CELLS),
+        "the eye inside the scan": Limit(0.01, _BY_CELLS),
         "coplanar points": Limit(0.008, _BY_CELLS),
         "collinear points": Limit(0.035, _BY_CELLS),
         "collinear points end on, perspective": Limit(0.08, NO_SPACING),
         "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
     }
-    default_reasons = {"fill": "point clouds have holes to fill; the polygons of dense range views leave few"}
+    default_reasons = {
+        "fill": "point clouds have holes to fill, but the polygons of dense range views leave few"
+    }
 
     def needs(self, pose: Pose, params: ProjectionParams) -> tuple[str, ...]:
         """The samples of range views where there are such, else nothing but positions."""

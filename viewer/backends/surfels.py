@@ -56,9 +56,10 @@ class Params:
 
     passes: str = param(
         "auto",
-        "How overlapping splats become one surface. one: the nearest splat; two: the nearest, blended "
-        "with those close behind; auto: two without enlarging, or one if two is too slow in motion. The "
-        "others are the pictures of Slomp 2014, Fig. 3, for comparison: one_blended (a), one_no_depth "
+        "How overlapping splats become one surface. one: show the nearest splat; two: blend the "
+        "nearest splat with the splats close behind it; auto: two with enlarge=1, or one if two is "
+        "too slow in motion. The others give the pictures of Slomp 2014, Fig. 3, for comparison: "
+        "one_blended (a), one_no_depth "
         "(b), visibility (c), two_large (e), and sorted, blended from back to front",
         choices=("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
         sweep=("auto", "one", "two"),
@@ -66,7 +67,7 @@ class Params:
     )
     enlarge: float = param(
         2.0,
-        "Factor on the size of splats in the second pass (Fig. 3 f); 1: not enlarged (Fig. 3 d)",
+        "Factor on the size of splats in the second pass (Slomp 2014, Fig. 3 f); 1: not enlarged (Fig. 3 d)",
         low=1.0,
         high=8.0,
         group="Surface",
@@ -74,7 +75,8 @@ class Params:
     )
     epsilon: float = param(
         1.0,
-        "How far behind the nearest splat others are blended with it, in radii of the nearest",
+        "How far behind the nearest splat another one may lie and still be blended with it, in radii "
+        "of the nearest",
         low=0.0,
         high=100.0,
         group="Surface",
@@ -98,14 +100,14 @@ class Params:
     )
     mask_falloff: float = param(
         4.0,
-        "How fast the mask fades: exp(-falloff d^2), with d = 1 at the radius",
+        "How fast the opacity of a splat fades: exp(-falloff d^2), where d is 1 at the radius",
         low=0.1,
         high=100.0,
         group="Splats",
     )
     mask_cutoff: float = param(
         0.0183,
-        "Value of the mask at which a splat ends. It ends at its radius at the latest",
+        "Opacity at which a splat ends. It never extends beyond its radius",
         low=0.0183,
         high=0.99,
         group="Splats",
@@ -134,13 +136,13 @@ class Surfels(Backend):
     blends = True
     fills = True
     limits = {
-        "zoomed in on 10^-6 of the scan": Limit(0.0, _SEEN_THROUGH, _SORTED),
-        "zoomed in on 10^-3 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
-        "zoomed in on 10^-6 of a splat": Limit(0.0, _SEEN_THROUGH, _SORTED),
-        "points x1000, one after the other": Limit(0.5, _SEEN_THROUGH, _SORTED),
-        "points x1000, all over again": Limit(0.5, _SEEN_THROUGH, _SORTED),
-        "points of a body x1000": Limit(0.21, _SEEN_THROUGH, _SORTED),
-        "points x1000 without radii": Limit(0.35, _SEEN_THROUGH, _SORTED),
+        "zoomed in to a millionth of the scan's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "zoomed in to 1/1000 of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "zoomed in to a millionth of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "each point 1000 times in a row": Limit(0.5, _SEEN_THROUGH, _SORTED),
+        "the list of points 1000 times": Limit(0.5, _SEEN_THROUGH, _SORTED),
+        "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
+        "each point 1000 times, without radii": Limit(0.35, _SEEN_THROUGH, _SORTED),
         "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
         "collinear points end on, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
         "collinear points end on, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
@@ -149,8 +151,9 @@ class Surfels(Backend):
         "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
     }
     default_reasons = {
-        "cull_back": "open scans, and eyes inside a scan: 2.2 % of the pixels of the bunny, which has no "
-        "base, show what is behind; no test for closed scans was both safe and faster "
+        "cull_back": "a scan can be open, and the eye can be inside: 2.2 % of the pixels of the "
+        "bunny, which has no base, would show the background. No test for closed scans was "
+        "both safe and faster "
         "(docs/how-it-works/surfels.md)"
     }
 
@@ -239,13 +242,13 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
         gaps = pose.keep(GapRadii)
         if frame.moving and pose.gpu.software and gaps.presumes_none(pose):
             surface.stats.simplified = True
-            surface.stats.skipped["gaps"] = "it moves, and stored radii of the last pose left none"
+            surface.stats.skipped["gaps"] = "playback runs, and the radii of the last pose left no gaps"
         else:
             known = gaps.find(pose, wait=frame.budget_ms is None)
         own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
             if own:
-                surface.stats.chosen["radius"] = "as large as gaps, of which the scan's leave some"
+                surface.stats.chosen["radius"] = "as large as the gaps, which the scan's own radii leave open"
             return _Sizes(True, gaps.usual, gaps.largest, {"radii": gaps.texels}), True
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)
@@ -304,10 +307,12 @@ def _draw_subpixel(points: Points, surface: Surface, params: Params, instancing:
     """Splats of about a pixel: those of a pixel are averaged, in place of any second pass; the larger they
     are, the less, so that nothing changes at once while one comes nearer."""
     if params.passes in _TWO:
-        surface.stats.skipped["second pass"] = "splats are under a pixel: they are averaged"
+        surface.stats.skipped["second pass"] = "splats are smaller than a pixel, so they are averaged"
     if params.instancing == "auto":
         surface.stats.chosen["instancing"] = "scatter"
-        surface.stats.skipped["tiles"] = "splats are under a pixel: they are sent there one by one"
+        surface.stats.skipped["tiles"] = (
+            "splats are smaller than a pixel, so each one is written to its pixel"
+        )
         splat_subpixel(points, surface, splats)
     else:
         _draw_nearest(points, surface, instancing, splats)

@@ -150,9 +150,9 @@ def _clipped() -> Iterator[Row]:
 
         return clear
 
-    yield Row("near plane inside the cloud", cut, cleared(None), FLOAT32)
+    yield Row("the near plane inside the scan", cut, cleared(None), FLOAT32)
     # Seen from the hole of the torus, the nearest point in the picture is 0.6 away.
-    yield Row("eye inside the cloud", inside, cleared(0.3), FLOAT32)
+    yield Row("the eye inside the scan", inside, cleared(0.3), FLOAT32)
 
 
 def _zoomed() -> Iterator[Row]:
@@ -166,13 +166,13 @@ def _zoomed() -> Iterator[Row]:
         return shot.joined(around.picked(around.depths() < -2 * around.arrays["radii"]).arrays)
 
     yield Row(
-        "zoomed in on 10^-3 of the scan",
+        "zoomed in to 1/1000 of the scan's width",
         detail(3),
         partial(surrounded, power=3),
         _rounded(np.float32, 700, "offsets"),
     )
     yield Row(
-        "zoomed in on 10^-6 of the scan",
+        "zoomed in to a millionth of the scan's width",
         detail(6),
         partial(surrounded, power=6),
         _rounded(np.float32, 2**15 / _UNIT, "offsets from an origin 2^15 pixels away"),
@@ -255,11 +255,11 @@ def _arranged() -> Iterator[Row]:
         return PointView(wall(20, 15, spacing=0.12), Camera((1.0, 0.5, 5.0))).given(radii=None)
 
     # Sums of a thousand copies exceed the 24 bits of float32, which is what a rasteriser adds.
-    yield Row("points x1000, one after the other", few, copied(np.repeat), EXACT, summed=FLOAT32)
-    yield Row("points x1000, all over again", few, copied(np.tile), EXACT, summed=FLOAT32)
+    yield Row("each point 1000 times in a row", few, copied(np.repeat), EXACT, summed=FLOAT32)
+    yield Row("the list of points 1000 times", few, copied(np.tile), EXACT, summed=FLOAT32)
     # Lists of tiles overflow here, and some points hide others.
-    yield Row("points of a body x1000", partial(_body, 300), copied(np.repeat), FLOAT32)
-    yield Row("points x1000 without radii", bare, copied(np.repeat), FLOAT32)
+    yield Row("a body, each point 1000 times", partial(_body, 300), copied(np.repeat), FLOAT32)
+    yield Row("each point 1000 times, without radii", bare, copied(np.repeat), FLOAT32)
 
     def at_one_place() -> PointView:
         return _thread().picked(np.arange(1)).filled("positions", 0.0).filled("radii", 0.3)
@@ -299,7 +299,7 @@ def _arranged() -> Iterator[Row]:
         outlier = shot.picked(np.arange(1)).given(positions=1e6 * _SHIFT[None])
         return _fitted(outlier.joined(shot.arrays))
 
-    yield Row("an outlier at 10^6 times the size", _fitted, with_outlier, FLOAT32)
+    yield Row("an outlier at a million times the scan's width", _fitted, with_outlier, FLOAT32)
 
 
 def _slanted() -> PointView:

@@ -31,7 +31,7 @@ def time_goal(text: str) -> Goal:
     """The goal of a time such as 50ms, 50 or 0.05s. Raises InputError."""
     number, unit = _parts(text, "--budget", "such as 50ms")
     if unit not in ("", "ms", "s"):
-        raise InputError(f"'{shortened(text)}' is no time", "--budget", "Use milliseconds, such as 50ms")
+        raise InputError(f"'{shortened(text)}' is not a time", "--budget", "Use milliseconds, such as 50ms")
     return Goal("time", number * (1000 if unit == "s" else 1))
 
 
@@ -60,5 +60,5 @@ def _parts(text: str, name: str, example: str) -> tuple[float, str]:
     except ValueError:
         number = math.nan
     if found is None or not (0 < number < math.inf):
-        raise InputError(f"'{shortened(text)}' is no bound", name, f"Use more than 0, {example}")
+        raise InputError(f"'{shortened(text)}' is not a limit", name, f"Use more than 0, {example}")
     return number, found[2]

@@ -30,7 +30,7 @@ def model_of(gpu: Gpu, file: Path | None = None) -> Model:
     if kept is None and gpu.software:
         kept = read_models(resource_path("assets", FILE)).get("software")
     if kept is None:
-        what = f"it is not known how long {gpu.device} takes for pictures"
+        what = f"Scan4D does not know how long {gpu.device} takes for a picture"
         raise InputError(what, "automatic choice", "Measure it once: scan4d bench --calibrate -o DIR")
     return kept
 

@@ -81,7 +81,7 @@ def render_frame(
         names = request.layers.names(pose.overview.scalars)
         raise missing_source(request.look.color_by, chosen[0], names)
     if prepared is None:
-        stats.skipped[str(request.backend or "look")] = "what it needs is being prepared"
+        stats.skipped[str(request.backend or "look")] = "Scan4D is still preparing what it needs"
     budget_ms = None if wait else _BUDGET_MS
     drawn = {
         "pose": pose,
@@ -131,7 +131,7 @@ def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
     surface.drawn = {**before, "values": surface.values_key}
     shade(surface, request.look)
     stats = surface.stats
-    stats.skipped["draw"] = "what is seen is the same"
+    stats.skipped["draw"] = "the visible surface is the same"
     stats.samples = 1
     _tell_uploads(stats, {pose})
     stats.derive_ms = 0.0

@@ -273,7 +273,7 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
     if device is None:
         device = device_from_environment()
     if device is not None and device < 0:
-        raise InputError(f"{device} is no device number", "--device", "Use 0, 1, ...")
+        raise InputError(f"{device} is not the number of a device", "--device", "Use 0, 1, ...")
     options: list[tuple[str, dict[str, Any]]] = []
     if sys.platform.startswith("linux"):
         name = "EGL" if device is None else f"EGL device {device}"
@@ -338,5 +338,5 @@ def device_from_environment() -> int | None:
     if not text:
         return None
     if not text.isdigit():
-        raise InputError(f"'{text}' is no device number", "SCAN4D_DEVICE", "Use 0, 1, ...")
+        raise InputError(f"'{text}' is not the number of a device", "SCAN4D_DEVICE", "Use 0, 1, ...")
     return int(text)

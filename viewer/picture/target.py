@@ -453,7 +453,9 @@ class RenderTarget:
 
     def _found_texels(self, name: str) -> gl.BufferTexture:
         if self._given is None or self._given[0] != name:
-            raise InputError(f"'{name}' was not found for this picture", hint="Draw it again with this look")
+            raise InputError(
+                f"'{name}' was not computed for this picture", hint="Draw it again with this look"
+            )
         return self._given[1]
 
     @property

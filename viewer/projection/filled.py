@@ -83,11 +83,11 @@ def draw_filled(
             surface, source, channels, _spread(surface, source, visits, params) if spreads else {"SUMS": 0}
         )
     else:
-        surface.stats.skipped["fill"] = "level 0 alone is shown"
+        surface.stats.skipped["fill"] = "only level 0 is shown"
     if merge is not None and isinstance(source, ViewSource):
         merge(source, channels)
     if source.is_closed:
-        surface.stats.skipped["hide"] = "polygons hide what is behind them"
+        surface.stats.skipped["hide"] = "polygons already hide what is behind them"
     if not (fills or hides):
         return refinable
     targets = surface.keep(Targets)

@@ -21,7 +21,7 @@ class ProjectionParams:
 
     fill: bool = param(
         True,
-        "Fill holes from coarser levels",
+        "Fill holes from coarser levels of the picture",
         key="H",
         group=_LEVELS,
         sweep=(True, False),
@@ -30,16 +30,32 @@ class ProjectionParams:
     )
     level_0: bool = param(True, "Show the measured samples", key="0", group=_LEVELS)
     level_1: bool = param(
-        True, "Fill holes from the picture of half the size", key="1", group=_LEVELS, when=_FILLING
+        True,
+        "Fill holes from the picture at 1/2 of its width and height",
+        key="1",
+        group=_LEVELS,
+        when=_FILLING,
     )
     level_2: bool = param(
-        True, "Fill holes from the picture of a quarter of the size", key="2", group=_LEVELS, when=_FILLING
+        True,
+        "Fill holes from the picture at 1/4 of its width and height",
+        key="2",
+        group=_LEVELS,
+        when=_FILLING,
     )
     level_3: bool = param(
-        True, "Fill holes from the picture of an eighth of the size", key="3", group=_LEVELS, when=_FILLING
+        True,
+        "Fill holes from the picture at 1/8 of its width and height",
+        key="3",
+        group=_LEVELS,
+        when=_FILLING,
     )
     level_4: bool = param(
-        True, "Fill holes from the picture of a sixteenth of the size", key="4", group=_LEVELS, when=_FILLING
+        True,
+        "Fill holes from the picture at 1/16 of its width and height",
+        key="4",
+        group=_LEVELS,
+        when=_FILLING,
     )
     upsampling: str = param(
         "bilinear",
@@ -50,7 +66,7 @@ class ProjectionParams:
     )
     step: float = param(
         6.0,
-        "Depth step up to which neighbours belong to one surface, in cells of their level",
+        "Largest depth step between neighbours of one surface, in cells of their level",
         low=0.1,
         high=100,
         group=_LEVELS,
@@ -58,7 +74,7 @@ class ProjectionParams:
     )
     margin: float | None = param(
         None,
-        "How far filling extends beyond the samples of a surface, in distances between samples; auto: "
+        "How far filling extends beyond the outermost samples of a surface, in sample spacings; auto: "
         "0.15 for samples that polygons join, 0.4 for others",
         type=float,
         low=0,
@@ -68,7 +84,7 @@ class ProjectionParams:
     )
     reach: float = param(
         2.25,
-        "Largest distance of a filled pixel from the samples that fill it, in distances between samples",
+        "Largest distance of a filled pixel from the samples that fill it, in sample spacings",
         low=0.1,
         high=100,
         group=_LEVELS,
@@ -102,14 +118,16 @@ class ProjectionParams:
 
     neighbors: int = param(
         4,
-        "Samples of a range image this close to a sample of the nearer surface stay visible",
+        "Samples this close to a sample of the nearer surface stay visible",
         low=0,
         high=100,
         unit="samples",
         group=_HIDDEN,
         when={"hide": (True,)},
     )
-    first_level: int = param(0, "Finest level of range images to draw", low=0, high=5, group=_VIEWS)
+    first_level: int = param(
+        0, "Finest level of range images to draw; 0: as measured", low=0, high=5, group=_VIEWS
+    )
     primitive: str = param(
         "polygons",
         "How samples of range images are drawn",
@@ -121,7 +139,7 @@ class ProjectionParams:
         True, "Draw the level of range images whose samples fit the pixels", group=_VIEWS, affects="draw"
     )
     detail: float = param(
-        1.0, "Distance between samples, in pixels, above which a finer level is drawn",
+        1.0, "Spacing of samples, in pixels, above which a finer level is drawn",
         low=0.25, high=16, unit="px", group=_VIEWS, when={"lod": (True,)},
     )  # fmt: skip
     filter: str = param(
@@ -132,8 +150,8 @@ class ProjectionParams:
     )
     blend: str = param(
         "linear",
-        "Where several views see one surface. linear: mean of all views; best: the best view; nearest: "
-        "the nearest sample",
+        "What to show where several views see one surface. linear: the mean of all views; best: the "
+        "best view; nearest: the nearest sample",
         choices=MODES,
         group=_VIEWS,
         sweep=("linear", "best", "nearest"),
@@ -142,8 +160,8 @@ class ProjectionParams:
     skip: bool = param(True, "Skip tiles of range images that no pixel shows", group=_VIEWS, affects="speed")
     antialias: str = param(
         "off",
-        "Draw points as point spread functions and add up their colours. table: from a table; analytic: "
-        "computed for each point",
+        "Draw each point as a blurred dot (point spread function) and add up the colours. table: "
+        "read the dot from a table; analytic: compute it for each point",
         choices=FUNCTIONS,
         group=_SMOOTHING,
         sweep=("off", "table", "analytic"),
@@ -157,7 +175,7 @@ class ProjectionParams:
     )
     fade: bool = param(
         False,
-        "Fade colours into the next coarser level as samples come closer together than pixels",
+        "Fade into the next coarser level where samples lie closer together than pixels",
         group=_SMOOTHING,
         when={"lod": (True,)},
     )

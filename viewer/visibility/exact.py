@@ -60,7 +60,7 @@ class SeenPoints:
         """The points of a cloud from an eye (3,), absolute. Raises InputError for what is no place."""
         at = np.asarray(eye, np.float64)
         if at.shape != (3,) or not np.isfinite(at).all():
-            raise InputError(f"an eye is three finite numbers, not {eye!r}")
+            raise InputError(f"an eye has three finite coordinates, not {eye!r}")
         positions = cloud.positions.astype(np.float64)
         if cloud.remainders is not None:
             positions += cloud.remainders
@@ -236,7 +236,7 @@ def katz_radius(points: Pose | PointCloud | ArrayLike, eye: ArrayLike) -> float:
     both = (first, SeenPoints.of(cloud, np.asarray(eye, np.float64) + 2 * first.middle))
     least = max(float(seen.distance.max(initial=0.0)) for seen in both)
     if least == 0:
-        raise InputError("no points to find a radius of")
+        raise InputError("there are no points from which to find a radius")
 
     def disjoint(decades: float) -> int:
         counts = np.zeros(len(cloud), np.uint8)

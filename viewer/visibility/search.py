@@ -235,7 +235,7 @@ def calibrated(
     """
     cloud, at = as_cloud(points), checked_viewpoint(eye)
     if not len(cloud):
-        raise InputError("no points to calibrate by")
+        raise InputError("there are no points to calibrate with")
     if radius is not None:
         flipping(SeenPoints.of(cloud, at), radius)  # refuses one that is too small
     body = body_of(cloud)

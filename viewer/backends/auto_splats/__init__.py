@@ -21,7 +21,7 @@ from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .values import VALUES, give_value
 
-_HIDDEN_COPIES = "visible copies of a point count as one neighbour, hidden copies as several"
+_HIDDEN_COPIES = "visible copies of a point count as one neighbour, but hidden copies count as several"
 
 _FEW = 200  # points
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
@@ -56,15 +56,15 @@ class Params:
     outliers: bool = param(False, "Show points without close neighbours", key="Shift+O", group=_NEIGHBORS)
     expansions: int = param(
         3,
-        "How many times the search doubles its radius before a point without a neighbour counts as an "
-        "outlier",
+        "Number of times that the search doubles its radius before a point without neighbours counts "
+        "as an outlier",
         low=0,
         high=10,
         group=_NEIGHBORS,
     )
     growth: float = param(
         4.0,
-        "End a neighbourhood with fewer than k points if its area can grow by this factor without "
+        "Stop the search with fewer than k points if the area can grow by this factor without "
         "reaching another point",
         low=1,
         high=100,
@@ -72,13 +72,13 @@ class Params:
     )
     orient: str = param(
         "eye",
-        "Side that normals point to: the eye, or the scanner of the range view that saw the point",
+        "Where normals point: towards the viewer, or towards the scanner that measured the point",
         choices=("eye", "scanner"),
         group=_NEIGHBORS,
     )
     passes: str = param(
         "two",
-        "one: show the nearest splat; two: blend the nearest splat with those close behind it",
+        "one: show the nearest splat; two: blend the nearest splat with the splats close behind it",
         choices=("one", "two"),
         group=_SPLATS,
     )
@@ -127,7 +127,7 @@ class AutoSplats(Backend):
     finds_normals = True
     values = VALUES
     limits = {
-        "points of a body x1000": Limit(0.012, _HIDDEN_COPIES),
+        "a body, each point 1000 times": Limit(0.012, _HIDDEN_COPIES),
         "collinear points end on, perspective": Limit(0.001, NO_SPACING),
         "collinear points end on, orthographic": Limit(0.001, NO_SPACING),
     }

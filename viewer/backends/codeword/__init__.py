@@ -31,8 +31,8 @@ from .encoder import encode_points
 from .engine import Sheet, WordBuffers, draw_bands
 
 _HELD = (
-    "words store places, shapes, depths and colours in steps: the last bit can move a value by a whole step, "
-    "and other points move the steps"
+    "code words store positions, shapes, depths and colours in steps: the last bit can move a value by a "
+    "whole step, and added points move the steps"
 )
 _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
 
@@ -43,8 +43,8 @@ class Params(settings.Params):
 
     lighting: str = param(
         "common",
-        "common: the colours and light of all renderers; own: Phong lighting in whole numbers with "
-        "indexed materials, one colour a disc",
+        "common: the colours and light of all renderers; own: Phong lighting in integers with a "
+        "palette of materials, one colour per disc",
         choices=("common", "own"),
         sweep=("common", "own"),
         group="Light",
@@ -55,14 +55,14 @@ class CodeWords(Backend):
     """The backend `codeword`."""
 
     title = "Code words"
-    good_for = "Research: discs from compact tables"
+    good_for = "For research: discs from compact tables"
     params_class = Params
     limits = {
-        "near plane inside the cloud": Limit(0.0, _HELD, _OF_PALETTE),
-        "zoomed in on 10^-3 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
-        "zoomed in on 10^-6 of the scan": Limit(0.0, _HELD, _OF_PALETTE),
-        "an outlier at 10^6 times the size": Limit(0.0, _HELD, _OF_PALETTE),
-        "eye inside the cloud": Limit(1.0, _HELD, _OF_TABLE),
+        "the near plane inside the scan": Limit(0.0, _HELD, _OF_PALETTE),
+        "zoomed in to 1/1000 of the scan's width": Limit(0.0, _HELD, _OF_PALETTE),
+        "zoomed in to a millionth of the scan's width": Limit(0.0, _HELD, _OF_PALETTE),
+        "an outlier at a million times the scan's width": Limit(0.0, _HELD, _OF_PALETTE),
+        "the eye inside the scan": Limit(1.0, _HELD, _OF_TABLE),
         "zoomed out x10^6": Limit(0.07, _HELD, _OF_TABLE),
         "zero radii": Limit(0.0, _HELD, _OF_TABLE),
         "negative radii": Limit(0.0, _HELD, _OF_TABLE),

@@ -32,7 +32,7 @@ class Params:
     output: str = param(
         "splats",
         "What to draw of the visible points. points: the points; faces: triangles between neighbours; "
-        "splats: discs; reconstruction: points, with the gaps between them filled",
+        "splats: discs; reconstruction: points, with filled gaps between them",
         choices=OUTPUTS,
         sweep=("faces", "reconstruction", "splats"),
         title="Shown as",
@@ -41,7 +41,7 @@ class Params:
     )
     point_size: int = param(
         1,
-        "Edge of a point's square; 0: the distance to the next point",
+        "Edge length of a point's square; 0: the spacing of the points",
         low=0,
         high=32,
         unit="px",
@@ -50,7 +50,7 @@ class Params:
     )
     longest: float = param(
         6.0,
-        "Longest edge of a face, in distances between points",
+        "Longest edge of a face, in point spacings",
         low=1,
         high=1000,
         sweep=(3, 6, 12),
@@ -68,8 +68,9 @@ class Params:
     )
     mode: str = param(
         MODES[0],
-        "hull: the points on the hull of the flipped points; combined: the points that no discs around "
-        "other points cover. combined keeps points in folds and hides points behind gaps",
+        "hull: a point is visible if it lies on the convex hull of the flipped points; combined: a "
+        "point is visible if no disc around another point covers it. combined shows more points in "
+        "folds and hides more points behind gaps",
         choices=MODES,
         title="Visible by",
         basic=True,
@@ -77,7 +78,7 @@ class Params:
     )
     quality: float = param(
         QUALITY,
-        "Number of sectors, relative to the number at which half of them would hold a point",
+        "Number of sectors, as a factor on the number that would leave half of them empty",
         title="Sector density",
         low=0.05,
         high=64,
@@ -88,8 +89,8 @@ class Params:
     )
     depth: float = param(
         DEPTH,
-        "How far behind a surface points still count as hidden, in distances between points. A larger "
-        "value shows deeper folds and more of what lies behind gaps",
+        "How far a point may lie behind a surface and still be shown, in point spacings. A larger "
+        "value shows deeper folds, but also more of what lies behind gaps",
         low=1e-3,
         high=1e6,
         title="Hides from",
@@ -100,8 +101,8 @@ class Params:
     )
     radius: float | None = param(
         None,
-        "Radius R of the flip, in distances from the eye to the farthest point; auto: from the depth and "
-        "the density of points",
+        "Radius of the sphere that flips the points, as a factor on the distance of the farthest "
+        "point; auto: from the depth and the density of the points",
         type=float,
         low=1,
         high=1e9,
@@ -110,7 +111,7 @@ class Params:
     )
     sectors: int | None = param(
         None,
-        "Total number of sectors, k; auto: from the quality",
+        "Number of sectors; auto: from the quality",
         type=int,
         low=1,
         high=MOST_SECTORS,
@@ -119,7 +120,8 @@ class Params:
     )
     steps: int | None = param(
         None,
-        "How many sectors a candidate can reach beyond its own; auto: as many as lie between visible points",
+        "Number of neighbouring sectors in which a point can replace others; auto: as many as lie "
+        "between visible points",
         type=int,
         low=0,
         high=UNLIMITED,
@@ -137,16 +139,16 @@ class VisiblePoints(Backend):
     """The backend `hpr`."""
 
     title = "Visible points"
-    good_for = "Points without those on the far side"
+    good_for = "Hides points on the far side"
     params_class = Params
     blends = True
     fills = True
     finds_normals = True
     limits = {
         "rotated by 37 degrees": Limit(0.01, AROUND_ALL),
-        "near plane inside the cloud": Limit(0.01, AROUND_ALL),
-        "zoomed in on 10^-3 of the scan": Limit(0.05, NO_DETAIL),
-        "zoomed in on 10^-6 of the scan": Limit(0.05, NO_DETAIL),
+        "the near plane inside the scan": Limit(0.01, AROUND_ALL),
+        "zoomed in to 1/1000 of the scan's width": Limit(0.05, NO_DETAIL),
+        "zoomed in to a millionth of the scan's width": Limit(0.05, NO_DETAIL),
         "zoomed out x10^6": Limit(0.02, AROUND_ALL),
         "zoomed out x10^9": Limit(0.02, AROUND_ALL),
         "collinear points": Limit(0.02, AROUND_ALL),

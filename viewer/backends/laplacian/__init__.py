@@ -31,8 +31,8 @@ class Params:
 
     levels: int = param(
         6,
-        "Number of frequency bands. The first band holds detail of single pixels, each further band half "
-        "the frequency of the one before",
+        "Number of frequency bands. The first band holds the detail of single pixels. Each further "
+        "band has half the frequency of the previous one",
         low=3,
         high=6,
         group=_BANDS,
@@ -42,8 +42,8 @@ class Params:
     )
     bands: str = param(
         "picture",
-        "Where bands come from. picture: the picture that each view gives; capture: the captured image, "
-        "whose samples are drawn as Gaussians",
+        "What the bands are computed from. picture: from the picture that each view gives; capture: "
+        "from the captured image, whose samples are drawn as Gaussians",
         choices=("picture", "capture"),
         group=_BANDS,
         sweep=("picture", "capture"),
@@ -55,26 +55,28 @@ class Params:
         group=_BANDS,
         sweep=("5x5", "3x3"),
     )
-    detail: float = param(1.0, "Factor on the finest band", low=0, high=4, group=_BANDS)
+    detail: float = param(
+        1.0, "Factor on the finest band, which sharpens or softens", low=0, high=4, group=_BANDS
+    )
     weights: str = param(
         "mixed",
-        "Which views give the bands. crisp: the best view at each place; soft: all views, weighted by "
-        "quality; mixed: the best view, but all views in the coarsest band",
+        "Which views each band uses. crisp: the best view at each pixel; soft: the mean of all "
+        "views, weighted by quality; mixed: crisp, but soft in the coarsest band",
         choices=("mixed", "crisp", "soft"),
         group=_BANDS,
         sweep=("mixed", "crisp", "soft"),
     )
     light: str = param(
         "logarithm",
-        "Scale on which bands are computed. logarithm: a view with another gain differs by a constant; "
-        "linear: linear light",
+        "Scale of the colours in the bands. logarithm: a brighter view differs only by a constant; "
+        "linear: the light itself",
         choices=("logarithm", "linear"),
         group=_BANDS,
         sweep=("logarithm", "linear"),
     )
     tolerance: float = param(
         4.0,
-        "Largest distance at which surfaces of two views are merged, in samples",
+        "Largest distance between surfaces of two views that are merged, in sample spacings",
         low=0,
         high=100,
         unit="samples",
@@ -83,8 +85,8 @@ class Params:
     cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
     quality: str = param(
         "fast",
-        "Samples per pixel where samples lie closer than pixels. fast: one place, between two levels; "
-        "fine: four places of a finer level, for pictures that can wait",
+        "How a view is read where its samples lie closer than pixels. fast: once per pixel, between "
+        "two levels; fine: four times per pixel, from a finer level",
         choices=("fast", "fine"),
         title="Texture sampling",
         group=_VIEWS,
@@ -92,7 +94,12 @@ class Params:
         when={"bands": ("picture",)},
     )
     fill: bool = param(
-        True, "Fill holes from coarser levels", key="H", group=_LEVELS, title="Fill holes", basic=True
+        True,
+        "Fill holes from coarser levels of the picture",
+        key="H",
+        group=_LEVELS,
+        title="Fill holes",
+        basic=True,
     )
 
     @property
@@ -111,7 +118,7 @@ class Laplacian(Backend):
     """The backend `laplacian`."""
 
     title = "Merged views"
-    good_for = "Several range views, without seams"
+    good_for = "Merges several range views without seams"
     params_class = Params
     rows = "samples"
     blends = True

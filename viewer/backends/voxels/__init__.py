@@ -51,15 +51,15 @@ class Params:
 
     stop: str = param(
         "delta",
-        "When to stop dividing octants. delta: when nearly every position has its own; depth: at a fixed "
-        "level; occupancy: when an octant holds few points",
+        "When to stop dividing octants. delta: when nearly every position has an octant of its own; "
+        "depth: at a fixed level; occupancy: when an octant holds few points",
         choices=STOPS,
         affects="derive",
         group="Octree",
     )
     delta: float = param(
         0.05,
-        "Share of the positions that may lack an octant of their own",
+        "Share of the positions that may share their octant with others",
         low=0,
         high=1,
         affects="derive",
@@ -77,7 +77,7 @@ class Params:
     )
     occupancy: int = param(
         8,
-        "Number of points up to which an octant is not divided",
+        "Octants with at most this many points are not divided",
         low=1,
         high=1 << 20,
         affects="derive",
@@ -87,8 +87,8 @@ class Params:
     )
     shape: str = param(
         "discs",
-        "How octants are drawn. discs: a piece of the surface, at the mean position and along the mean "
-        "normal; cubes: cubes lit by the mean normal; flat_cubes: cubes lit by their faces",
+        "How octants are drawn. discs: at the mean position, facing along the mean normal; cubes: "
+        "cubes lit by the mean normal; flat_cubes: cubes lit by the normals of their faces",
         choices=("discs", *_CUBES),
         words={"discs": "Pieces of the surface", "cubes": "Cubes", "flat_cubes": "Flat cubes"},
         basic=True,
@@ -115,7 +115,8 @@ class Params:
     )
     least: float = param(
         0.75,
-        "Smallest half edge of a cube, in radii of the disc in its place. Larger cubes close the surface;"
+        "Smallest half edge of a cube, in radii of the disc that would replace it. Larger cubes "
+        "close the surface;"
         " 0: the exact octant",
         low=0.0,
         high=10.0,
@@ -134,7 +135,7 @@ class Params:
     )
     pixel_threshold: float = param(
         1.0,
-        "Draw an octant in place of its children if its edge is shorter than this",
+        "Draw an octant instead of its children if its edge is shorter than this",
         low=0.25,
         high=64.0,
         unit="px",
@@ -158,29 +159,39 @@ class Voxels(Backend):
     """The backend `voxels`."""
 
     title = "Voxels"
-    good_for = "Large scans; coarser where far away"
+    good_for = "For large scans: coarser where far away"
     params_class = Params
     rows = "octants"
     blends = True
     derives = Derives.ON_THREAD
     limits = {
         "rotated by 37 degrees": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
-        "near plane inside the cloud": (Limit(0.01, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
-        "eye inside the cloud": (Limit(0.04, AROUND_ALL, _IN_CUBES), Limit(0.01, AROUND_ALL)),
-        "zoomed in on 10^-3 of the scan": (Limit(0.007, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
-        "zoomed in on 10^-6 of the scan": (Limit(0.99, NO_DETAIL, _IN_CUBES), Limit(0.65, NO_DETAIL)),
+        "the near plane inside the scan": (Limit(0.01, AROUND_ALL, _IN_CUBES), Limit(0.001, AROUND_ALL)),
+        "the eye inside the scan": (Limit(0.04, AROUND_ALL, _IN_CUBES), Limit(0.01, AROUND_ALL)),
+        "zoomed in to 1/1000 of the scan's width": (
+            Limit(0.007, AROUND_ALL, _IN_CUBES),
+            Limit(0.001, AROUND_ALL),
+        ),
+        "zoomed in to a millionth of the scan's width": (
+            Limit(0.99, NO_DETAIL, _IN_CUBES),
+            Limit(0.65, NO_DETAIL),
+        ),
         "collinear points": Limit(0.015, AROUND_ALL),
         "collinear points end on, perspective": Limit(0.01, NO_SPACING),
         "collinear points end on, orthographic": Limit(0.01, NO_SPACING),
         **dict.fromkeys(
-            ("one point x1000", "zoomed in on 10^-3 of a splat", "zoomed in on 10^-6 of a splat"),
+            (
+                "one point x1000",
+                "zoomed in to 1/1000 of a splat's width",
+                "zoomed in to a millionth of a splat's width",
+            ),
             _NOT_ENLARGED,
         ),
     }
     default_reasons = {
-        "cull_back": "open scans, and eyes inside a scan: 1.5 % of the pixels of the bunny, which has no "
-        "base, show what is behind",
-        "radius_scale": "0.8 leaves holes: 0.1 % of the armadillo and 1 % of a dancing body stay open",
+        "cull_back": "a scan can be open, and the eye can be inside: 1.5 % of the pixels of the "
+        "bunny, which has no base, would show the background",
+        "radius_scale": "with 0.8, holes stay open: 0.1 % of the armadillo and 1 % of a dancing body",
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
@@ -238,7 +249,7 @@ def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:
         stats.chosen["depth"] = stopped
     for cause, count in (("out of view", cut.outside), ("facing away", cut.facing_away)):
         if count:
-            stats.skipped[f"octants {cause}"] = f"{count:,}, with all that they hold"
+            stats.skipped[f"octants {cause}"] = f"{count:,}, with all their children"
 
 
 @dataclass(frozen=True, eq=False)

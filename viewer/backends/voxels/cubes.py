@@ -34,12 +34,14 @@ def draw_cubes(points: Points, surface: Surface, instancing: str) -> None:
         return
     small, large = _by_size(points, surface)
     if small is None:
-        surface.stats.skipped["scatter"] = "no voxel is small"
+        surface.stats.skipped["scatter"] = "no voxel is smaller than a pixel"
     else:
         _scatter(small, surface)
         surface.stats.chosen["instancing"] = "scatter"
     if large is None:
-        surface.stats.skipped["splat"] = "all voxels are small: they are sent to their pixels one by one"
+        surface.stats.skipped["splat"] = (
+            "all voxels are smaller than a pixel, so each one is written to its pixel"
+        )
     else:
         feed = instancing_for(surface, "auto", "gs", "voxels", _OF_SOME, _ways)
         amplify(large, surface, feed, CUBE, _FRAGMENT, over=small is not None)

@@ -36,7 +36,7 @@ def draw_discs(
     if share > 0:
         splats = _splats(radius_scale, share)
     if share > 0 and (way == TILES or instancing == "auto"):
-        surface.stats.skipped["tiles"] = "discs are under a pixel: they are sent there one by one"
+        surface.stats.skipped["tiles"] = "discs are smaller than a pixel, so each one is written to its pixel"
         splat_subpixel(points, surface, splats)
     else:
         _draw(points, surface, splats, way, two=False)

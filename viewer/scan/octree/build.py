@@ -36,7 +36,7 @@ class Stop:
     )
     depth: int = param(10, "Level of the leaves", low=0, high=DEEPEST, affects="derive")
     occupancy: int = param(
-        8, "Number of points up to which an octant is not divided", low=1, affects="derive"
+        8, "Octants with at most this many points are not divided", low=1, affects="derive"
     )
 
     def __post_init__(self) -> None:
