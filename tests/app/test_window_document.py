@@ -174,7 +174,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
     for number in range(3):
         formats.write(scan / f"{number}.npz", PointCloud.from_arrays(np.eye(3) + number))
     with running_app(screen, tmp_path, scan) as app:
-        app.told("The scan has changed since this was saved")
+        app.told("The scan has changed since you saved this")
 
 
 def saved_session(app: RunningApp, name: str) -> Path:

@@ -74,7 +74,7 @@ def run(
                 app.scans.tell([refused, *problems] if refused else problems)
                 app.capture.find_unfinished()
                 if device is not None:
-                    app.note("The display's own GPU draws the window; a device number has no effect on it.")
+                    app.note("The display's own GPU draws the window, so a device number has no effect.")
                 if replay is not None:
                     app.replayer.replay(replay)
                 Loop(app, signals, watch).run()

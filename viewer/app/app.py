@@ -426,7 +426,7 @@ class App:
         if scan != self.session.scan:
             return
         self.tools.abandon()
-        self.session.change("Begin without what was kept", bookmarks=(), parts={}, unread={})
+        self.session.change("Start without the saved changes", bookmarks=(), parts={}, unread={})
         self._look_for_kept()
 
     def pass_on_messages(self) -> None:

@@ -489,7 +489,7 @@ class Commands:
         for command in added:
             chords(command.key)
             if command.name in self.of:
-                raise InputError(f"there is a command '{command.name}' already", hint="Name it otherwise")
+                raise InputError(f"a command '{command.name}' exists already", hint="Give it another name")
         self.of |= {command.name: command for command in added}
         self.tool_of |= {command.name: tool for command in added}
         group = (tuple(entries),)

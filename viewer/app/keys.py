@@ -44,10 +44,9 @@ _WIDGETS_OWN = {
     )
 }  # fmt: skip
 _HEAD = """\
-# The keys of Scan4D. Take the '#' away from a line and change its keys; "" is none. Scan4D reads this
-# when it starts. Keys: letters, digits, F1 to F12, {named};
-# before them Ctrl+, Shift+, Alt+; between several a space. Escape ends what is going on and cannot
-# be changed.
+# The keys of Scan4D. Remove the '#' at the start of a line and change its keys; "" means no key.
+# Scan4D reads this file when it starts. Keys: letters, digits, F1 to F12, {named}. Write Ctrl+, Shift+
+# or Alt+ before a key, and a space between several keys. Escape stops what is going on; its key is fixed.
 
 [keys]
 """
@@ -181,7 +180,7 @@ def _checked(given: Mapping[str, Any], commands: Commands, problems: list[InputE
     problems += [unknown_name("table", name, ["keys"]) for name in given if name != "keys"]
     table = given.get("keys", {})
     if not isinstance(table, dict):
-        problems.append(InputError("'keys' is not a table", hint="Write [keys] above the lines"))
+        problems.append(InputError("'keys' is not a TOML table", hint="Write [keys] above the lines"))
         table = {}
     changes = {}
     for name, text in table.items():
@@ -190,7 +189,7 @@ def _checked(given: Mapping[str, Any], commands: Commands, problems: list[InputE
                 hint = f"{did_you_mean(name, commands.of)}F1 lists them"
                 raise InputError(f"unknown command '{shortened(name)}'", hint=hint)
             if not isinstance(text, str):
-                raise InputError(f"the keys of '{name}' are not text", hint=f'Write {name} = "Ctrl+K"')
+                raise InputError(f"the value of '{name}' is not a text", hint=f'Write {name} = "Ctrl+K"')
             chords(text)
             changes[name] = text
         except InputError as problem:
@@ -217,7 +216,7 @@ def _without_clashes(
                 else:
                     tool = commands.tool_of.get(name)
                     where = f"The tool '{tool}'" if tool else "The default keys"
-                    hint = f"'{name}' has none, unless {FILE} gives it others; F1 lists those that are taken"
+                    hint = f"'{name}' has no keys now. Give it others in {FILE}; F1 lists the keys in use"
                     problems.append(InputError(what, where, hint))
                     usual[name] = ""
                 break

@@ -135,7 +135,7 @@ class PathDialog(ABC):
             imgui.set_keyboard_focus_here()
             self._takes_keyboard = False
         changed, self._name = widgets.edit_path("##name", self._name)
-        widgets.tooltip("Name of the file, or a path; Up and Down go through the rows")
+        widgets.tooltip("Name of the file, or a path. Up and Down move through the rows")
         if changed:
             self._view.refusal = ""
         if imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter):

@@ -94,7 +94,8 @@ class Toolbox:
         for name, (used, *others) in tools.folders_of_tools().items():
             for folder in others:
                 self.note(
-                    f"The tool '{name}' in {folder} is not used: {used} has one of this name; rename it."
+                    f"Scan4D does not use the tool '{name}' in {folder}, because {used} has one with "
+                    "this name. Rename it."
                 )
 
     def _open(self, slot: Slot, commands: Commands) -> None:
@@ -105,7 +106,7 @@ class Toolbox:
             slot.context.settings = usable(module.Settings(), self._remembered.get(name, {}))
         for menu, entries in getattr(module, "COMMANDS", {}).items():
             if isinstance(entries, (Command, Listing, Menu)):
-                what = f"COMMANDS['{menu}'] is a {type(entries).__name__} and has to be a tuple of such"
+                what = f"COMMANDS['{menu}'] must be a tuple of commands, not a {type(entries).__name__}"
                 raise TypeError(f"{what}: a comma is missing after it")
             commands.add(menu, [self._bound(slot, entry) for entry in entries], name)
         commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))
@@ -175,7 +176,7 @@ class Toolbox:
         if self.clicking == slot.context.name:
             self.clicking = None
         slot.context.cancel_work()
-        words = f"{slot.title} is switched off until the next start: {failures.reason(error)}"
+        words = f"Scan4D switched off {slot.title} until the next start: {failures.reason(error)}"
         self._failures.tell(f"The tool '{slot.context.name}'", error, words)
 
     def lay(self, name: str, numbers: NumbersOf | None, place: PlaceOf | None) -> None:

@@ -66,8 +66,10 @@ class Window(GlfwWindow):
             problems += filter(None, (str(error), obstacle()))
             raise NoOpenGLError(
                 f"no window can be opened ({'; '.join(problems)})",
-                hint="It needs a display and OpenGL 4.3. 'scan4d render' makes pictures without a window; "
-                "'scan4d doctor' has details",
+                hint=(
+                    "The window needs a display and OpenGL 4.3. 'scan4d render' makes pictures without a "
+                    "window; 'scan4d doctor' shows details"
+                ),
             ) from error
         self.dropped: list[str] = []
         self._restore(place)

@@ -159,7 +159,7 @@ def test_what_cannot_be_is_refused() -> None:
         with pytest.raises(InputError, match=r"does not hold all points\. The farthest is"):
             exact_visible_points(points, (0, 0, 3), radius)
     for eye in ((0, 0), (0, 0, np.nan), [[0, 0, 3]]):
-        with pytest.raises(InputError, match="an eye is three finite numbers"):
+        with pytest.raises(InputError, match="an eye has three finite coordinates"):
             exact_visible_points(points, eye, 400)
     with pytest.raises(InputError, match=r"shape \(12,\)"):
         exact_visible_points(np.zeros(12), (0, 0, 3), 400)

@@ -28,7 +28,7 @@ def offer_of_kept(scan: str, hash: Future[str | None], use: Callable[[SavedSessi
     named = [f"{printable(each.scan)} ({_made(each)})" for each in found]
     gone = "" if os.path.lexists(found[0].scan) else ", which is no longer there"
     choices = {f"Use kept {_made(each)} of {_title(each.scan)}": partial(use, each) for each in found[::-1]}
-    text = f"Scan4D knows these files by another name: {'; '.join(named)}{gone}."
+    text = f"Scan4D has seen these files under another name: {'; '.join(named)}{gone}."
     return Offer(text, dict(reversed(choices.items())), _ABOUT)
 
 
@@ -40,14 +40,14 @@ def offer_of_change(saved: SavedSession, hash: Future[str | None], begin: Callab
     """
     if hash.result() in (saved.hash, None):
         return ""
-    text = "The scan has changed since this was saved: views and distances may not fit."
+    text = "The scan has changed since you saved this: views and distances may no longer fit."
     if not saved.document.made:
         return text
     with suppress(InputError):  # what is kept stays as it is, and that is told when it is written
         set_aside(saved)
     kept = _made(saved)
     choices = {f"Keep the {kept}": lambda: None, f"Begin without the {kept}": begin}
-    return Offer(f"{text} They may be of another subject.", choices, _ABOUT)
+    return Offer(f"{text} They may belong to another subject.", choices, _ABOUT)
 
 
 def _made(session: SavedSession) -> str:

@@ -18,7 +18,7 @@ from .exporting import Exporting
 
 _TITLE, _LEAVING = "Export", "Close Scan4D?"
 _WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Image sequence / film"}
-_FORMATS = {PNG: "PNG pictures", EXR: "EXR: surface data", MP4: "MP4 film"}
+_FORMATS = {PNG: "PNG pictures", EXR: "EXR: depth, normals and colours", MP4: "MP4 film"}
 _SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
 _MARKS = {
     "scale_bar": "Scale bar",
@@ -96,7 +96,9 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
     if of_view is not None:
         titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, as the view"
     now = f"{choices.width}x{choices.height}"
-    widgets.label("Size", "Pixels. A shape other than the view's shows more or less at the sides")
+    widgets.label(
+        "Size", "Width and height in pixels. Other proportions than the view's show more or less at the sides"
+    )
     chosen = widgets.combo("size", now if now in titles else "Other", list(titles), titles)
     if chosen in titles and chosen != now:
         width, height = (int(side) for side in chosen.split("x"))
@@ -123,7 +125,7 @@ def _edit_quality(choices: Choices, shown: str) -> Choices:
 
 
 def _edit_marks(marks: Marks, choices: Choices) -> Marks:
-    widgets.label("Overlays", "EXR has none: it stores the surface, not a picture")
+    widgets.label("Overlays", "EXR files have no overlays: they store the surface, not a picture")
     imgui.begin_disabled(choices.format == EXR)
     imgui.begin_group()
     width = imgui.get_content_region_avail().x

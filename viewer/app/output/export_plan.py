@@ -39,7 +39,7 @@ class Choices:
     pictures: int = param(36, "Number of pictures in one turn", low=2, high=_MOST_PICTURES)
     first: int = param(1, "First frame to export")
     last: int | None = param(None, "Last frame to export; auto: the scan's last", type=int)
-    step: int = param(1, "1: every frame, 2: every second one, and so on", low=1, high=100_000)
+    step: int = param(1, "1: every frame; 2: every second frame; and so on", low=1, high=100_000)
     format: str = param(PNG, "File format", choices=(PNG, EXR, MP4))
     fps: float | None = param(
         None, "Frames per second of the film; auto: as the scan",

@@ -144,7 +144,7 @@ class Exporting:
         """
         name = self._session.document.look.color_by
         if self.choices.what == export_plan.FRAMES and name in self._session.laid.names:
-            self._note(f"Cannot export: '{name}' colours some frames, and a tool computes it.")
+            self._note(f"Cannot export: some frames are coloured by '{name}', which a tool computes.")
             return
         there = export_plan.present(self.choices, self.count)
         shown, choices, timeline = self._entry(), self.choices, self._playback.timeline

@@ -104,7 +104,7 @@ class Replaying:
         """Compare a scan with the hash that it had; what to tell of it, nothing where it is the same."""
         if fingerprint_as(hash, files) in (hash, None):
             return ""
-        return f"{scan} has changed since {self.path.name} was made: pictures may differ."
+        return f"{scan} has changed since {self.path.name} was recorded: pictures may differ."
 
 
 def _show(app: App, entry: Entry, pose: Pose) -> None:

@@ -76,7 +76,7 @@ def _in_unit(look: Look, factor: float) -> Look:
 def _edit_background(look: Look) -> Look:
     """Declare what chooses the background, and a field for one's own."""
     help = (
-        "background: what is behind the scan, in the window and in saved pictures; films have no transparency"
+        "background: colour behind the scan, in the window and in saved pictures. Films have no transparency"
     )
     widgets.label("Background", help, imgui.get_frame_height())
     presets = {color: name for name, color in BACKGROUNDS.items()}
@@ -99,7 +99,10 @@ def _why_unlit(look: Look, name: str, params: object, pose: Pose) -> str:
     has_normals = cloud.normals is not None or drawn_by.finds_normals
     if has_normals or "normals" in drawn_by.needs(pose, params):
         return ""
-    return "The scan has no normals, so nothing is lit; with another Light, Scan4D estimates them"
+    return (
+        "The scan has no normals, so Scan4D draws it without light. If you choose another Light, Scan4D "
+        "estimates normals"
+    )
 
 
 def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> dict[str, str]:
@@ -110,11 +113,9 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
     if has_own and (look.color_by in ("auto", "own") or not is_here):
         idle["plain"] = "The scan has its own colours; choose Single colour above"
     elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
-        idle["plain"] = (
-            f"Colours are by {COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()} now"
-        )
+        idle["plain"] = f"Colours show {COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()} now"
     if not is_here:
-        idle |= dict.fromkeys(_OF_NUMBERS, "This frame does not have what the colours show")
+        idle |= dict.fromkeys(_OF_NUMBERS, "This frame has no data of the kind that the colours show")
     if look.light == "auto" and why_unlit:
         idle |= dict.fromkeys(_OF_LIGHT, why_unlit)
     elif look.eye_dome is None:
@@ -127,7 +128,10 @@ def _edit_range(shown: tuple[float, float] | None, look: Look) -> Look:
 
     shown: where it begins and ends in the picture; None: nowhere.
     """
-    help = "range: the values that the colours span. Fixed keeps the present range, which you can edit below"
+    help = (
+        "range: lowest and highest value of the colours. Fixed keeps the present range, which you can "
+        "edit below"
+    )
     widgets.label("Range", help, imgui.get_frame_height())
     now = look.range if None in (look.low, look.high) else _FIXED
     titles = RANGE_WORDS | ({_FIXED: "Fixed"} if shown or now == _FIXED else {})

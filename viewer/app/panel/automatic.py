@@ -40,7 +40,11 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
     goal = session.document.goal
     imgui.begin_disabled(goal is None and bool(choosing.why_not))  # as of another device it can be ended
     imgui.begin_group()
-    widgets.label("Automatic", "Scan4D chooses the renderer for each view, so that it keeps a limit")
+    widgets.label(
+        "Automatic",
+        "Scan4D chooses the renderer for each view, so that the picture stays within a limit of time "
+        "or error",
+    )
     wanted = imgui.checkbox("##automatic", goal is not None)[1]
     imgui.end_group()
     imgui.end_disabled()
@@ -60,14 +64,14 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
     scan is, in it; None while that is not known."""
     lengths = sorted({unit, goal.unit} - {PIXELS, "ms"})
     words = {"ms": "Time", PIXELS: "Error in pixels"} | {each: f"Error in {each}" for each in lengths}
-    widgets.label("Limit", "What may not be exceeded: the drawing time of a picture, or its error")
+    widgets.label("Limit", "What to limit: the drawing time of a picture, or its error")
     kind = widgets.combo("bound", goal.unit, list(words), words)
     if kind != goal.unit:
         first = _FIRST_ERROR if kind == PIXELS else float(f"{_FIRST_ERROR * (footprint or 1.0):.2g}")
         return FIRST_GOAL if kind == "ms" else Goal("error", first, kind)
     pixel = 1.0 if kind == PIXELS else footprint or goal.bound / _FIRST_ERROR
     low, high = _TIMES if kind == "ms" else (_ERRORS[0] * pixel, _ERRORS[1] * pixel)
-    widgets.label("Maximum", "For one full picture. At rest, Scan4D goes on refining it")
+    widgets.label("Maximum", "Time for one full picture. While you rest, Scan4D refines the picture further")
     flags = imgui.SliderFlags_.logarithmic.value
     edited, bound = imgui.slider_float(
         "##most", goal.bound, low, high, widgets.number_format("%.3g", kind), flags
@@ -86,13 +90,13 @@ def _draw_choice(choosing: Choosing) -> None:
     widgets.fact("Expected", _expected(choice))
     bounded = next(each.bounded for each in comparison.candidates if each.way == choice.way)
     widgets.fact("90 % within", f"{bounded:.2g} {comparison.goal.unit}")
-    widgets.tooltip("Nine of ten pictures stay within this; the limit applies to it")
+    widgets.tooltip("Nine of ten pictures stay within this value, which Scan4D compares with the limit")
     if measured is not None:
         widgets.fact("Last picture", f"{measured:.3g} ms")
     if choosing.overrun:
         widgets.faint(choosing.overrun)
     if not choice.keeps:
-        widgets.faint("No renderer is sure to meet the limit; using the closest.")
+        widgets.faint("No renderer is sure to stay within the limit. Scan4D uses the closest one.")
     _draw_curve(comparison, choice)
 
 

@@ -35,7 +35,7 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
         "Otherwise each begins with the one that suits it best."
     )
     if rendering.others_begin_with and not is_for_all:
-        widgets.faint(f"New scans begin with: {rendering.others_begin_with}")
+        widgets.faint(f"New scans start with: {rendering.others_begin_with}")
         if imgui.button("Clear choice for all scans"):
             rendering.clear_for_all()
     automatic.draw(session, rendering, choosing, scale)

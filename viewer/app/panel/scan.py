@@ -89,7 +89,8 @@ class ScanSection:
         if estimated := _estimated(pose, *self.session.document.chosen(pose)):
             widgets.fact("Estimated", ", ".join(estimated))
             widgets.tooltip(
-                "The scan does not store what the renderer needs here: Scan4D estimates it from the points"
+                "The scan does not store these data, which the renderer needs: Scan4D estimates them "
+                "from the points"
             )
 
     def _draw_unit(self, pose: Pose) -> None:
@@ -100,7 +101,8 @@ class ScanSection:
         names = [*UNIT_WORDS, *([document.unit] if document.unit and document.unit not in UNIT_WORDS else [])]
         titles = {_OWN: own} | {name: UNIT_WORDS.get(name, name) for name in names}
         widgets.label(
-            "Scan unit", "How long one unit of the scan's coordinates is. Scan4D keeps it with the scan."
+            "Scan unit",
+            "The length of one unit of the scan's coordinates. Scan4D remembers it for this scan.",
         )
         chosen = widgets.combo("unit", document.unit or _OWN, list(titles), titles)
         guess = guess_unit(self.steering.bounds(pose), document.look.up)
@@ -108,7 +110,9 @@ class ScanSection:
             widgets.label("")
             if imgui.button(widgets.labelled(f"Set to {_PLURALS[guess[0]]}?", "accept"), ImVec2(-1, 0)):
                 chosen = guess[0]
-            widgets.tooltip(f"In {guess[0]}, the scan is as large as {guess[1]}. Click to set this unit.")
+            widgets.tooltip(
+                f"If the unit is {guess[0]}, the scan is as large as {guess[1]}. Click to set this unit."
+            )
         if chosen != (document.unit or _OWN):
             self.session.change("Set the unit", unit=None if chosen == _OWN else chosen)
         if not is_length(self.playback.unit):
@@ -116,7 +120,7 @@ class ScanSection:
         shown = {_OWN: UNIT_WORDS.get(self.playback.unit, self.playback.unit)}
         shown |= {name: word for name, word in UNIT_WORDS.items() if name != self.playback.unit}
         now = self.playback.scale.unit if self.playback.scale.unit != self.playback.unit else _OWN
-        widgets.label("Show lengths in", "The unit of the lengths that Scan4D shows, draws and saves")
+        widgets.label("Show lengths in", "Unit of all lengths in the window and in saved tables")
         wanted = widgets.combo("shown_unit", now, list(shown), shown)
         if wanted != now:
             self.session.change("Show lengths in another unit", shown_unit=None if wanted == _OWN else wanted)
@@ -132,7 +136,7 @@ class ScanSection:
             return
         widgets.label(
             "Frame rate",
-            "Frames per second of the scan. Press Enter to set it. Scan4D keeps it with the scan.",
+            "Frames per second of the scan. Press Enter to set it. Scan4D remembers it for this scan.",
         )
         entered, rate = imgui.input_float(
             "##rate", pacing.rate, format="%.4g Hz", flags=imgui.InputTextFlags_.enter_returns_true.value

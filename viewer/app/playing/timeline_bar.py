@@ -113,7 +113,7 @@ def _draw_pace(app: App) -> None:
 
 def _draw_list_of_pace(app: App) -> None:
     """Declare a button that opens how the scan plays."""
-    if widgets.icon_button(f"{icons.ICON_FA_CARET_DOWN}###pace", "How it plays: loop, direction, speed"):
+    if widgets.icon_button(f"{icons.ICON_FA_CARET_DOWN}###pace", "Playback options: loop, direction, speed"):
         imgui.open_popup("how it plays")
     corner = imgui.get_item_rect_min() - ImVec2(0, imgui.get_style().item_spacing.y)
     imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(0, 1))

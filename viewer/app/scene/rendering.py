@@ -41,7 +41,7 @@ class Rendering:
                 if known
                 else f"This Scan4D has no renderer '{chosen_backend}'"
             )
-            self._note(f"{why}: {backends()[stand_in].title} draws it instead.")
+            self._note(f"{why}. {backends()[stand_in].title} draws it instead.")
         missed = self._session.scan, look.color_by
         names = self._session.laid.layers(pose).names(pose.overview.scalars)
         drawn_by = backends()[self._session.document.chosen(pose)[0]]
@@ -51,8 +51,8 @@ class Rendering:
             name = f"scalar {chosen[1:]}" if chosen.startswith("#") else f"'{chosen}'"
             finders = [one.title for one in backends().values() if chosen in one.values]
             self._note(
-                f"{name} is not found by {drawn_by.title}, but by {' and '.join(finders)}: "
-                "other colours are shown."
+                f"{drawn_by.title} does not compute {name}, but {' and '.join(finders)} can. The "
+                "view shows other colours."
                 if finders
                 else f"{frame_in_words(pose.index).capitalize()} has no {name} to colour by: "
                 "other colours are shown until a frame has it."

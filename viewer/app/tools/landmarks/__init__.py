@@ -44,7 +44,7 @@ class Settings:
 
     follow: bool = param(True, "Track landmarks through all frames as soon as you place them")
     names: bool = param(True, "Show names in the view, where there is room")
-    loupe: bool = param(True, "Magnify what is under the mouse while you place landmarks")
+    loupe: bool = param(True, "Show a magnifier under the mouse while you place landmarks")
 
 
 class Tool:
@@ -186,7 +186,7 @@ class Tool:
     def prompt(self) -> str:
         """The words that say what a click does."""
         if self.notebook.is_pinning:
-            return "Note: click its place. Esc to stop."
+            return "Note: click where it belongs. Esc to stop."
         target, names = self.target, [one.name for one in self.made.all]
         if target is not None and target.state == "not placed":
             number = names.index(target.name) + 1
@@ -194,7 +194,7 @@ class Tool:
         if target is not None:
             return f"{target.title}: click it in {frame_in_words(self.frame)}. Esc to stop."
         if self.is_free:
-            return f"{self.made.free_name()}: click its place. Esc to stop."
+            return f"{self.made.free_name()}: click its position. Esc to stop."
         return "All landmarks are placed: drag one to correct it, or choose one in the list. Esc to stop."
 
     def on_click(self, click: Click) -> bool:
@@ -218,7 +218,7 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         spot = moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
         if click.through_gap:
-            self.context.note("No data there; placed on the nearest surface in front.")
+            self.context.note("No data there: placed on the nearest surface in front.")
         self.corrects = self.corrects and bool(landmark.keys)
         self.selected = landmark.name
         self.context.change(name, self.made.with_landmark(landmark.with_key(spot)), merge=merge)
@@ -257,7 +257,9 @@ class Tool:
             self.context.seen_at(vector(self.positions[number]), (right, up)) if self.seen[number] else None
         )
         if click is None or click.pose.index != self.shown.frame:
-            raise InputError(f"{self.selected} is hidden in this view: turn the view to move it.")
+            raise InputError(
+                f"{self.selected} is hidden in this view. Turn the view until you see it, then move it."
+            )
         if click.picked is not None:
             landmark = self.shown.landmarks[number]
             self._set(landmark, click, "Nudge landmark", merge=("nudge", landmark.name, self.frame))
@@ -267,15 +269,16 @@ class Tool:
         """Set the next one where the mirror image of its partner is, on the surface that is seen there."""
         target, proposal, pose = self.target, self.proposal, self.context.pose
         if target is None or proposal is None or pose is None:
-            raise InputError(
-                "No mirror place is known: place its mirror partner and a few other pairs first."
-            )
+            raise InputError("No mirror position yet: place its mirror partner and a few other pairs first.")
         place = self.context.motion(pose).points(proposal.position)
         click = self.context.seen_at(vector(place))
         deviations, share = _OFF
         most = deviations * np.nan_to_num(proposal.sigma) + share * self.context.viewport.bounds(pose).radius
         if click is None or click.picked is None or np.linalg.norm(click.picked.position - place) > most:
-            raise InputError(f"The mirror place of {target.name} is hidden in this view: turn the view.")
+            raise InputError(
+                f"The mirror position of {target.name} is hidden in this view. Turn the view until you "
+                "see it."
+            )
         self._set(target, click, "Place landmark")
 
     # --- the list ---------------------------------------------------------------------
@@ -370,7 +373,7 @@ class Tool:
         if landmark is None:
             return "Select a landmark first"
         if landmark.key_at(self.frame) is None:
-            return f"You set no place of {landmark.name} in {frame_in_words(self.frame)}"
+            return f"You did not place {landmark.name} in {frame_in_words(self.frame)}"
         if len(landmark.keys) == 1:
             return f"{landmark.name} is placed in this frame only: Delete removes the landmark"
         return ""

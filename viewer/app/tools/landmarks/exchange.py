@@ -123,7 +123,7 @@ class Exchange:
             found = read_landmarks(path, unit)
             problem = None if is_sure else told_apart(found, _bounds(found, timeline, frame))
             if problem is not None:
-                raise InputError(problem, path, "Import the file again to use them all the same")
+                raise InputError(problem, path, "Import the file again to use them anyway")
             return found, landmarks_of(found, timeline.visit, len(timeline), frame, known)
 
         def take(result: tuple[LandmarkSet, tuple[Landmark, ...]]) -> None:

@@ -84,7 +84,7 @@ class Notebook:
         imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * (side + gap))
         changed, text = imgui.input_text_with_hint("##text", "Note text", note.text)
         where = "All frames" if note.frame is None else frame_in_words(note.frame).capitalize()
-        widgets.tooltip(f"{where}, {'pinned to a place' if note.position else 'on the whole frame'}")
+        widgets.tooltip(f"{where}, {'pinned to the surface' if note.position else 'on the whole frame'}")
         imgui.same_line()
         goes = widgets.icon_button(icons.ICON_FA_CROSSHAIRS, f"Go there: {where.lower()}")
         imgui.same_line()

@@ -84,7 +84,9 @@ def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:
         there = view.on_screen(vector(tool.context.motion(pose).points(proposal.position)))
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
-            label = Label(["mirror place: A sets it"], np.array([(there.x, there.y)]), _GHOST, faint=True)
+            label = Label(
+                ["mirror position: A places it"], np.array([(there.x, there.y)]), _GHOST, faint=True
+            )
             canvas.labels([label])
     if tool.dragged is not None and (there := view.on_screen(tool.dragged)) is not None:
         canvas.ring(there, _CHOSEN)

@@ -58,7 +58,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     row = ui.row("Pin a note", "Add frame note")
     if row.button():
         tool.pin_note()
-    ui.tooltip("Click a place in the view to pin a note to it", "note_at_place")
+    ui.tooltip("Click the surface to pin a note to it", "note_at_place")
     if row.button():
         tool.notebook.add_to_frame(tool.frame)
     ui.tooltip("Add a note to this whole frame", "note_at_frame")
@@ -166,7 +166,7 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     if row.button():
         tool.take_key_away()
     imgui.end_disabled()
-    about = "Remove the place that you set in this frame; tracking finds it again"
+    about = "Remove the position that you set in this frame. Tracking finds the landmark again"
     ui.tooltip(reason or about, "landmark_key")
     if row.button():
         tool.delete()

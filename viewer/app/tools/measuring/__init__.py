@@ -99,7 +99,7 @@ class Tool:
 
     def prompt(self) -> str:
         """The words that say what a click does."""
-        return f"Measuring: click the {'second' if self.begun else 'first'} place. Esc to stop."
+        return f"Measuring: click the {'second' if self.begun else 'first'} point. Esc to stop."
 
     def on_click(self, click: Click) -> bool:
         """Set an end at what was clicked; raises InputError where it cannot be."""
@@ -107,7 +107,7 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         end = Spot.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
-            self.context.note("No data there; placed on the nearest surface in front.")
+            self.context.note("No data there: placed on the nearest surface in front.")
         log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
         self.set_end(end)
         _learn_topology(self.context.timeline, click.pose.index)
@@ -216,7 +216,7 @@ class Tool:
 
     def _read(self, file: Path) -> None:
         if not self.on_file(file):
-            raise InputError("holds no distances", file, "Choose a table of 'Export distances...'")
+            raise InputError("holds no distances", file, "Choose a table that 'Export distances...' wrote")
 
     def on_file(self, path: Path) -> bool:
         """Add the measurements of a table that was saved of this scan, but those that are there; whether the

@@ -24,7 +24,7 @@ def draw(measuring: Tool, ui: Ui) -> None:
     words = "Stop measuring" if measuring.is_active else "Measure distance"
     if ui.row(widgets.labelled(words, "measure")).button():
         measuring.toggle()
-    ui.tooltip("Click two places in the view to measure their distance", "measure")
+    ui.tooltip("Click two points in the view to measure their distance", "measure")
     measuring.filled = imgui.checkbox("Allow clicks on filled holes", measuring.filled)[1]
     widgets.tooltip("Also measure where the renderer has filled a hole, and the scanner measured no point")
     if not measuring.made.all:

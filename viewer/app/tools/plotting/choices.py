@@ -47,23 +47,25 @@ class Settings:
     """Choices that come back at the next start, whatever the scan."""
 
     is_open: bool = param(False, "Show the plot under the timeline")
-    mode: str = param(TIME, "What the plot shows, and over what", choices=tuple(MODE_WORDS), words=MODE_WORDS)
-    order: str = param(VALUE, "Values, or how fast they change", choices=ORDERS, words=ORDER_WORDS)
-    bands: bool = param(True, "Two standard deviations to either side of a curve", title="±")
+    mode: str = param(TIME, "Quantities on the axes of the plot", choices=tuple(MODE_WORDS), words=MODE_WORDS)
+    order: str = param(
+        VALUE, "Values of the measures, or their rate of change", choices=ORDERS, words=ORDER_WORDS
+    )
+    bands: bool = param(True, "Two standard deviations above and below a curve", title="±")
     seconds: float = param(
-        0.3, "Width of the window that smooths curves, for speed, acceleration and numbers",
+        0.3, "Width of the smoothing window, for speeds, accelerations and the numbers under the plot",
         low=0.02, high=5.0, unit="s", title="Smoothing",
     )  # fmt: skip
     lines: bool = param(True, "Draw each measure in the view, with its value", title="In the view")
     least: float = param(
-        0.5, "Least height of a peak that counts as a repeat, as a share of the curve's range",
+        0.5, "Smallest height of a peak that counts as a repeat, as a share of the curve's range",
         low=0.05, high=1.0, title="Least repeat",
     )  # fmt: skip
     trajectories: bool = param(
         True, "Draw the paths of the landmarks that are ticked", title="Show paths", basic=True
     )
     coordinates: str = param(
-        SCAN, "Show paths as recorded, or with the motion of the rigid references removed",
+        SCAN, "Show paths as recorded, or without the motion of the rigid references",
         choices=(SCAN, ANCHORS), words={SCAN: "As recorded", ANCHORS: "With head motion removed"}, basic=True,
     )  # fmt: skip
     hold: bool = param(
@@ -71,7 +73,7 @@ class Settings:
         title="Remove head motion", basic=True,
     )  # fmt: skip
     by_speed: bool = param(
-        True, "Colour paths by speed; else each landmark has its own colour",
+        True, "Colour paths by speed. If off, each landmark has its own colour",
         title="Colour by speed", basic=True,
     )  # fmt: skip
 

@@ -40,7 +40,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         tool.lasso.toggle()
     ui.tooltip("Draw round a part of the surface to measure its area and perimeter", "lasso")
     _, tool.lasso.through = imgui.checkbox("Include surface behind", tool.lasso.through)
-    ui.tooltip("Also measure the surface in front of and behind the region", "lasso")
+    ui.tooltip("Also measure surfaces in front of and behind the outlined one", "lasso")
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
         adding.draw(tool, ui)
         imgui.tree_pop()
@@ -105,7 +105,7 @@ def _draw_ways(tool: Tool) -> None:
             ("path", "Draw its path over the picture"),
             (
                 "rigid reference",
-                "A place that does not deform, such as the forehead: Scan4D removes its motion",
+                "A part that does not deform, such as the forehead. Scan4D removes its motion",
             ),
         ):
             imgui.table_next_column()

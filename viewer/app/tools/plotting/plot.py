@@ -83,7 +83,7 @@ def _why_none(tool: Tool) -> str:
     return (
         "This needs two measures."
         if mode == AGAINST
-        else "No peak is high enough: lower the least height at the left."
+        else "No peak is high enough: lower the smallest height at the left."
     )
 
 
@@ -107,12 +107,10 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         imgui.set_next_item_width(_COMBO * em)
         share = imgui.slider_float("##least", 100 * least, 5, 100, "at least %.0f %%")[1]
         least = round(share) / 100
-        widgets.tooltip(
-            "Least height of a peak that counts as a repeat, in percent of the range of the curve"
-        )
+        widgets.tooltip("Smallest height of a peak that counts as a repeat, in percent of the curve's range")
     widgets.same_line(widgets.check_width("±"))
     bands = imgui.checkbox("±", settings.bands)[1]
-    widgets.tooltip("Band of two standard deviations; for repeats, of one")
+    widgets.tooltip("Band of ± two standard deviations; for repeats, ± one")
     widgets.same_line(_SLIDER * em)
     imgui.set_next_item_width(_SLIDER * em)
     points = (

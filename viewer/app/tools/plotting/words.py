@@ -9,11 +9,11 @@ from ....analysis.measures.curves import BAND_SIGMAS, MeasureCurve
 UNKNOWN = "-"
 WARNING = "(!)"  # before numbers of a movement that the user should know more about
 NUMBERS_HELP = {
-    "Amplitude": "From rest, the mean of the first frames, to the peak; ± covers 95 %",
+    "Amplitude": "Distance from rest (the mean of the first frames) to the peak. ± covers 95 %",
     "Onset": "Time when the curve leaves rest by 10 % of the amplitude",
     "Peak": "Time when the curve is farthest from rest",
     "Duration": "From onset until the curve returns to within 10 % of the amplitude from rest",
-    "Fastest": "Largest speed, rising or falling",
+    "Fastest": "Largest speed in either direction",
 }
 
 
