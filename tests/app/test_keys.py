@@ -92,7 +92,7 @@ def test_two_commands_can_swap_keys(file: Path) -> None:
     [
         ('[keys]\nplai = "F7"\nfit = "F8"', "unknown command 'plai'"),
         ('[keys]\nplay = "Hyper+F7"\nfit = "F8"', "unknown modifier key 'Hyper'"),
-        ('[keys]\nplay = 7\nfit = "F8"', "the keys of 'play' are not text"),
+        ('[keys]\nplay = 7\nfit = "F8"', "the value of 'play' is not a text"),
         ('[keys]\nfit = "F8"\nplay = "R"', "R is set for both"),
         ('[keys]\nfit = "F8"\nplay = "F7 R"', "R is set for both"),
         ('[keys]\nfit = "F8"\nplay = "F7 Ctrl"', "unknown key 'Ctrl'"),
