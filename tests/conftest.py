@@ -18,13 +18,9 @@ from hypothesis import HealthCheck, settings
 
 from viewer import cli
 from viewer.backends import backends
-from viewer.camera import Camera
-from viewer.look import Look
-from viewer.scan.pose import Pose, Scanned
 from viewer.splatting import lists
 
 if TYPE_CHECKING:
-    from viewer.backends import Backend
     from viewer.drawing.renderer import Renderer
     from viewer.picture.surface import Surface
 
@@ -110,31 +106,7 @@ def renderer() -> Renderer:
 def draw(renderer: Renderer) -> Callable[..., Surface]:
     """draw(cloud or range views, camera, size, backend or its name or a variant, look, params): one finished
     Surface."""
-    from scenes import of_variant
-
-    from viewer.backends import backend
-    from viewer.drawing.frame import render_frame
-    from viewer.drawing.request import Request
-    from viewer.picture.surface import Surface
-
-    def draw(
-        scanned: Scanned,
-        camera: Camera,
-        size: tuple[int, int] = (64, 48),
-        which: str | Backend = "points",
-        look: Look | None = None,
-        params: dict[str, object] | None = None,
-    ) -> Surface:
-        setting: dict[str, object] = {}
-        if isinstance(which, str):
-            name, setting = of_variant(which)
-            which = backend(name)
-        values = which.params({**setting, **(params or {})})
-        request = Request(Pose.of(0, 0.0, "test", scanned), camera, which, values, look or Look(light="flat"))
-        surface = Surface(renderer.gpu, size)
-        while render_frame(renderer, request, surface):
-            pass
-        return surface
+    from viewer.testing.scenes import draw
 
     return draw
 

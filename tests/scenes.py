@@ -6,47 +6,24 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.backends import Backend, backends
+from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.mesh.triangles import Mesh
 from viewer.scan.points import PointCloud
-from viewer.scan.pose import Pose
-from viewer.splatting.amplify import FEEDS
+from viewer.testing.backends import BUFFERS as BUFFERS
+from viewer.testing.backends import draws_points
+from viewer.testing.backends import variants as variants_of
+from viewer.testing.scenes import NOTHING, of_variant, sphere
+from viewer.testing.scenes import looking_down_z as looking_down_z
+from viewer.testing.scenes import plane as plane
 from viewer.view import View
 
-NOTHING = 0xFFFFFFFF
-
-
-DRAWS_POINTS = [
-    one.name for one in backends().values()
-    if one.draws(Pose.of(0, 0.0, "one", PointCloud.from_arrays(np.zeros((1, 3)))))
-]  # fmt: skip
-BUFFERS = tuple(feed for feed in FEEDS if feed != "gs")  # feeds that give the same bits: test_same_bits.py
+DRAWS_POINTS = [one.name for one in backends().values() if draws_points(one)]
 
 
 def variants() -> list[str]:
-    """All backends that draw points, by name, each in every way that changes its shaders but not its picture.
-
-    "surfels instancing=gs". One of those that give the same bits: "auto" is one of the others, feeds from
-    buffers agree.
-    """
-
-    def ways(one: Backend) -> list[str]:
-        return [
-            f"{one.name} {parameter.name}={word}"
-            for parameter in one.parameters
-            if parameter.affects == "speed"
-            for word in parameter.choices
-            if word not in ("auto", *BUFFERS[1:])
-        ]
-
-    return [variant for name in DRAWS_POINTS for variant in ways(backends()[name]) or [name]]
-
-
-def of_variant(name: str) -> tuple[str, dict[str, object]]:
-    """The backend of a variant and its parameters."""
-    name, _, setting = name.partition(" ")
-    return name, dict([setting.split("=")]) if setting else {}
+    """All backends that draw points, each in every way that changes its shaders but not its picture."""
+    return [variant for name in DRAWS_POINTS for variant in variants_of(backends()[name])]
 
 
 def _for_each(names: list[str]) -> pytest.MarkDecorator:
@@ -69,34 +46,6 @@ every_backend = _for_each(variants())
 every_backend_of_points = _for_each(
     [name for name in variants() if backends()[of_variant(name)[0]].rows == "points"]
 )
-
-
-def sphere(count: int, radius: float = 1.0, center: tuple[float, float, float] = (0, 0, 0)) -> PointCloud:
-    """A Fibonacci sphere with exact normals, and radii of 1.5 times the spacing."""
-    i = np.arange(count) + 0.5
-    polar, turn = np.arccos(1 - 2 * i / count), np.pi * (1 + 5**0.5) * i
-    normals = np.stack([np.cos(turn) * np.sin(polar), np.cos(polar), np.sin(turn) * np.sin(polar)], axis=1)
-    spacing = radius * np.sqrt(4 * np.pi / count)
-    return PointCloud.from_arrays(
-        normals * radius + np.array(center),
-        normals=normals,
-        colors=normals * 0.5 + 0.5,
-        radii=np.full(count, 1.5 * spacing),
-        scalars={"height": normals[:, 1]},
-    )
-
-
-def plane(edge: int, depth: float, spacing: float = 0.05) -> PointCloud:
-    """edge x edge points on z = -depth, facing +z."""
-    x, y = np.meshgrid(np.arange(edge) - (edge - 1) / 2, np.arange(edge) - (edge - 1) / 2)
-    points = np.stack([x.ravel() * spacing, y.ravel() * spacing, np.full(edge * edge, -depth)], axis=1)
-    normals = np.tile([0.0, 0.0, 1.0], (edge * edge, 1))
-    return PointCloud.from_arrays(points, normals=normals, radii=np.full(edge * edge, 1.5 * spacing))
-
-
-def looking_down_z(**fields: object) -> Camera:
-    """At the origin, looking along -z."""
-    return Camera(eye=(0, 0, 0), target=(0, 0, -1), **fields)  # type: ignore[arg-type]
 
 
 def zbuffer(

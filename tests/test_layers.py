@@ -32,7 +32,7 @@ LAYERS = (
     {"analysis"},
     {"output"},
     {"document", "__init__"},
-    {"app", "bench"},
+    {"app", "bench", "testing"},
     {"cli", "commands", "__main__"},
 )  # fmt: skip
 LAYER_OF = {part: number for number, parts in enumerate(LAYERS) for part in parts}

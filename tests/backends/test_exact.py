@@ -6,16 +6,11 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hardware import stored
 from scenes import (
-    DRAWS_POINTS,
     NOTHING,
-    every_backend,
-    every_backend_of_points,
     looking_down_z,
     of_variant,
     plane,
-    rarely,
     sphere,
     sphere_hits,
     variants,
@@ -58,34 +53,6 @@ def test_a_point_is_a_square_of_its_size(draw: Draw, size: int) -> None:
     assert np.ptp(rows) == np.ptp(columns) == size - 1
     assert abs(rows.mean() + 0.5 - 24.12) <= 0.51
     assert abs(columns.mean() + 0.5 - 32.12) <= 0.51
-
-
-@every_backend_of_points
-def test_the_nearer_wins_whatever_the_order(draw: Draw, name: str) -> None:
-    normals, radii = [[0, 0, 1]] * 2, [0.3, 0.3]
-    for order in ([-2.0, -3.0], [-3.0, -2.0]):
-        cloud = PointCloud.from_arrays([[0, 0, z] for z in order], normals=normals, radii=radii)
-        surface = draw(cloud, looking_down_z(fov_y=60), (33, 33), name)
-        assert surface.id[16, 16] == order.index(-2.0)
-        assert surface.depth[16, 16] == pytest.approx(2.0, rel=1e-6)
-
-
-@every_backend
-def test_ties_go_to_the_lowest_id(draw: Draw, name: str) -> None:
-    cloud = PointCloud.from_arrays([[0, 0, -2.0]] * 500, normals=[[0, 0, 1]] * 500, radii=[0.5] * 500)
-    surface = draw(cloud, looking_down_z(fov_y=60), (33, 33), name)
-    assert set(np.unique(surface.id)) == {0, NOTHING}
-
-
-@every_backend_of_points
-@pytest.mark.parametrize("projection", PROJECTIONS)
-def test_a_plane_has_constant_depth(draw: Draw, name: str, projection: str) -> None:
-    camera = looking_down_z(fov_y=40, projection=projection, height=2.0)
-    surface = draw(plane(120, 3.0), camera, (64, 48), name)
-    covered = surface.id != NOTHING
-    assert covered.sum() > 1000
-    rtol = 3e-7 if surface.gpu.software else max(3e-7, float(stored(surface, 3.0)))
-    np.testing.assert_allclose(surface.depth[covered], 3.0, rtol=rtol)
 
 
 @ways_of_surfels
@@ -162,89 +129,6 @@ def test_an_unusable_radius_counts_as_unknown(draw: Draw, radius: float) -> None
     one, other = (draw(c, camera, (80, 60), "surfels") for c in (bad, none))
     assert (one.id != NOTHING).mean() > 0.3
     np.testing.assert_array_equal(one.id, other.id)
-
-
-@every_backend
-@pytest.mark.parametrize("size", [(1, 1), (7, 3), *rarely((1, 240), (641, 1), (255, 257))])
-def test_odd_sizes(draw: Draw, name: str, size: tuple[int, int]) -> None:
-    cloud = sphere(3000)
-    surface = draw(cloud, Camera.orbit(cloud.bounds(), aspect=size[0] / size[1]), size, name)
-    for channel, values in surface.arrays().items():
-        assert values.shape[:2] == size[::-1], channel
-    assert surface.image().shape == (size[1], size[0], 4)
-    assert (surface.id != NOTHING).any()
-
-
-@every_backend
-def test_an_empty_pose_is_background(draw: Draw, name: str) -> None:
-    cloud = PointCloud.from_arrays(np.zeros((0, 3)), normals=np.zeros((0, 3)))
-    surface = draw(cloud, Camera(eye=(0, 0, 5)), (20, 10), name, Look(background="#102030"))
-    assert (surface.id == NOTHING).all()
-    assert (surface.level == 255).all()
-    assert (surface.image() == [0x10, 0x20, 0x30, 255]).all()
-
-
-@every_backend
-def test_one_point(draw: Draw, name: str) -> None:
-    cloud = PointCloud.from_arrays([[1e6, -2e6, 3e6]], normals=[[0, 0, 1]], radii=[1.0])
-    surface = draw(cloud, Camera.orbit(cloud.bounds()), (31, 31), name)
-    assert surface.id[15, 15] == 0
-
-
-@every_backend
-def test_points_behind_the_eye_are_not_seen(draw: Draw, name: str) -> None:
-    cloud = PointCloud.from_arrays([[0, 0, 1.0], [0, 0, 0.0]], normals=[[0, 0, 1]] * 2, radii=[0.1] * 2)
-    assert (draw(cloud, looking_down_z(), (32, 32), name).id == NOTHING).all()
-
-
-@every_backend_of_points
-def test_near_and_far_planes_cut(draw: Draw, name: str) -> None:
-    cloud = PointCloud.from_arrays(
-        [[0.0, 0, -z] for z in (1, 2, 3)], normals=[[0, 0, 1]] * 3, radii=[0.5] * 3
-    )
-    for projection in PROJECTIONS:
-        fields = {"projection": projection, "height": 2.0}
-        assert draw(cloud, looking_down_z(near=1.5, **fields), (33, 33), name).id[16, 16] == 1
-        assert draw(cloud, looking_down_z(near=2.5, **fields), (33, 33), name).id[16, 16] == 2
-        far = draw(cloud, looking_down_z(near=1.5, far=1.8, **fields), (33, 33), name)
-        assert (far.id == NOTHING).all()
-
-
-@every_backend
-def test_switching_there_and_back_gives_the_same_picture(draw: Draw, name: str) -> None:
-    cloud = sphere(5000)
-    camera = Camera.orbit(cloud.bounds(), 10, 10)
-    first = draw(cloud, camera, (90, 70), name)
-    for other in DRAWS_POINTS:
-        draw(cloud, camera, (90, 70), other)
-    again = draw(cloud, camera, (90, 70), name)
-    np.testing.assert_array_equal(first.id, again.id)
-    np.testing.assert_array_equal(first.image(), again.image())
-
-
-@every_backend
-def test_a_far_away_scan_looks_as_it_does_at_the_origin(draw: Draw, name: str) -> None:
-    shift = np.array([4.5e6, 5.6e6, -1.2e6])
-    near, far = sphere(5000), sphere(5000, center=tuple(shift))
-    assert np.abs(far.positions).max() < 1e6, "stored relative to its own origin"
-    camera = Camera.orbit(near.bounds(), 25, 15)
-    moved = Camera(
-        eye=tuple(np.array(camera.eye) + shift),
-        target=tuple(np.array(camera.target) + shift),
-        fov_y=camera.fov_y,
-    )
-    one, other = draw(near, camera, (160, 120), name), draw(far, moved, (160, 120), name)
-    # float64 itself resolves 1e-9 at this distance: a few points sit on pixel edges.
-    assert (one.id != other.id).mean() < 0.005
-
-
-@every_backend_of_points
-def test_ids_are_those_of_the_file(draw: Draw, name: str) -> None:
-    points = np.array([[np.nan, 0, 0], [0, 0, -2.0], [np.inf, 0, 0], [0.5, 0, -2.0]])
-    cloud = PointCloud.from_arrays(points, normals=[[0, 0, 1]] * 4, radii=[0.2] * 4)
-    assert cloud.dropped == 2
-    surface = draw(cloud, looking_down_z(fov_y=60), (65, 65), name)
-    assert set(np.unique(surface.id)) == {1, 3, NOTHING}
 
 
 def test_automatic_choices_do_not_depend_on_what_was_estimated_before(renderer: Renderer) -> None:

@@ -16,11 +16,8 @@ from pathlib import Path
 from typing import Any
 from zipfile import ZIP_STORED, ZipFile
 
-import lzf
 import numpy as np
-import OpenEXR
-from PIL import Image
-from PIL.TiffImagePlugin import ImageFileDirectory_v2
+from whole_files import TEXTS, write_scans
 from whole_folders import FOLDERS
 
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
@@ -45,35 +42,16 @@ from viewer.picture.surface import Surface
 from viewer.scan import formats
 from viewer.scan.listing import list_folder
 from viewer.scan.open import open_scan
-from viewer.scan.points import PointCloud
-from viewer.scan.pose import Pose
-from viewer.scan.range_view import RangeView, merge
 from viewer.scan.times import TIMES_FILE
 
 FOLDER = ".folder"  # how the kinds end that are folders, packed
 MOST_SEED = 20_000  # bytes of a real file that is worth damaging
 SIZE = (48, 32)
-_PCD = (
-    "FIELDS x y z rgb n\nSIZE 4 4 4 4 2\nTYPE F F F F U\nCOUNT 1 1 1 1 2\nWIDTH 3\nHEIGHT 4\nPOINTS 12\nDATA "
-)
-_PLY = "ply\nformat ascii 1.0\nelement vertex 3\n" + "".join(f"property float {name}\n" for name in "xyz")
 _TEXTS = {
-    "list.ply": f"{_PLY}property list uchar int seen_by\nend_header\n1 2 3 2 0 1\n4 5 6 0\n7 8 9 1 5\n",
-    "mesh.ply": f"{_PLY}element face 1\nproperty list uchar int vertex_index\nend_header\n"
-    "1 2 3\n4 5 6\n7 8 9\n3 0 1 2\n",
-    "ascii.pcd": f"{_PCD}ascii\n{'1 2 3 1e-38 7 8' * 12}\n",
-    "mesh.obj": "v 0 0 1 1 0 0\nv 1 2 3 0 1 0\nvn 0 0 1\nf 1//1 2//1 1//1\nf 1/2/1 -1//-1 2//1\n",
-    "plain.xyz": "1 2 3 4 5 6\n7 8 9 1 2 3\n",
-    "commas.xyz": "# x y z\n1,2,3\n4,5,6\n",
-    "named.csv": '"x";"y";"z";"GPS Time"\r\n1;2;3;4\r\n5;6;7;8\r\n',
-    "tabs.txt": "X\tY\tZ\tR\tG\tB\n1\t2\t3\t4\t5\t6\n",
-    "count.pts": "2\n1 2 3 4 5 6 7\n8 9 1 2 3 4 5\n",
     "landmarks.fcsv": "# CoordinateSystem = 1\n# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc\n"
     'a,1,2,3,0,0,0,1,1,1,1,"n, tip",\nb,4,5,6,0,0,0,1,1,1,1,chin,d\n',
     "landmarks.lm": "Landmarks-1.0\n2\nnose\n1 2 3 1 1\nchin\n4 5 6 1 1\n",
 }
-
-
 _LANDMARKS = ("mrk.json", "tps", "txt", "c3d", "csv", "wide.csv")  # in which they are written
 
 
@@ -86,10 +64,7 @@ def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
     """
     for name, text in _TEXTS.items():
         (folder / name).write_text(text)
-    packed = lzf.compress(bytes(240))
-    sizes = np.array([len(packed), 240], "<u4").tobytes()
-    (folder / "packed.pcd").write_bytes(f"{_PCD}binary_compressed\n".encode() + sizes + packed)
-    _write_scans(folder)
+    write_scans(folder)
     _write_choices(folder)
     _write_landmarks(folder)
     found: dict[str, list[bytes]] = {}
@@ -106,70 +81,6 @@ def seeds(folder: Path, data_dir: Path | None) -> dict[str, list[bytes]]:
         if known and path.stat().st_size < MOST_SEED:
             found.setdefault(path.suffix, []).append(path.read_bytes())
     return found
-
-
-def _write_scans(folder: Path) -> None:
-    rng = np.random.default_rng(7)
-    normals = rng.normal(size=(60, 3))
-    cloud = PointCloud.from_arrays(
-        rng.random((60, 3)) * 2,
-        normals=normals / np.linalg.norm(normals, axis=1, keepdims=True),
-        colors=rng.integers(0, 256, (60, 4), np.uint8),
-        radii=rng.random(60),
-        axes=rng.random((60, 4)),
-        scalars={"intensity": rng.random(60, np.float32), "gps_time": rng.random(60) + 1e9},
-    )
-    for suffix in formats.writable_suffixes():
-        formats.write(folder / f"full{suffix}", cloud)
-    poses = [Pose(index, index / 25, "", cloud) for index in range(3)]
-    formats.write_poses(folder / "scan.svo", poses, "mm")
-    sequence = np.ones((3, 8, 3), np.float32)
-    np.save(folder / "sequence.npy", sequence)
-    np.save(folder / "columns.npy", np.asfortranarray(sequence[0].astype(">f8")))
-    np.savez(
-        folder / "radii.npz", positions=sequence, radii=np.ones(8), origin=np.ones(3), times=np.arange(3)
-    )
-    np.savez_compressed(folder / "packed.npz", positions=sequence, label=np.ones((3, 8), np.int8))
-    depth = rng.random((7, 9), np.float32) + 1
-    to_camera = np.eye(4)
-    views = [
-        RangeView(
-            depth=depth, mask=depth < 1.9, color=rng.random((7, 9, 3)).astype(np.float16), confidence=depth,
-            fx=10.0, fy=10.0, cx=4.5, cy=3.5, world_to_camera=to_camera, name=name, unit="mm",
-        )
-        for name in ("left", "right")
-    ]  # fmt: skip
-    formats.write(folder / "views.exr", merge(views), views)
-    _write_grids(folder)
-
-
-def _write_grids(folder: Path) -> None:
-    """Range views as other programs write them."""
-    row, column = np.mgrid[:7, :9].astype(np.float32)
-    depth = 2 + 0.1 * column
-    grid = np.stack([(column - 4) * depth / 9, (row - 3) * depth / 9, depth], axis=2)
-    head = "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 9\nHEIGHT 7\nVIEWPOINT 1 2 3 0 1 0 0\nDATA binary\n"
-    (folder / "organised.pcd").write_bytes(head.encode() + grid.tobytes())
-    np.savez(
-        folder / "depth.npz", depth=depth, kind="range", unit="m", intrinsics=np.diag([9.0, 9, 1]),
-        distortion=np.array([0.1, 0, 0, 0]), pose=np.eye(4), mask=depth > 2, color=depth / 9,
-    )  # fmt: skip
-    np.savez(folder / "grid.npz", xyz=grid)
-    np.savez(folder / "scanner.npz", xyz=np.stack([column, row, np.sin(column)], axis=2), unit="mm")
-    np.savez(folder / "terrain.npz", elevation=row.astype(np.int16), xmin=0, xmax=9, ymin=7, ymax=0)
-    ground = ImageFileDirectory_v2()
-    for tag, numbers in {33550: (2.0, 2.0, 0.0), 33922: (0.0, 0.0, 0.0, 5e5, 4e6, 0.0)}.items():
-        ground.tagtype[tag], ground[tag] = 12, numbers
-    ground.tagtype[34735], ground[34735] = 3, (1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 9001)
-    ground.tagtype[42113], ground[42113] = 2, "3"
-    Image.fromarray(row).save(folder / "terrain.tif", tiffinfo=ground)
-    Image.fromarray(row.astype(np.uint16)).save(folder / "depth.tif", compression="tiff_lzw")
-    layers = {f"L.Depth.{name}": np.ascontiguousarray(depth) for name in "ZA"} | {
-        f"L.Combined.{name}": depth.astype(np.float16) for name in "RGBA"
-    }
-    header = {"type": OpenEXR.scanlineimage, "worldToCamera": np.eye(4, dtype=np.float32)}
-    with open(folder / "render.exr", "wb") as stream:
-        OpenEXR.File(header, layers).write(stream)
 
 
 def _write_choices(folder: Path) -> None:
@@ -271,7 +182,7 @@ def _kept(path: Path) -> None:
 
 def _times(path: Path) -> None:
     for name in ("f0.ply", "f1.ply"):
-        (path.parent / name).write_text(_TEXTS["mesh.ply"])
+        (path.parent / name).write_text(TEXTS["mesh.ply"])
     with open_scan(path.parent / "f*.ply") as timeline:
         timeline.pose(1)
 

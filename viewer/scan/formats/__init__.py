@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, Scan4DError, explained, shortened
+from ...errors import InputError, Scan4DError, explained, shortened, unknown_name
 from ...extensions import load_modules, package_of
 from ...files import whole_file
 from ..faces import Faces
@@ -67,6 +67,13 @@ def writable_suffixes(views: bool = False) -> list[str]:
 def scan_suffixes() -> list[str]:
     """Every suffix of which one file can be written for all poses of a scan, sorted."""
     return sorted(suffix for suffix, module in _formats().items() if hasattr(module, "write_poses"))
+
+
+def format_of(suffix: str) -> ModuleType:
+    """The module that reads files of a suffix. Raises InputError where none does."""
+    if suffix not in _formats():
+        raise unknown_name("file suffix", suffix, _formats())
+    return _formats()[suffix]
 
 
 def package_reading(path: Path) -> str:
@@ -253,7 +260,7 @@ def _readable(path: Path) -> ModuleType:
         what, hint = explained(error)
         raise InputError(what, path, hint) from error
     if path.is_dir():
-        raise InputError("is a folder, not a file", path)
+        raise InputError("is a folder, not a file", path, "Name a file in it")
     if not path.is_file():
         raise InputError("is a device or a pipe, not a file", path, "Copy its output into a file")
     suffix = path.suffix.lower()

@@ -1,0 +1,71 @@
+"""The conformance suites, run on every backend, reader and measure of Scan4D."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from scenes import rarely
+from whole_files import write_scans
+
+from viewer.analysis.measures.kinds import measure_kinds
+from viewer.backends import backends
+from viewer.errors import InputError
+from viewer.scan import formats
+from viewer.testing import Check, backend_checks, measure_checks, reader_checks
+from viewer.testing.backends import SIZES
+
+BACKENDS = [check for name in backends() for check in backend_checks(name)]
+READERS = [check for suffix in formats.known_suffixes() for check in reader_checks(suffix)]
+MEASURES = [check for kind in measure_kinds() for check in measure_checks(kind)]
+SUFFIXES = sorted({*formats.known_suffixes()} - {".laz"})
+_RARE = tuple(f"odd_size_{width}x{height}" for width, height in SIZES[2:])  # which repeat what others show
+
+
+def parameters(check: Check) -> object:
+    """A check of a backend as a parameter of a test."""
+    marks = [pytest.mark.backend(check.subject), *([pytest.mark.slow] if check.name in _RARE else [])]
+    return pytest.param(check, id=str(check), marks=marks)
+
+
+@pytest.fixture(scope="module")
+def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a file of each format, or several."""
+    folder = tmp_path_factory.mktemp("scans")
+    write_scans(folder)
+    return folder
+
+
+@pytest.mark.usefixtures("renderer")
+@pytest.mark.parametrize(
+    "check", [parameters(check) for name in backends() for check in backend_checks(name)]
+)
+def test_backends(check: Check) -> None:
+    check()
+
+
+@pytest.mark.parametrize("check", READERS, ids=str)
+def test_readers(check: Check) -> None:
+    check()
+
+
+@pytest.mark.parametrize("suffix", [*SUFFIXES, *rarely(".laz")])
+def test_readers_with_files(scans: Path, suffix: str) -> None:
+    paths = sorted(scans.glob(f"*{suffix}"))
+    assert paths
+    for path in paths:
+        for check in reader_checks(suffix, path):
+            check()
+
+
+@pytest.mark.parametrize(
+    "check", [check for kind in measure_kinds() for check in measure_checks(kind)], ids=str
+)
+def test_measures(check: Check) -> None:
+    check()
+
+
+def test_names_that_nothing_has_are_refused() -> None:
+    for suite, name in ((backend_checks, "dotz"), (reader_checks, ".zip"), (measure_checks, "distanse")):
+        with pytest.raises(InputError, match=f"unknown .* '{name}'"):
+            suite(name)
