@@ -110,7 +110,7 @@ def test_sizes_are_told_once() -> None:
 
 
 def test_the_parameters_are_those_that_all_have_in_common() -> None:
-    assert "`voxels` with `stop=depth depth=10" in " ".join(page([measured()]).split())
+    assert "`voxels` and the parameters `stop=depth depth=10" in " ".join(page([measured()]).split())
     deeper = drawn("instancing", {"instancing": "gs", "depth": 11}, [1.0, 1.0], n=101_931)
     assert page([digest([*FEEDS, deeper], [], [])]).endswith("that it runs.\n")
     assert digest([*FEEDS, deeper], [], [])["params"] == {"stop": "depth"}

@@ -76,7 +76,7 @@ def test_timer_queries_need_no_line_of_the_processors() -> None:
 
 def test_a_run_that_was_stopped_says_how_many_views_it_has() -> None:
     stopped = [a_row("gs", [10.0], [40.0], n=87_003, scene="owlii")]
-    assert "1 or 2 views a scan" in " ".join(page([digest([*ROWS, *stopped])]).split())
+    assert "each scan has 1 or 2 views" in " ".join(page([digest([*ROWS, *stopped])]).split())
 
 
 def test_a_driver_without_geometry_shaders_has_times_alone() -> None:

@@ -28,7 +28,7 @@ Measurement = dict[str, Any]
 
 _ONCE = ("device", "driver", "processors", "timer", "version", "date", "size", "repeat", "seed")
 _SPACE = "\N{NARROW NO-BREAK SPACE}"
-_TIMERS = {"query": "timer queries", "finish": "wall time between two `glFinish` calls"}
+_TIMERS = {"query": "GPU timer queries", "finish": "wall times between two `glFinish` calls"}
 
 
 def circumstances(rows: Sequence[Row]) -> Measurement:
@@ -135,15 +135,18 @@ def _machine(measurement: Measurement, backend: str) -> str:
         {len(row["gpu_ms"]) for row in measurement["rows"]}
     )  # fewer of a scan where it was stopped
     params = (f"{name}={str(value).lower()}" for name, value in measurement["params"].items())
-    parts = [
-        f"**{measurement['device']}**: {measurement['driver']}, {measurement['processors']} processors",
-        _TIMERS[measurement["timer"]],
-        f"{'x'.join(map(str, measurement['size']))}, {' or '.join(map(str, views))} views a scan",
-        f"Scan4D {measurement['version']}, {measurement['date']}",
+    size = "x".join(map(str, measurement["size"]))
+    count = f"{' or '.join(map(str, views))} view{'' if views == [1] else 's'}"
+    used = f", with `{backend}` and the parameters `{' '.join(params)}`" if backend else ""
+    sentences = [
+        f"**{measurement['device']}** with {measurement['processors']} processors and the driver "
+        f"{measurement['driver']}",
+        f"Times are {_TIMERS[measurement['timer']]}",
+        f"Pictures have {size} pixels, and each scan has {count}",
+        f"Scan4D {measurement['version']} measured on {measurement['date']}{used}",
     ]
-    if backend:
-        parts[-1] += f", `{backend}` with `{' '.join(params)}`"
-    return "; ".join(parts) + (f". {measurement['note']}" if measurement["note"] else "")
+    note = measurement["note"]
+    return " ".join(f"{sentence.rstrip('.')}." for sentence in [*sentences, *([note] if note else [])])
 
 
 def put_tables(text: str, tables: Mapping[str, str]) -> str:
