@@ -143,7 +143,7 @@ def _machine(measurement: Measurement, backend: str) -> str:
         f"{measurement['driver']}",
         f"Times are {_TIMERS[measurement['timer']]}",
         f"Pictures have {size} pixels, and each scan has {count}",
-        f"Scan4D {measurement['version']} measured on {measurement['date']}{used}",
+        f"Version {measurement['version']} of Scan4D was measured on {measurement['date']}{used}",
     ]
     note = measurement["note"]
     return " ".join(f"{sentence.rstrip('.')}." for sentence in [*sentences, *([note] if note else [])])
