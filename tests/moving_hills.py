@@ -92,7 +92,7 @@ def key(x: float, y: float, frame: int) -> Spot:
     """A place of the surface, as set exactly in a frame."""
     place = moved(at_rest(x, y)[None], frame)[0]
     where = (float(place[0]), float(place[1]), float(place[2]))
-    return Spot(frame, frame / 25.0, where, "surface", None, SPACING, 0, (0.0,) * 6)
+    return Spot(frame, frame / 25.0, where, None, SPACING, 0, (0.0,) * 6)
 
 
 def placed(name: str, *keys: Spot) -> Landmark:

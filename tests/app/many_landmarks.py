@@ -34,7 +34,7 @@ def document(first: NDArray[np.float64], landmarks: int, measures: int) -> Docum
     rows = np.linspace(0, len(first) - 1, landmarks).astype(int).tolist()
     names = [f"landmark {number}" for number in range(1, landmarks + 1)]
     placed = tuple(
-        Landmark(name, (Spot(0, 0.0, vector(first[row]), "point", row, 1.2, 0),))
+        Landmark(name, (Spot(0, 0.0, vector(first[row]), row, 1.2, 0),))
         for name, row in zip(names, rows, strict=True)
     )
     made = tuple(

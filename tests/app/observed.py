@@ -24,12 +24,11 @@ from acting import Actor
 from cut_texts import CutTexts
 from imgui_bundle import imgui
 
-from viewer.analysis.measure import Measurement, Reading, reading_of
+from viewer.analysis.pick import SURE
 from viewer.app import run
 from viewer.app.app import App
 from viewer.app.scene.view import words_over
 from viewer.backends import backends
-from viewer.document.measurements import Measurements
 from viewer.document.schema import plain
 
 _SETTLING = 3  # turns in which the window shows what an event has changed, whatever else goes on
@@ -203,7 +202,7 @@ def shown(app: App) -> dict[str, Any]:
         "landmarks": landmarks(app),
         "followed": {name: track.is_whole for name, track in app.tools.followed.tracks.items()},
         "measured": {name: one.values.tolist() for name, one in app.tools.followed.series.items()},
-        "measurements": [told(measurement, app) for measurement in document.part(Measurements).all],
+        "distances": distances(app),
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),
         "range_note": app.ranging.words(),
@@ -227,18 +226,20 @@ def shown(app: App) -> dict[str, Any]:
     return state
 
 
-def told(measurement: Measurement, app: App) -> dict[str, Any]:
-    """A measurement as it stands in the frame that is shown."""
-    pose, one_topology = app.playback.pose, app.playback.timeline.one_topology
-    reading = Reading(measurement, None)
-    if pose is not None:
-        reading = reading_of(measurement, pose, one_topology, app.session.laid.layers(pose).place)
-    return {
-        "ends": [asdict(end) for end in reading.measurement.ends],
-        "distance": reading.measurement.distance,
-        "uncertainty": reading.measurement.uncertainty,
-        "motion": reading.motion,
-    }
+def distances(app: App) -> list[dict[str, Any]]:
+    """The distances as they are in the frame that is shown."""
+    tool = app.tools._slots["measuring"].tool
+    return [] if tool is None else [
+        {
+            "name": one.measure.name,
+            "ends": [asdict(end) for end in one.ends],
+            "positions": one.positions.tolist(),
+            "distance": one.value,
+            "uncertainty": SURE * one.sigma,
+            "state": one.state,
+        }
+        for one in tool.shown
+    ]  # fmt: skip
 
 
 def landmarks(app: App) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from virtual_screen import (
 )
 from written import picture
 
-from viewer.document.measurements import Measurements
+from viewer.document.landmarks import Landmarks
 from viewer.document.saved_session import SavedSession
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -162,7 +162,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
         app.process.send_signal(signal.SIGKILL)
         app.process.wait()
     kept = kept_of(tmp_path, scan)
-    assert len(kept.document.part(Measurements).all) == 1
+    assert len(kept.document.part(Landmarks).distances) == 1
     assert str(kept.hash).startswith("content:")
     with running_app(screen, tmp_path, scan) as app:
         state = app.settle()
@@ -235,23 +235,23 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         hands.measure(60)
         path = saved_session(app, "mine")
         data: dict[str, Any] = json.loads(path.read_text())
-        measured = data["document"]["parts"]["measurements"]
+        measured = data["document"]["parts"]["landmarks"]
         measured["all"][0]["note"] = "left"
         data["document"]["backend"] = "cubist"
         path.write_text(json.dumps(data))
         hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
-        app.told("these cannot be read: parts.measurements")
+        app.told("these cannot be read: parts.landmarks")
         app.told("This Scan4D has no renderer 'cubist': .* draws it instead")
         state = app.see(frame=1)
         assert state.document["backend"] == "cubist"
         assert state.document["camera"] == data["document"]["camera"]
         assert state.document["bookmarks"] == data["document"]["bookmarks"]
-        assert state.document["parts"]["measurements"] == measured
+        assert state.document["parts"]["landmarks"] == measured
         hands.measure(60)
         after = app.settle().document
-        assert len(after["parts"]["measurements"]["all"]) == 1
-        assert after["unread"] == {"parts.measurements": measured}
+        assert len(after["parts"]["landmarks"]["measures"]) == 1
+        assert after["unread"] == {"parts.landmarks": measured}
         assert "cannot be drawn" not in app.log()
         assert "Traceback" not in app.log()
 

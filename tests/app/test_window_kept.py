@@ -89,7 +89,7 @@ def test_a_hundred_acts_are_there_again_after_a_kill(screen: Screen, tmp_path: P
         app.process.wait()
     parts = done.document
     assert parts["bookmarks"]
-    assert parts["parts"]["measurements"]["all"]
+    assert parts["parts"]["landmarks"]["measures"]
     with running_app(screen, tmp_path / "run1", scan, home=home) as app:
         again = app.settle()
         assert again.document == done.document

@@ -177,7 +177,7 @@ def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
     press(app, "m")
     app.screen.do("click", 1)
     app.told("filled")
-    assert not app.settle().measurements
+    assert not app.settle().distances
 
 
 @pytest.mark.slow

@@ -56,17 +56,17 @@ def measure(app: RunningApp, points: NDArray[np.float64], one: int, other: int) 
     click(app, pixel_of(app, points, one))
     app.see(is_under_way=True)
     click(app, pixel_of(app, points, other), times=2)
-    measurement = app.see(lambda state: state.measurements).measurements[-1]
-    for end, number in zip(measurement["ends"], (one, other), strict=True):
+    made = app.see(lambda state: state.distances).distances[-1]
+    for end, number in zip(made["ends"], (one, other), strict=True):
         assert (end["id"], end["frame"]) == (number, 0)
         assert math.dist(end["position"], points[number]) < CLICK
-    return measurement["distance"], measurement["uncertainty"]
+    return made["distance"], made["uncertainty"]
 
 
-def expect_reading(app: RunningApp, *distances: float, motion: str = "moves with the surface") -> None:
-    """Wait until the measurements read so."""
-    wanted = [(pytest.approx(distance, abs=2 * CLICK), motion) for distance in distances]
-    app.see(lambda state: [(one["distance"], one["motion"]) for one in state.measurements] == wanted)
+def expect_reading(app: RunningApp, *distances: float, state: str = "tracked") -> None:
+    """Wait until the distances read so."""
+    wanted = [(pytest.approx(distance, abs=2 * CLICK), state) for distance in distances]
+    app.see(lambda seen: [(one["distance"], one["state"]) for one in seen.distances] == wanted)
 
 
 def name_unit(app: RunningApp, name: str) -> None:
@@ -104,8 +104,7 @@ def keys_file(tmp_path: Path) -> None:
     """Keys for what has none of its own."""
     folder = tmp_path / "config" / "scan4d"
     folder.mkdir(parents=True)
-    keys = '[keys]\nsave_measurements = "Ctrl+L"\ncopy_measurements = "Ctrl+C"\n'
-    keys += 'read_measurements = "Ctrl+K"\n'
+    keys = '[keys]\nsave_distances = "Ctrl+L"\ncopy_distances = "Ctrl+C"\nread_distances = "Ctrl+K"\n'
     (folder / "keys.toml").write_text(keys)
 
 
@@ -121,7 +120,7 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
         name_unit(app, "cm")
         distance, uncertainty = measure(app, frames[0], 34, 128)
         assert abs(distance - distances[0]) < uncertainty < 2 * CLICK
-        expect_reading(app, distances[0])
+        expect_reading(app, distances[0], state="placed")
 
         screen.do("key", "Right")
         expect_reading(app, distances[1])
@@ -152,9 +151,10 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
             saved = list(csv.DictReader(stream))
         assert saved[:2] == copied
         for row, frame in zip(saved, (0, 1, 2), strict=True):
-            assert (row["scan"], row["unit"], row["motion"]) == ("scan.npz", "cm", "moves with the surface")
+            assert (row["scan"], row["unit"], row["frame"]) == ("scan.npz", "cm", str(frame + 1))
             assert abs(float(row["distance"]) - distances[frame]) < 2 * CLICK
-            assert (row["frame_1"], row["id_1"], row["id_2"]) == (str(frame + 1), "34", "128")
+            assert row["state_1"] == row["state_2"] == ("tracked" if frame else "placed")
+            assert (row["point_1"], row["point_2"]) == (("", "") if frame else ("34", "128"))
             place = [float(row[f"{axis}_2"]) for axis in "xyz"]
             assert math.dist(place, frames[frame][128]) < 2 * CLICK
 
@@ -177,11 +177,11 @@ def test_distances_that_follow_their_points_are_undone_and_saved(screen: Screen,
         app.see(clicking=None)
         click(app, pixel_of(app, frames[0], 34))
         after = app.settle()
-        assert (after.is_under_way, len(after.measurements)) == (False, 1), "clicks set no ends any longer"
+        assert (after.is_under_way, len(after.distances)) == (False, 1), "clicks set no ends any longer"
         assert "Traceback" not in app.log()
 
 
-def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) -> None:
+def test_without_one_topology_it_is_tracked_or_has_a_reason(screen: Screen, tmp_path: Path) -> None:
     scan = tmp_path / "scan"
     scan.mkdir()
     for number, faces in enumerate((FACES, FACES, FACES[::-1])):
@@ -192,10 +192,10 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
         click(app, (app.view()[0] + 10, app.view()[1] + 10))
         app.told("No surface here")
         distance, _ = measure(app, points, 34, 128)
-        expect_reading(app, distance)
+        expect_reading(app, distance, state="placed")
         screen.do("key", "End")
-        app.told("Not all frames have the same points")
-        expect_reading(app, distance, motion="fixed in space")
+        app.see(lambda seen: seen.frame == 2 and seen.distances[0]["state"] != "not tracked yet")
+        assert re.match("tracked|no data: ", app.state.distances[0]["state"])
         screen.do("key", "ctrl+Home")
         app.see(frame=0)
 
@@ -203,7 +203,7 @@ def test_without_one_topology_it_stays_in_space(screen: Screen, tmp_path: Path) 
         start = pixel_of(app, points, 34)
         after = app.drag(start, (start[0] + 90, start[1]))
         assert after.camera != before.camera
-        assert (after.is_under_way, len(after.measurements)) == (False, 1), (
+        assert (after.is_under_way, len(after.distances)) == (False, 1), (
             "a drag turns the view and sets no end"
         )
         assert "Traceback" not in app.log()
@@ -218,4 +218,4 @@ def test_a_double_click_in_a_slow_window_sets_one_end(screen: Screen, tmp_path: 
         app.see(clicking="measuring")
         measure(app, points, 34, 128)
         after = app.settle()
-        assert (after.is_under_way, len(after.measurements)) == (False, 1)
+        assert (after.is_under_way, len(after.distances)) == (False, 1)

@@ -14,6 +14,7 @@ from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, Screen, runn
 from viewer import cli
 from viewer.document.recording import Recording
 from viewer.errors import InputError
+from viewer.rigid import Rigid
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
@@ -430,11 +431,12 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         press(app, "m")
         click(app, x, y)
         click(app, x + 60, y)
-        (measured,) = app.settle().measurements
-        ends = np.array([end["position"] for end in measured["ends"]])
+        (measured,) = app.settle().distances
+        moved_by = Rigid(np.array(entry.place))
+        ends = moved_by.points(np.array(measured["positions"]))
         np.testing.assert_allclose(ends[0], (100, 0, 3), atol=0.05)
-        (kept,) = app.state.document["parts"]["measurements"]["all"]
-        np.testing.assert_allclose([kept["first"]["position"], kept["second"]["position"]], ends, atol=1e-6)
+        stored = app.state.document["parts"]["landmarks"]["all"]
+        np.testing.assert_allclose([end["keys"][0]["position"] for end in stored], measured["positions"])
         press(app, "Escape")
         press(app, "ctrl+z")  # pictures have measured lines, too
 

@@ -28,7 +28,7 @@ def app(screen: Screen, tmp_path: Path) -> Iterator[RunningApp]:
     formats.write(tmp_path / "head.npz", type(ball).from_arrays(points, normals=ball.normals))
     folder = tmp_path / "config" / "scan4d"
     folder.mkdir(parents=True)
-    (folder / "keys.toml").write_text('[keys]\ncopy_measurements = "Ctrl+C"\n')
+    (folder / "keys.toml").write_text('[keys]\ncopy_distances = "Ctrl+C"\n')
     with running_app(screen, tmp_path, tmp_path / "head.npz") as app:
         yield app
     assert "Traceback" not in app.log()
@@ -70,7 +70,7 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     for x in (-width // 12, width // 12):
         app.do(("mousemove", middle[0] + x, middle[1]), ("click", 1))
         app.settle()
-    made = app.see(lambda state: state.measurements).measurements[0]
+    made = app.see(lambda state: state.distances).distances[0]
     assert made["distance"] < 0.25, "it is kept in units of the scan"
     ctrl(app.screen, "c")
     app.told("Copied")

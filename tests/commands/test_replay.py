@@ -17,8 +17,6 @@ from hostile_values import variants
 from scenes import sphere
 from written import bits, film, picture
 
-from viewer.analysis.measure import Measurement
-from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.recording import Entry, Recording, fingerprint, matrix_of
@@ -109,61 +107,30 @@ def test_a_picture_tells_its_scan_and_the_scans_hash(run: Run) -> None:
     assert pose.hash == fingerprint(sorted(Path("sequence").iterdir()))
 
 
-def test_measurements_are_drawn_again_follow_their_points_and_stand_in_anonymous_pictures(run: Run) -> None:
-    """From cheek to cheek of the demo, in its first frame; the points have moved by frame 6."""
-    with open_scan("demo") as timeline:
-        first = timeline.pose(0)
-        low, high, places = first.bounds.low, first.bounds.high, first.cloud.world()
-        ends = []
-        for share in (0.2, 0.8):
-            wanted = low + (high - low) * np.array([share, 0.45, 0.8])
-            row = int(np.linalg.norm(places - wanted, axis=1).argmin())
-            ends.append(Spot(0, 0.0, vector(places[row]), "surface", row, 3.0, 0))
-        camera = Camera.orbit(first.bounds, 0, 0, aspect=1.5)
-    measured = entry(
-        scan="demo", camera=camera, size=(384, 256), marks=Marks(measurements=True),
-        measurements=(Measurement(ends[0], ends[1]),), backend="points", look=Look(),
-    )  # fmt: skip
-    later = replace(measured, pose=5, time=0.2, at=0.2)
-    Recording((measured, later)).save(Path("a.json"))
-    assert run("render", "--replay", "a.json", "-o", "p%d.png").code == 0
-    assert run("render", "--replay", "a.json", "--anonymous", "-o", "q%d.png").code == 0
-    ink = np.array(rgba(f"#{LINE_COLOR:06x}"), int)
-    for number, shown in enumerate((measured, later)):
-        named = picture(Path(f"p{number}.png"))
-        assert run("render", "--replay", f"p{number}.png", "-o", "again.png", "--force").code == 0
-        assert np.array_equal(picture(Path("again.png")), named)
-        assert run("render", "demo", "--replay", f"q{number}.png", "-o", "again.png", "--force").code == 0
-        assert np.array_equal(picture(Path("again.png")), picture(Path(f"q{number}.png")))
-        lines = [
-            np.abs(each.astype(int) - ink).max(axis=2) < 40
-            for each in (named, picture(Path(f"q{number}.png")))
-        ]
-        assert lines[0].sum() > 100
-        assert np.array_equal(*lines)
-        assert Recording.load(Path(f"p{number}.png")).entries[0].measurements == shown.measurements
-
-
 def test_landmarks_and_their_lines_stand_in_anonymous_pictures_where_they_are(run: Run) -> None:
     away = np.array([5000.0, -300.0, 20.0])
     formats.write(Path("away.npz"), PointCloud.from_arrays(sphere(2000).world() + away))
     camera = Camera.orbit(sphere(2000).bounds(), 0, 0, aspect=1.5).moved(away)
-    top, side = (vector(away + place) for place in ((0.0, 0.8, 1.2), (0.8, 0.0, 1.2)))
+    places = (0.0, 0.8, 1.2), (0.8, 0.0, 1.2), (0.0, -0.8, 1.2)
+    top, side, low = (vector(away + place) for place in places)
     turn = Rigid(np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])).in_frame(-away)
     shown = entry(
         scan="away.npz", camera=camera, size=(1200, 800), look=Look(), at=0.0,
         marks=Marks(landmarks=True, trajectories=True, measure_lines=True, plot=True),
         landmarks=(DrawnLandmark(side, "jane", False, 0.1),), held=matrix_of(turn),
         trajectories=(DrawnPath((top, side), (0xFF0000, 0xFF0000)),),
-        measure_lines=(DrawnPath((top, side), (0x00FF00,), False, "doe", "1 mm"),),
+        measure_lines=(
+            DrawnPath((top, side), (0x00FF00,), False, "doe", "1 mm"),
+            DrawnPath((side, low), (LINE_COLOR,), name="roe", value="1", has_ends=True),
+        ),
         plot=DrawnPlot("time [s]", (0.0, 0.04), (DrawnCurve("doe", "mm", 0x0000FF, (None, 1.0)),)),
     )  # fmt: skip
     Recording((shown,)).save(Path("a.json"))
     assert Recording.load(Path("a.json")).entries == (shown,)
     assert run("render", "--replay", "a.json", "-o", "p.png").code == 0
     assert run("render", "--replay", "a.json", "--anonymous", "-o", "q.png").code == 0
-    assert not any(word in read_description(Path("q.png")) for word in ("jane", "doe", "away", "5000"))
-    for color in ((255, 210, 31), (255, 0, 0), (0, 255, 0)):
+    assert not any(word in read_description(Path("q.png")) for word in ("jane", "doe", "roe", "away", "5000"))
+    for color in ((255, 210, 31), (255, 0, 0), (0, 255, 0), rgba(f"#{LINE_COLOR:06x}")[:3]):
         named, anonymous = (
             np.abs(picture(Path(name)).astype(int)[..., :3] - color).max(axis=2) < 60
             for name in ("p.png", "q.png")

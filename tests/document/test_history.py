@@ -9,13 +9,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from viewer.analysis.measure import Measurement
 from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
 from viewer.document.history import MOST_STEPS, History
-from viewer.document.measurements import Measurements
+from viewer.document.landmarks import Landmarks
 from viewer.document.part import Part
 from viewer.look import COLOR_MAPS
 
@@ -23,9 +22,9 @@ START = Document(camera=Camera(eye=(0, 0, 5)))
 Change = Callable[[Document, np.random.Generator], Document]
 
 
-def measurement(number: float) -> Measurement:
-    ends = (Spot(0, 0.0, (number, 0, side), "point", 3, 0.1, 0) for side in (0, 1))
-    return Measurement(*ends)
+def with_distance(document: Document, number: float) -> Document:
+    ends = ([Spot(0, 0.0, (number, 0, side), 3, 0.1, 0)] for side in (0, 1))
+    return document.with_part(document.part(Landmarks).with_distance(*ends))
 
 
 def moved(document: Document, rng: np.random.Generator) -> Document:
@@ -52,11 +51,12 @@ def bookmarked(document: Document, rng: np.random.Generator) -> Document:
 
 
 def measured(document: Document, rng: np.random.Generator) -> Document:
-    return document.with_part(document.part(Measurements).added(measurement(float(rng.random()))))
+    return with_distance(document, float(rng.random()))
 
 
 def forgotten(document: Document, rng: np.random.Generator) -> Document:
-    return document.with_part(document.part(Measurements).without(0))
+    made = document.part(Landmarks)
+    return document.with_part(made.without_measures(one.name for one in made.distances[:1]))
 
 
 CHANGES: tuple[Change, ...] = (
@@ -157,7 +157,7 @@ def test_what_nobody_changed_is_no_step() -> None:
 def test_it_keeps_so_many_steps_which_share_what_they_do_not_change() -> None:
     document = START
     for number in range(500):
-        document = document.with_part(document.part(Measurements).added(measurement(number)))
+        document = with_distance(document, number)
     history = History(document)
     tracemalloc.start()
     for number in range(2 * MOST_STEPS):
@@ -173,14 +173,14 @@ def test_it_keeps_so_many_steps_which_share_what_they_do_not_change() -> None:
 
 def test_a_tool_declares_what_it_keeps_and_finds_it_again() -> None:
     @dataclass(frozen=True)
-    class Landmarks(Part, name="tests.landmarks"):
+    class Places(Part, name="tests.landmarks"):
         names: tuple[str, ...] = ()
 
     try:
-        document = START.with_part(Landmarks(("nasion",)))
-        assert START.part(Landmarks) == Landmarks()
-        assert document.part(Landmarks).names == ("nasion",)
-        assert document.part(Measurements) == Measurements()
+        document = START.with_part(Places(("nasion",)))
+        assert START.part(Places) == Places()
+        assert document.part(Places).names == ("nasion",)
+        assert document.part(Landmarks) == Landmarks()
         with pytest.raises(TypeError, match=r"tests\.landmarks"):
 
             class Others(Part, name="tests.landmarks"):

@@ -16,7 +16,7 @@ PAIR = Template(
 
 
 def spot(frame: int) -> Spot:
-    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), "surface", None, None, 0)
+    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), None, None, 0)
 
 
 def test_landmarks_are_placed_in_turn_but_those_that_are_not_there() -> None:
@@ -90,3 +90,24 @@ def test_a_name_goes_wherever_it_is_spoken_of() -> None:
 def test_a_free_name_is_none_of_those_that_are_there() -> None:
     assert Landmarks().free_name() == "Landmark 1"
     assert Landmarks((Landmark("Landmark 7"), Landmark("nose"))).free_name() == "Landmark 8"
+
+
+def test_a_distance_owns_its_landmarks_and_takes_them_along() -> None:
+    made = Landmarks((Landmark("nose"),)).with_distance([spot(0)], [spot(1)])
+    assert [one.name for one in made.all] == ["nose", "Distance 1 A", "Distance 1 B"]
+    assert [one.name for one in made.listed] == ["nose"]
+    (measure,) = made.distances
+    assert (measure.name, measure.kind) == ("Distance 1", "distance")
+    assert measure.landmarks == ("Distance 1 A", "Distance 1 B")
+    assert made.without_measures(["Distance 1"]) == Landmarks((Landmark("nose"),))
+    assert made.without_landmark("nose").listed == ()
+
+
+def test_names_of_distances_are_free_ones() -> None:
+    made = Landmarks().with_distance([spot(0)], [spot(1)]).with_distance([spot(0)], [spot(1)])
+    assert [one.name for one in made.distances] == ["Distance 1", "Distance 2"]
+    made = made.without_measures(["Distance 1"]).with_measure_renamed("Distance 2", "lips")
+    made = made.with_distance([spot(0)], [spot(1)]).with_distance([spot(0)], [spot(1)], "lips")
+    made = made.with_distance([spot(0)], [spot(1)], "eyes")
+    assert [one.name for one in made.distances] == ["lips", "Distance 1", "Distance 3", "eyes"]
+    assert len({one.name for one in made.all}) == len(made.all), "a landmark's name is there once"

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from viewer.document.measurements import Measurements
+from viewer.document.landmarks import Landmarks
 from viewer.document.part import Part
 from viewer.geometry import Vector
 
@@ -36,7 +36,7 @@ def known() -> Iterator[None]:
 
 
 def test_what_the_tools_keep_is_declared_as_it_has_to_be() -> None:
-    assert Measurements in Part.kinds.values()
+    assert Landmarks in Part.kinds.values()
     for kind in Part.kinds.values():
         kind.check_declared()
 

@@ -133,7 +133,8 @@ def test_notes_are_shown_in_their_frame_and_left_out_of_anonymous_pictures(tmp_p
     with open_scan("demo") as timeline:
         legend = shown.legend(timeline, POSE)
     assert legend.notes == ("on it", "always")
-    assert [(line.ends[0], line.text) for line in legend.lines] == [((1.0, 0.0, 0.0), "at it")]
+    assert legend.overlay is not None
+    assert [(path.places, path.name) for path in legend.overlay.paths] == [(((1.0, 0.0, 0.0),), "at it")]
     assert shown.without_names().notes == ()
 
 

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 from hostile_values import variants
 
-from viewer.analysis.measure import Measurement
 from viewer.analysis.spot import Spot
 from viewer.backends import backend
 from viewer.camera import Camera
@@ -26,7 +25,7 @@ from viewer.choice.goal import Goal
 from viewer.choice.ways import DrawingWay
 from viewer.document import saved_session
 from viewer.document.document import Bookmark, Document
-from viewer.document.measurements import Measurements
+from viewer.document.landmarks import Landmarks
 from viewer.document.part import Part
 from viewer.document.recording import place_of
 from viewer.document.saved_session import SavedSession, is_session, keep, kept, kept_file
@@ -36,14 +35,14 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 CAMERA = Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5)
-ENDS = Spot(2, 0.08, (0.1, 1e-17, 3), "point", 7, 0.2, 0), Spot(2, 0.08, (1, 2, 3), "surface", None, None, 2)
+ENDS = (Spot(2, 0.08, (0.1, 1e-17, 3), 7, 0.2, 0),), (Spot(2, 0.08, (1, 2, 3), None, None, 2),)
 FULL = Document(
     camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
     goal=Goal("time", 1 / 3), way=DrawingWay("surfels", {"passes": "one"}),
     unit="mm", shown_unit="cm", front=-30.0, span=(2, 7), fps=30.0, times_by_names=True,
     bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
-    parts={"measurements": Measurements((Measurement(*ENDS), Measurement(*ENDS[::-1])))},
+    parts={"landmarks": Landmarks().with_distance(*ENDS).with_distance(*ENDS[::-1])},
     unread={"clips": [{"plane": [1, 0, 0]}]},
 )  # fmt: skip
 SESSION = SavedSession("/scans/knot", "files:0123456789abcdef", 3, FULL)
@@ -95,7 +94,7 @@ def test_what_other_tools_and_renderers_keep_survives_untouched(tmp_path: Path) 
     data["document"]["parts"]["tests.pins"] = data["document"]["params"]["a backend"] = unknown
     (tmp_path / "a.json").write_text(json.dumps(data))
     read = SavedSession.load(tmp_path / "a.json")
-    changed = replace(read, document=read.document.with_part(Measurements()))
+    changed = replace(read, document=read.document.with_part(Landmarks()))
     changed.save(tmp_path / "b.json")
     again = json.loads((tmp_path / "b.json").read_text())["document"]
     assert again["parts"] == {"tests.pins": unknown}
@@ -171,8 +170,8 @@ UNREADABLE = [
     (("unit",), " ", "unit"),
     (("bookmarks", 1, "name"), 3, "bookmarks"),
     (("bookmarks", 0, "colour"), "#ffffff", "bookmarks"),
-    (("parts", "measurements", "all", 1, "first", "snapped"), "x", "parts.measurements"),
-    (("parts", "measurements", "all", 0, "note"), "left", "parts.measurements"),
+    (("parts", "landmarks", "all", 1, "keys", 0, "level"), "x", "parts.landmarks"),
+    (("parts", "landmarks", "measures", 0, "note"), "left", "parts.landmarks"),
     (("sections",), [{"plane": [0, 0, 1]}], "sections"),
 ]
 
@@ -198,7 +197,7 @@ def test_what_cannot_be_read_of_a_document_costs_no_more_and_is_written_again(
     assert document.look == (replace(FULL.look, light="auto") if to == "dim" else FULL.look)
 
     # Whatever the user does now, it is there.
-    document = document.with_part(Measurements((Measurement(*ENDS),)))
+    document = document.with_part(Landmarks().with_distance(*ENDS))
     document = document.with_params("points", backend("points").params({"point_size": 2}))
     keep(replace(found, document=replace(document, camera=Camera(), bookmarks=(), unit="m")))
     again = json.loads(file.read_text())["document"]["unread"]

@@ -23,14 +23,13 @@ from whole_folders import FOLDERS
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.analysis.landmarks.templates import read_template, save_template, templates
-from viewer.analysis.measure import Measurement
 from viewer.analysis.spot import Spot
 from viewer.app import keys, settings
 from viewer.app.commands import Commands
 from viewer.backends import backend, backends
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
-from viewer.document.measurements import Measurements
+from viewer.document.landmarks import Landmarks
 from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
 from viewer.drawing.frame import render_frame, shared_renderer
@@ -97,10 +96,10 @@ def _write_choices(folder: Path) -> None:
     marks = (Bookmark("front", camera),)
     chosen = settings.Settings(look=Look(light="head"), recent=("demo",)).to_json()
     (folder / "settings.json").write_text(json.dumps(chosen))
-    end = Spot(0, 0.0, (1.0, 2.0, 3.0), "point", 3, 0.1, 0)
+    end = Spot(0, 0.0, (1.0, 2.0, 3.0), 3, 0.1, 0)
     document = Document(camera, (1.0, 2.0, 3.0), Look(light="head"), "points", unit="mm", bookmarks=marks)
     document = document.with_params("points", backend("points").params()).with_part(
-        Measurements((Measurement(end, replace(end, id=None, snapped="surface")),))
+        Landmarks().with_distance([end], [replace(end, id=None)])
     )
     SavedSession("scan.npz", None, 3, document).save(folder / "session.json")
     keys.write_template(folder / "keys.toml", Commands())
@@ -176,7 +175,7 @@ def _recorded(path: Path) -> None:
 
 def _kept(path: Path) -> None:
     session = SavedSession.load(path)
-    session.document.part(Measurements)
+    session.document.part(Landmarks)
     session.save(path)
 
 

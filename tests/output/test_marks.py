@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from viewer.camera import Camera
+from viewer.geometry import Vector
 from viewer.look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from viewer.output.image_painter import ImagePainter
 from viewer.output.legend import (
     Legend,
     Marks,
-    MeasuredLine,
     number,
     quantity,
     range_note,
@@ -30,7 +30,7 @@ from viewer.output.legend import (
 )
 from viewer.output.marked import marked
 from viewer.output.marks import INK, PLATE, text_height
-from viewer.output.overlays import LABEL_EDGE, LINE_COLOR, DrawnCurve, DrawnPlot
+from viewer.output.overlays import LABEL_EDGE, LINE_COLOR, DrawnCurve, DrawnPath, DrawnPlot, Overlay
 from viewer.output.plot_below import PLOT_HEIGHT, draw_plot, round_values
 from viewer.scan.points import PointCloud
 
@@ -215,14 +215,22 @@ def test_the_colours_of_the_bar_are_those_of_the_surface(draw: Callable[..., Sur
     assert abs(nearest - len(rows) / 2) <= 1
 
 
+def distance(one: Vector, other: Vector, text: str) -> DrawnPath:
+    return DrawnPath((one, other), (LINE_COLOR,), name=text, has_ends=True)
+
+
+def overlay_of(lines: Sequence[DrawnPath]) -> Overlay:
+    return Overlay.of((), [(line, np.array(line.places, float)) for line in lines], 0.0)
+
+
 def test_measured_lines_go_from_end_to_end_and_their_texts_keep_off_each_other() -> None:
     """One near the upper edge, and four at one place, whose texts would hide each other."""
-    ends = (-3.0, -4.9, 0.0), (3.0, -4.9, 0.0)
     lines = [
-        MeasuredLine(ends, (0, 0), "1:  6 mm"),
-        *(MeasuredLine(((-2, 0, 0), (2, 1, 0)), (0, 0), "4.1 mm"),) * 4,
+        distance((-3.0, -4.9, 0.0), (3.0, -4.9, 0.0), "1: 6 mm"),
+        *(distance((-2, 0, 0), (2, 1, 0), "4.1 mm"),) * 4,
     ]
-    told = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=tuple(lines)), None)
+    shown = replace(LEGEND, marks=Marks(measure_lines=True), overlay=overlay_of(lines))
+    told = marked(gray(), shown, None)
     color = np.array(rgba(f"#{LINE_COLOR:06x}"), int)
     there = np.abs(told.astype(int) - color).max(axis=2) <= 2
     for x, y in ((-3, -4.9), (3, -4.9), (-2, 0), (2, 1)):
@@ -233,11 +241,9 @@ def test_measured_lines_go_from_end_to_end_and_their_texts_keep_off_each_other()
     whole = np.logical_and.reduce([there[row : len(there) - high + row + 1] for row in range(high)])
     begins = whole & ~np.roll(whole, 1, axis=0)
     assert begins.sum() == len(lines) * wide, "no label covers a part of another one's edge"
-    faint = [replace(line, hidden=True) for line in lines]
-    hidden = marked(gray(), replace(LEGEND, marks=Marks(measurements=True), lines=tuple(faint)), None)
-    assert not (np.abs(hidden.astype(int) - color).max(axis=2) <= 2).any()
-    bare = marked(gray(), replace(LEGEND, marks=Marks(scale_bar=True), lines=tuple(lines)), None)
-    assert (bare == with_marks(scale_bar=True)).all(), "lines are a mark of their own"
+    one_end = overlay_of(lines).with_seen(lambda places, _: np.arange(len(places)) % 2 == 0)
+    hidden = marked(gray(), replace(shown, overlay=one_end), None)
+    assert not (np.abs(hidden.astype(int) - color).max(axis=2) <= 2).any(), "faint where an end is hidden"
 
 
 VALUES_OF_RISE = (0.0, 1.0, 2.0, None, None, 5.0, 6.0, 7.0, 8.0, 9.0)
@@ -339,8 +345,8 @@ def test_values_at_axes_are_round_and_as_many_as_fit(seed: int) -> None:
 
 def test_what_is_behind_the_eye_is_no_line() -> None:
     camera = Camera(eye=(0, 0, 5), target=(0, 0, 0), up=(0, 1, 0))
-    line = MeasuredLine(((0, 0, 0), (1, 0, 6)), (0, 0), "behind")
-    legend = replace(LEGEND, marks=Marks(measurements=True), camera=camera, lines=(line,))
+    line = distance((0, 0, 6), (1, 0, 6), "behind")
+    legend = replace(LEGEND, marks=Marks(measure_lines=True), camera=camera, overlay=overlay_of([line]))
     assert (marked(gray(), legend, None) == gray()).all()
 
 

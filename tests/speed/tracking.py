@@ -53,9 +53,7 @@ def landmarks_in(source: ResampledDemo, folder: Path) -> list[Landmark]:
     spacing, placed = typical_spacing(cloud), []
     for name, place in zip(PLACES, path_of(truth_places(), [0.0], source.demo.motion)[0], strict=True):
         row, _ = nearest_row(cloud, place)
-        placed.append(
-            Landmark(name).with_key(Spot(0, 0.0, vector(place), "surface", row, spacing, 0, _EXACT))
-        )
+        placed.append(Landmark(name).with_key(Spot(0, 0.0, vector(place), row, spacing, 0, _EXACT)))
     return placed
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,20 +29,18 @@ _TURNING = 4  # points that tell how a place turns and how well they do
 
 @dataclass(frozen=True)
 class Spot:
-    """A place of the surface that was picked in a frame, such as an end of a measurement.
+    """A place of the surface that was picked in a frame, such as an end of a distance.
 
-    frame: the pose's index. time: the pose's, seconds. position: float64, scan units. snapped: "point" where
-    it is the very place of the point, as ends were once; else on the surface. id: of the point that is seen
-    there, or of the nearest one, None where none is. spacing: distance between the points around it, scan
-    units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how the
-    place that was meant may lie off the position, squared scan units; None: unknown. neighbors: points around
-    it that it follows, and where they were when it was set. at_outline: as of a `Picked`.
+    frame: the pose's index. time: the pose's, seconds. position: float64, scan units. id: of the point that
+    is seen there, or of the nearest one, None where none is. spacing: distance between the points around it,
+    scan units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how
+    the place that was meant may lie off the position, squared scan units; None: unknown. neighbors: points
+    around it that it follows, and where they were when it was set. at_outline: as of a `Picked`.
     """
 
     frame: int
     time: float
     position: Vector
-    snapped: Literal["point", "surface"]
     id: int | None
     spacing: float | None
     level: int
@@ -53,8 +50,8 @@ class Spot:
 
     @classmethod
     def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> Spot:
-        """The spot at a place that was picked, with its spacing, in the picture of a pose that is moved to a
-        place.
+        """The spot at a place that was picked, with its spacing, in scan coordinates. place: the motion by
+        which the picture shows the pose.
 
         filled: whether a place may be taken that no point shows, also where it is not between points of one
         surface that lie a few spacings away. Where the points around do not tell of a
@@ -78,11 +75,10 @@ class Spot:
         if covariance is None and spacing is not None:
             beside = 0.0 if picked.point is None else float(np.linalg.norm(picked.point - picked.position))
             covariance = max(spacing, beside) ** 2 * np.eye(3)
-        return cls(
+        spot = cls(
             frame=pose.index,
             time=float(pose.time),
             position=picked.place,
-            snapped="surface",
             id=point,
             spacing=spacing,
             level=picked.level,
@@ -90,6 +86,7 @@ class Spot:
             neighbors=neighbors,
             at_outline=picked.at_outline,
         )
+        return _moved(spot, place.inverse)
 
     @property
     def spread(self) -> NDArray[np.float64] | None:
@@ -106,9 +103,9 @@ class Spot:
         return None if (spread := self.spread) is None else largest_deviation(spread)
 
 
-def followed(spot: Spot, pose: Pose, motion: Rigid = STILL) -> Spot | None:
-    """A spot where its points are in a pose of the same topology, which is moved by a motion; None where the
-    point that it was set at is missing.
+def followed(spot: Spot, pose: Pose) -> Spot | None:
+    """A spot where its points are in a pose of the same topology; None where the point that it was set at is
+    missing.
 
     To the covariance comes what following leaves open."""
     if spot.id is None:
@@ -118,7 +115,7 @@ def followed(spot: Spot, pose: Pose, motion: Rigid = STILL) -> Spot | None:
     if pose.cloud.row_of(spot.id) is None or all(row is None for row in rows):
         return None
     there = [(row, neighbor) for row, neighbor in zip(rows, neighbors, strict=True) if row is not None]
-    now = motion.points(pose.cloud.world(np.array([row for row, _ in there])))
+    now = pose.cloud.world(np.array([row for row, _ in there]))
     was = np.array(spot.position) + np.array([neighbor.offset for _, neighbor in there])
     if np.abs(now - was).max() <= _SAME * np.abs(now).max():
         return replace(spot, frame=pose.index, time=float(pose.time))
@@ -178,8 +175,7 @@ def _shares(position: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     return shares if shares @ shares <= 1 else usual  # else errors of points would grow
 
 
-def moved_spot(spot: Spot, motion: Rigid) -> Spot:
-    """A spot of a pose that is moved by a motion."""
+def _moved(spot: Spot, motion: Rigid) -> Spot:
     if motion.is_identity:
         return spot
     spread = spot.spread
@@ -191,14 +187,6 @@ def moved_spot(spot: Spot, motion: Rigid) -> Spot:
             Neighbor(one.id, vector(motion.rotation @ np.array(one.offset))) for one in spot.neighbors
         ),
     )
-
-
-def spot_slack(spot: Spot, radius: float) -> float:
-    """How far before a spot the surface may be that is its own, scan units, for `is_seen`.
-
-    radius: of the scan, scan units.
-    """
-    return float(slack_before(spot.spacing or 0.0, spot.uncertainty or 0.0, radius))
 
 
 def slack_before(

@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from .spot import Spot
 
 
 class Known(IntEnum):
@@ -21,6 +25,10 @@ class Known(IntEnum):
     GAP = 1
     TRACKED = 2
     PLACED = 3
+
+
+STATES = {Known.PENDING: "", Known.GAP: "gap", Known.TRACKED: "tracked", Known.PLACED: "placed"}  # in tables
+KNOWN_WORDS = STATES | {Known.PENDING: "not tracked yet", Known.GAP: "no data"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +56,13 @@ class Track:
             np.full((count, 3, 3), np.nan),
             np.full(count, Known.PENDING, np.uint8),
         )
+
+    @classmethod
+    def of(cls, spot: Spot) -> Track:
+        """One of a single frame, in which the landmark was placed at a spot."""
+        spread = np.full((3, 3), np.nan) if spot.spread is None else spot.spread
+        known = np.array([Known.PLACED], np.uint8)
+        return cls(np.array([spot.time]), np.array([spot.position]), spread[None], known)
 
     @property
     def is_whole(self) -> bool:

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.measure import Measurement
-from ..analysis.pick import before_gap, pick
+from ..analysis.measures.distances import distance_of
+from ..analysis.pick import SURE, before_gap, pick
 from ..analysis.spot import Spot
 from ..backends import backend
 from ..camera import Camera
@@ -161,9 +161,9 @@ def measured_in(
         ends = [_end(surface, pose, x, y) for x, y in pixels.tolist()]
         for place in range(0, len(ends), 2):
             if np.isfinite(meant[place : place + 2]).all():
-                made = Measurement(*ends[place : place + 2])
-                off.append(made.distance - float(np.linalg.norm(meant[place] - meant[place + 1])))
-                uncertainty.append(np.nan if made.uncertainty is None else made.uncertainty)
+                distance, sigma = distance_of(*ends[place : place + 2])
+                off.append(distance - float(np.linalg.norm(meant[place] - meant[place + 1])))
+                uncertainty.append(SURE * sigma)
     surface.release()
     return Distances(np.array(off), np.array(uncertainty), float(np.median(pitches)))
 

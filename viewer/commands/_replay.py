@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ..document.anonymous import anonymous_measurements, anonymous_pose, anonymous_request, middle_of
+from ..document.anonymous import anonymous_pose, anonymous_request, middle_of
 from ..document.recording import (
     Entry,
     Recording,
@@ -114,9 +114,6 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
                     failed = error
                 else:
                     shown = _completed(entry, request, args, found, hash, timeline)
-                    if shown.measurements and timeline.one_topology is None and len(timeline) > 1:
-                        with suppress(InputError):  # two frames tell whether these follow their points
-                            timeline.pose((entry.pose + 1) % len(timeline))
             if failed is None:
                 drawn = True
                 yield number, request, shown, shown.legend(timeline, request.pose)
@@ -153,14 +150,9 @@ def _completed(
         return shown
     time = float(request.pose.time)
     place = matrix_of(request.layers.place)
-    measurements = entry.measurements
     if not entry.anonymous:
-        pose = timeline.pose(entry.pose)
-        measurements = anonymous_measurements(measurements, pose, timeline.times[0])
-        shown = shown.drawn_from(middle_of(pose))
-    return replace(
-        shown, time=time, camera=request.camera, look=request.look, measurements=measurements, place=place
-    ).without_names()
+        shown = shown.drawn_from(middle_of(timeline.pose(entry.pose)))
+    return replace(shown, time=time, camera=request.camera, look=request.look, place=place).without_names()
 
 
 def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:

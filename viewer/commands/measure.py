@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from ..analysis.curves import ORDERS, Smoothing
 from ..analysis.landmarks.files import AXES, landmark_suffixes, read_landmarks
-from ..analysis.landmarks.files.long_table import LONG_COLUMNS, STATES, cell, landmark_rows
+from ..analysis.landmarks.files.long_table import LONG_COLUMNS, cell, landmark_rows
 from ..analysis.landmarks.landmark_set import LandmarkSet
 from ..analysis.measures import Measure, Quantity, Series
 from ..analysis.measures.curves import (
@@ -39,7 +39,7 @@ from ..analysis.measures.curves import (
 )
 from ..analysis.measures.definitions import read_measures
 from ..analysis.measures.series import all_series
-from ..analysis.track import Known, Track
+from ..analysis.track import STATES, Known, Track
 from ..analysis.trajectories import Trajectory, held_still, stabilising, trajectory_of
 from ..csv_text import save_rows
 from ..errors import InputError, unknown_name

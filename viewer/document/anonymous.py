@@ -6,18 +6,15 @@ The scan itself is changed before it is drawn, not what comes of it: whatever is
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.measure import Measurement
-from ..analysis.spot import Spot
 from ..camera import Camera
 from ..drawing.request import Request
-from ..geometry import up_vector, vector
+from ..geometry import up_vector
 from ..look import Look, drawable, unnamed, value_source
 from ..scan.points import UNKNOWN_UNIT, PointCloud
 from ..scan.pose import Pose
@@ -55,19 +52,6 @@ def anonymous_pose(pose: Pose, start: float) -> Pose:
         points = pose.points.moved(views, -middle)
     time = round(pose.time - start, _DECIMALS)  # no rest of a large number tells that it was one
     return Pose(pose.index, time, frame_in_words(pose.index), points)
-
-
-def anonymous_measurements(
-    measurements: Iterable[Measurement], pose: Pose, start: float
-) -> tuple[Measurement, ...]:
-    """Measurements over an anonymous picture of a pose, which is as the scan has it. start: as for
-    `anonymous_request`."""
-
-    def moved(end: Spot) -> Spot:
-        place, time = np.subtract(end.position, middle_of(pose)), round(end.time - start, _DECIMALS)
-        return replace(end, position=vector(place), time=time)
-
-    return tuple(Measurement(moved(each.first), moved(each.second)) for each in measurements)
 
 
 def middle_of(pose: Pose) -> NDArray[np.float64]:

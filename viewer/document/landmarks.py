@@ -1,4 +1,8 @@
-"""The landmarks of a document, the measures of them, and notes."""
+"""The landmarks of a document, the measures of them, and notes.
+
+A distance that is measured by two clicks is a measure that owns its two landmarks, "Distance 1 A" and
+"Distance 1 B". They are tracked like others, but lists of landmarks do not show them.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,11 @@ from dataclasses import dataclass, replace
 
 from ..analysis.landmarks import Landmark, Template
 from ..analysis.measures import Measure
+from ..analysis.spot import Spot
 from ..geometry import Vector
 from .part import Part
+
+_DISTANCE = re.compile("Distance ([0-9]{1,6})")
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,39 @@ class Landmarks(Part, name="landmarks"):
     template: str = ""
     measures: tuple[Measure, ...] = ()
     notes: tuple[Note, ...] = ()
+
+    @property
+    def distances(self) -> tuple[Measure, ...]:
+        """The measures that own their landmarks, in the order they were made."""
+        return tuple(measure for measure in self.measures if measure.owns_landmarks)
+
+    @property
+    def listed(self) -> tuple[Landmark, ...]:
+        """The landmarks that no measure owns."""
+        owned = {name for measure in self.distances for name in measure.landmarks}
+        return tuple(one for one in self.all if one.name not in owned) if owned else self.all
+
+    def with_distance(self, first: Iterable[Spot], second: Iterable[Spot], name: str = "") -> Landmarks:
+        """Add a distance between two landmarks of its own, where these are placed. name: that it has unless
+        it is taken; "" for the next number."""
+        taken = {*(one.name for one in self.all), *(one.name for one in self.measures)}
+        numbers = (_DISTANCE.fullmatch(measure.name) for measure in self.measures)
+        count = max((int(number[1]) for number in numbers if number), default=0)
+        names = (name, *(f"Distance {number}" for number in range(count + 1, count + len(taken) + 2)))
+        name = next(one for one in names if one and not {one, *_ends_of(one)} & taken)
+        ends = [Landmark(end, tuple(keys)) for end, keys in zip(_ends_of(name), (first, second), strict=True)]
+        measure = Measure(name, "distance", _ends_of(name), owns_landmarks=True)
+        return replace(self, all=(*self.all, *ends), measures=(*self.measures, measure))
+
+    def without_measures(self, names: Iterable[str]) -> Landmarks:
+        """The landmarks without the measures of these names, and without the landmarks that they own."""
+        gone = [measure for measure in self.measures if measure.name in set(names)]
+        owned = {name for measure in gone if measure.owns_landmarks for name in measure.landmarks}
+        return replace(
+            self,
+            all=tuple(one for one in self.all if one.name not in owned),
+            measures=tuple(measure for measure in self.measures if measure not in gone),
+        )
 
     def named(self, name: str) -> Landmark | None:
         """The landmark of a name; None where there is none."""
@@ -120,3 +160,8 @@ class Landmarks(Part, name="landmarks"):
         """A name for one more: "Landmark 4", a number above those that are there."""
         numbers = (re.fullmatch("Landmark ([0-9]{1,6})", landmark.name) for landmark in self.all)
         return f"Landmark {max((int(number[1]) for number in numbers if number), default=0) + 1}"
+
+
+def _ends_of(name: str) -> tuple[str, str]:
+    """The names of the two landmarks of a distance."""
+    return f"{name} A", f"{name} B"

@@ -32,8 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..analysis.measure import Measurement, distance_in_words, reading_of
-from ..analysis.spot import slack_before, spot_slack
+from ..analysis.spot import slack_before
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..choice.choose import Automatic, Choice
@@ -44,8 +43,9 @@ from ..geometry import vector
 from ..look import Look, drawable, value_source
 from ..output.export import read_description
 from ..output.labels import LabelSpot
-from ..output.legend import Legend, Marks, MeasuredLine
+from ..output.legend import Legend, Marks
 from ..output.overlays import (
+    LINE_COLOR,
     LINE_SLACK,
     NOTHING_DRAWN,
     DrawnLandmark,
@@ -104,9 +104,9 @@ class Entry:
     scan: as the user named it, None where it is anonymous. hash: of its files (see `fingerprint`), None
     where there is none. pose: its index. time: the pose's, seconds. size: (width, height) in pixels.
     params: the backend's own `Params`. marks: what is drawn over it. unit: of length, None for the scan's
-    own. measurements: to draw over it, as they were made. shown_unit: that marks tell lengths in, None for
-    `unit`. place: the matrix that the scan is moved by, None where it is not. anonymous: whether camera,
-    time, look, measurements and place are those of the scan as `anonymous_request` has it. notes: of the
+    own. shown_unit: that marks tell lengths in, None for `unit`. place: the matrix that the scan is moved by,
+    None where it is not. anonymous: whether camera, time, look and place are those of the scan as
+    `anonymous_request` has it. notes: of the
     scan, where the marks show them. labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
     the scan says which it is. at: seconds since the recording began; entries that differ in it alone
@@ -124,7 +124,6 @@ class Entry:
     look: Look
     marks: Marks = field(default_factory=Marks)
     unit: Unit | None = None
-    measurements: tuple[Measurement, ...] = ()
     shown_unit: Unit | None = None
     place: Matrix | None = None
     anonymous: bool = False
@@ -148,7 +147,6 @@ class Entry:
         size: tuple[int, int],
         unit: str,
         marks: Marks | None = None,
-        measurements: tuple[Measurement, ...] = (),
         shown_unit: str | None = None,
         notes: tuple[Note, ...] = (),
         drawn: DrawnMarks = NOTHING_DRAWN,
@@ -156,7 +154,7 @@ class Entry:
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
-        measurements, notes, drawn: kept where the marks show them. choice: that backend and parameters come
+        notes, drawn: kept where the marks show them. choice: that backend and parameters come
         from.
 
         Raises InputError where its colours come from a layer: these numbers are in no file.
@@ -170,7 +168,7 @@ class Entry:
         entry = cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
-            measurements if marks.measurements else (), shown_unit, matrix_of(layers.place),
+            shown_unit, matrix_of(layers.place),
             notes=notes if marks.notes else (),
             scale=1.0 if choice is None else choice.way.scale,
             automatic=None if choice is None else choice.told,
@@ -200,25 +198,20 @@ class Entry:
         return STILL if self.place is None else Rigid(np.array(self.place))
 
     def legend(self, timeline: Timeline, pose: Pose) -> Legend:
-        """Texts and lines of the marks. timeline: the scan's. pose: that is drawn.
-
-        Measurements follow their points as far as the frames read so far tell that they can.
-        """
+        """Texts and lines of the marks. timeline: the scan's. pose: that is drawn."""
         scale = Scale.of(timeline.unit if self.unit is None else self.unit, self.shown_unit)
-        lines: tuple[MeasuredLine, ...] = ()
-        if self.measurements and self.marks.measurements:
-            lines = measured_lines(self.measurements, pose, timeline.one_topology, self.motion, scale)
         notes = [one for one in self.notes if self.marks.notes and one.frame in (None, self.pose)]
-        pinned, on_frame = pinned_notes(notes, pose, self.motion)
         return Legend(
             self.marks, self.camera, self.look, scale.unit, self.pose, len(timeline), self.time,
-            lines=(*lines, *pinned), notes=on_frame, factor=scale.factor, overlay=self._overlay(pose),
-            plot=self.plot if self.marks.plot else None, labels=self.labels,
+            notes=tuple(one.text for one in notes if one.position is None), factor=scale.factor,
+            overlay=self._overlay(pose, notes), plot=self.plot if self.marks.plot else None,
+            labels=self.labels,
         )  # fmt: skip
 
-    def _overlay(self, pose: Pose) -> Overlay | None:
-        """Landmarks and lines where the scan is moved to; None where the marks show none."""
+    def _overlay(self, pose: Pose, notes: Iterable[Note]) -> Overlay | None:
+        """Landmarks, lines and pinned notes, where the scan is moved to; None where the marks show none."""
         marks, radius, motion = self.marks, pose.bounds.radius, self.motion
+        slack = float(slack_before(0.0, 0.0, radius))
         landmarks = [
             (
                 one,
@@ -229,7 +222,12 @@ class Entry:
         ]
         of_ways = motion if self.held is None else motion.after(Rigid(np.array(self.held)))
         ways = [(path, of_ways) for path in (self.trajectories if marks.trajectories else ())]
-        lines = [(path, motion) for path in (self.measure_lines if marks.measure_lines else ())]
+        pins = (
+            DrawnPath((one.position,), (LINE_COLOR,), name=one.text, has_ends=True, slack=slack)
+            for one in notes
+            if one.position is not None
+        )
+        lines = [(path, motion) for path in (*(self.measure_lines if marks.measure_lines else ()), *pins)]
         paths = [(path, moved.points(np.array(path.places))) for path, moved in (*ways, *lines)]
         return Overlay.of(landmarks, paths, LINE_SLACK * radius) if landmarks or paths else None
 
@@ -283,35 +281,6 @@ class Entry:
     def description(self) -> str:
         """The JSON text that a picture carries."""
         return json.dumps(_head() | self.to_json())
-
-
-def measured_lines(
-    measurements: Sequence[Measurement], pose: Pose, one_topology: bool | None, place: Rigid, scale: Scale
-) -> tuple[MeasuredLine, ...]:
-    """Lines of measurements as they stand in a pose. one_topology, place: as of `reading_of`."""
-    lines = []
-    for number, measurement in enumerate(measurements, 1):
-        there = reading_of(measurement, pose, one_topology, place).measurement
-        words = distance_in_words(there.distance, there.uncertainty, scale.unit, scale.factor)
-        first, second = there.ends
-        slack = spot_slack(first, pose.bounds.radius), spot_slack(second, pose.bounds.radius)
-        lines.append(MeasuredLine((first.position, second.position), slack, f"{number}:  {words}"))
-    return tuple(lines)
-
-
-def pinned_notes(
-    notes: Iterable[Note], pose: Pose, place: Rigid
-) -> tuple[tuple[MeasuredLine, ...], tuple[str, ...]]:
-    """Notes on a pose that is moved to a place: those at places as marks, and the texts of the others."""
-    lines, texts = [], []
-    for note in notes:
-        if note.position is None:
-            texts.append(note.text)
-        else:
-            at = vector(place.points(np.array(note.position)))
-            slack = float(slack_before(0.0, 0.0, pose.bounds.radius))
-            lines.append(MeasuredLine((at, at), (slack, slack), note.text))
-    return tuple(lines), tuple(texts)
 
 
 def matrix_of(place: Rigid) -> Matrix | None:

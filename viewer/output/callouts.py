@@ -7,47 +7,25 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..camera import Camera
 from ..look import rgba
 from .image_painter import ImagePainter
 from .labels import Box, Callout, LabelGround, LabelPlaces, forms_of, said_once
-from .legend import Legend, MeasuredLine
+from .legend import Legend
 from .marks import MARGIN, PAD, PLATE, MarkPainter, fitted_text
-from .overlays import (
-    DIM_LINE,
-    LABEL_EDGE,
-    LEADER_OPACITY,
-    LEADER_THICK,
-    LINE_COLOR,
-    ToldLine,
-    draw_line,
-    draw_overlay,
-)
+from .overlays import LABEL_EDGE, LEADER_OPACITY, LEADER_THICK, ToldLine, draw_line, draw_overlay
 
 # In heights of the text:
 _LINE_STEP = 1.2  # from one line of a label to the next
-_END = 0.28  # radius of a measured line's ends
 
 
 def draw_lines(
     painter: ImagePainter, size: tuple[float, float], legend: Legend, taken: Sequence[Box]
 ) -> None:
-    """Draw landmarks and their lines, and the measured lines, and their labels; what has an end behind
-    the eye is left out. taken: where other marks are."""
-    told: list[ToldLine] = []
-    marks = np.empty((0, 2))
-    if legend.overlay is not None:
-        told, marks = draw_overlay(painter, size, legend.camera, legend.overlay)
-    lines = legend.lines if legend.marks.measurements or legend.marks.notes else ()
-    for line in lines:
-        places = _places(line, legend.camera, size)
-        if places is None:
-            continue
-        opacities = np.full(2, DIM_LINE if line.hidden else 1.0)
-        draw_line(painter, places, [LINE_COLOR] * 2, opacities, np.ones(2, bool), 2 * _END * painter.em)
-        told.append(ToldLine(line.text, places, LINE_COLOR, float(opacities[0])))
+    """Draw landmarks and lines and their labels. taken: where other marks are."""
+    if legend.overlay is None:
+        return
+    told, marks = draw_overlay(painter, size, legend.camera, legend.overlay)
     inside = [one for one in told if _is_inside(one.places, size)]
-    marks = np.concatenate([marks, *(one.places for one in inside)])
     ground = LabelGround(size, painter.em, legend.covered, marks, taken, legend.camera)
     legend.places.take_up(legend.labels)
     _draw_labels(painter, legend.places, said_once(inside, lambda one: one.text), ground)
@@ -92,10 +70,3 @@ def _plate_size(painter: MarkPainter, lines: Sequence[str]) -> tuple[float, floa
 def _is_inside(places: NDArray[np.float64], size: tuple[float, float]) -> bool:
     """Whether some of a line's places (N, 2) are in a picture."""
     return bool(((places >= 0) & (places <= size)).all(axis=1).any())
-
-
-def _places(line: MeasuredLine, camera: Camera, size: tuple[float, float]) -> NDArray[np.float64] | None:
-    """The ends in a picture of this size, (2, 2); None where one is behind the eye."""
-    width, height = size
-    places = camera.places_in_picture(np.array(line.ends)) * (height, -height) + (width / 2, height / 2)
-    return places if np.isfinite(places).all() else None

@@ -159,16 +159,12 @@ def with_hidden(legend: Legend, surface: Surface) -> Legend:
     """The legend that knows where the surface shows the subject, and what it hides of lines and landmarks."""
     from ..analysis.pick import (
         are_seen,
-        is_seen,
     )  # here, as commands that draw nothing know this module, and no OpenGL
 
-    lines = (
-        replace(line, hidden=not all(map(partial(is_seen, surface), line.ends, line.slack)))
-        for line in legend.lines
-    )
-    overlay = None if legend.overlay is None else legend.overlay.with_seen(partial(are_seen, surface))
-    covered = covered_cells(surface) if legend.lines or overlay else None
-    return replace(legend, lines=tuple(lines), overlay=overlay, covered=covered)
+    if legend.overlay is None:
+        return legend
+    overlay = legend.overlay.with_seen(partial(are_seen, surface))
+    return replace(legend, overlay=overlay, covered=covered_cells(surface))
 
 
 def read_description(path: Path) -> str:

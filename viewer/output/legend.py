@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
-from ..geometry import Vector
 from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from ..params import describe, param
 from ..scan.times import frame_in_words
@@ -36,11 +35,10 @@ class Marks:
         "Colour bar, if the look colours by a number or by level, or paints holes",
     )
     stamp: bool = param(False, "Number and time of the frame")
-    measurements: bool = param(False, "Measured distances of the frame")
     notes: bool = param(False, "Notes on positions and on the frame")
     landmarks: bool = param(False, "Landmarks of the frame")
     trajectories: bool = param(False, "Paths of landmarks through all frames, as shown in the view")
-    measure_lines: bool = param(False, "Lines of the measures in the frame, with their values")
+    measure_lines: bool = param(False, "Distances and other measures in the frame, with their values")
     plot: bool = param(False, "Plot of the measures, if the view shows it, with a line at the frame")
 
     def __bool__(self) -> bool:
@@ -56,26 +54,12 @@ def marks_of(names: Sequence[str] | None) -> Marks:
 
 
 @dataclass(frozen=True)
-class MeasuredLine:
-    """A measured distance in a picture, or a note at a place, which is both ends.
-
-    ends: two places, scan units. slack: of each, how far before it the surface may be that is its own, scan
-    units. text: that stands beside it. hidden: whether something is before one of its ends.
-    """
-
-    ends: tuple[Vector, Vector]
-    slack: tuple[float, float]
-    text: str
-    hidden: bool = False
-
-
-@dataclass(frozen=True)
 class Legend:
     """The words and numbers that the marks of a picture show.
 
     unit: of length. pose: its index, of `count`. time: the pose's, seconds. range_note: what the colour bar
-    says of its numbers. lines: that were measured, and notes at places. notes: on the frame. factor: how many
-    of `unit` one unit of the scan is. overlay: landmarks and lines of them, None where none are drawn.
+    says of its numbers. notes: on the frame. factor: how many of `unit` one unit of the scan is. overlay:
+    landmarks, lines and notes at places, None where none are drawn.
     covered: the cells of the picture that show the subject (see `labels.covered_cells`), None where not
     known. places: of labels in the pictures before, which change with
     this one. labels: where they stand in the view that this is a picture of. plot: None where none is drawn.
@@ -89,7 +73,6 @@ class Legend:
     count: int
     time: float
     range_note: str = ""
-    lines: tuple[MeasuredLine, ...] = ()
     notes: tuple[str, ...] = ()
     factor: float = 1.0
     overlay: Overlay | None = None

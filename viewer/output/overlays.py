@@ -16,7 +16,7 @@ from ..geometry import Vector
 from ..rigid import STILL, Rigid
 from .labels import free_names
 
-LINE_COLOR = 0x58D6F0  # of measurements, in the window as well
+LINE_COLOR = 0x58D6F0  # of distances that were clicked, in the window as well
 
 
 class StateMark(NamedTuple):
@@ -39,7 +39,7 @@ HALO_OPACITY, LEADER_OPACITY, BAND_OPACITY = 0.75, 0.8, 0.3
 _DIGITS = 6  # of places, in the radius of the scan
 
 # In heights of the text:
-LINE_THICK, DOT_RADIUS, MARK_RADIUS = 0.15, 0.18, 0.25
+LINE_THICK, DOT_RADIUS, MARK_RADIUS, END_RADIUS = 0.15, 0.18, 0.25, 0.28
 CORNER_SHARE = 0.55  # of a mark's radius, that of a region's corner has
 MOST_NAMED = 16  # landmarks in view whose names stand beside the subject; of more, beside their marks
 HALO, LEADER_THICK, LABEL_EDGE = 0.1, 0.08, 0.2  # dark beside lines; of a leader; of a label's coloured edge
@@ -69,13 +69,17 @@ class DrawnLandmark:
 class DrawnPath:
     """A line through places without a gap. places: scan units, at least one. colors: 0xRRGGBB, of the line
     from each place on, or one for all. has_dots: whether there is a dot at each place where there is room.
-    name, value: that stand beside it, "" for nothing."""
+    name, value: that stand beside it, "" for nothing. has_ends: whether each place has a larger dot, and all
+    of the line is faint while one of them is hidden. slack: how far before a place the surface may be that
+    is its own, scan units; 0: `LINE_SLACK` of the scan's radius."""
 
     places: tuple[Vector, ...]
     colors: tuple[int, ...]
     has_dots: bool = False
     name: str = ""
     value: str = ""
+    has_ends: bool = False
+    slack: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -170,11 +174,14 @@ class Overlay:
         paths: Sequence[tuple[DrawnPath, NDArray[np.float64]]],
         slack: float,
     ) -> Overlay:
-        """landmarks: each with its place and slack. paths: each with its places, which have this slack."""
+        """landmarks: each with its place and slack. paths: each with its places. slack: of paths that have
+        none of their own."""
         lines = [places for _, places in paths]
         places = np.concatenate([np.array([place for _, place, _ in landmarks]).reshape(-1, 3), *lines])
         of_landmarks = np.array([own for *_, own in landmarks], float)
-        slacks = np.concatenate([of_landmarks, np.full(len(places) - len(landmarks), slack)])
+        slacks = np.concatenate(
+            [of_landmarks, *(np.full(len(places), path.slack or slack) for path, places in paths)]
+        )
         named, drawn = tuple(one for one, *_ in landmarks), tuple(one for one, _ in paths)
         return cls(named, drawn, places, slacks, np.ones(len(places), bool))
 
@@ -260,10 +267,11 @@ def draw_overlay(
         part = slice(start, start + len(path.places))
         start = part.stop
         seen = overlay.seen[part]
-        _draw_path(painter, path, pixels[part], seen)
+        opacities = np.where(seen.all() if path.has_ends else seen, np.ones(len(seen)), DIM_LINE)
+        _draw_path(painter, path, pixels[part], opacities)
         words = ": ".join(text for text in (path.name, path.value) if text)
         if words and np.isfinite(pixels[part]).all():
-            told.append(ToldLine(words, pixels[part], path.colors[0], 1.0 if seen.any() else DIM_LINE))
+            told.append(ToldLine(words, pixels[part], path.colors[0], float(opacities.max())))
     count = len(overlay.landmarks)
     lengths = height / camera.heights_at(overlay.places[:count]) if count else np.empty(0)
     of_landmarks = overlay.landmarks, pixels[:count]
@@ -295,13 +303,14 @@ def draw_line(
 
 
 def _draw_path(
-    painter: OverlayPainter, path: DrawnPath, pixels: NDArray[np.float64], seen: NDArray[np.bool_]
+    painter: OverlayPainter, path: DrawnPath, pixels: NDArray[np.float64], opacities: NDArray[np.float64]
 ) -> None:
     em, count = painter.em, len(pixels)
-    opacities = np.where(seen, 1.0, DIM_LINE)
-    dots = dotted(pixels, DOT_ROOM * em) if path.has_dots else np.zeros(count, bool)
     colors = path.colors if len(path.colors) == count else path.colors[:1] * count
-    draw_line(painter, pixels, colors, opacities, dots, 2 * DOT_RADIUS * em if path.has_dots else 0.0)
+    dots, radius = np.full(count, path.has_ends), END_RADIUS if path.has_ends else 0.0
+    if path.has_dots:
+        dots, radius = dotted(pixels, DOT_ROOM * em), DOT_RADIUS
+    draw_line(painter, pixels, colors, opacities, dots, 2 * radius * em)
 
 
 def _draw_landmarks(

@@ -62,7 +62,7 @@ def own(**changes: Any) -> dict[str, Any]:
 
 
 def test_a_template_of_present_landmarks_is_read_again(tmp_path: Path) -> None:
-    spot = Spot(0, 0.0, (1.0, 2.0, 3.0), "surface", None, None, 0)
+    spot = Spot(0, 0.0, (1.0, 2.0, 3.0), None, None, 0)
     landmarks = (
         Landmark("left", (spot,), partner="right", about="the left one"), Landmark("right", partner="left"),
         Landmark("alone", partner="left", skipped=True), Landmark("lost", partner="nobody"),

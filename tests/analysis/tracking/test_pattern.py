@@ -121,9 +121,7 @@ def tracks_of_arms(noise: float, kept: float = 1.0, scale: float = 1.0) -> Mappi
         points = points[chance.permutation(len(points))[: int(kept * len(points))]]
         clouds.append(PointCloud.from_arrays(scale * (points + chance.normal(0, noise, points.shape))))
     landmarks = [
-        Landmark(f"{n}").with_key(
-            Spot(0, 0.0, vector(place), "surface", None, scale * SPACING, 0, (0.0,) * 6)
-        )
+        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), None, scale * SPACING, 0, (0.0,) * 6))
         for n, place in enumerate(scale * PATHS[0])
     ]
     source = KeptFrames("arms", clouds, np.arange(float(FRAMES)))

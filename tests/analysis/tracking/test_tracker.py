@@ -150,7 +150,6 @@ def test_one_topology_is_followed_exactly() -> None:
         0,
         0.0,
         vector(timeline.pose(0).cloud.world(row)),
-        "point",
         row,
         1.0,
         0,

@@ -27,7 +27,7 @@ MM = Scale.of("mm", None)
 
 def spot(frame: int) -> Spot:
     covariance = (0.01, 0.0, 0.0, 0.04, 0.0, 0.01)
-    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), "surface", None, 0.5, 0, covariance)
+    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), None, 0.5, 0, covariance)
 
 
 def track(*known: Known, reasons: dict[int, str] | None = None) -> Track:

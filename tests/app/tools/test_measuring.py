@@ -1,4 +1,4 @@
-"""What the window says of measurements, and where it draws them."""
+"""What the window says of distances, and where it draws them."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from imgui_bundle import ImVec2
 
-from viewer.analysis.measure import Measurement, Reading
 from viewer.analysis.spot import Spot
 from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
 from viewer.app.tool_context import ToolContext
 from viewer.app.tools.measuring import Tool
-from viewer.app.tools.measuring.words import snap_words
+from viewer.app.tools.measuring.distances import snap_words
 from viewer.camera import Camera
+from viewer.document.landmarks import Landmarks
 
 PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 
 
 def end(id: int | None) -> Spot:
-    return Spot(0, 0.0, (0, 0, 0), "surface" if id is None else "point", id, None, 0)
+    return Spot(0, 0.0, (0, 0, 0), id, None, 0)
 
 
 @pytest.mark.parametrize(
@@ -35,10 +35,10 @@ def end(id: int | None) -> Spot:
     ],
 )
 def test_it_says_where_the_ends_are(ids: tuple[int | None, int | None], words: str) -> None:
-    assert snap_words(Reading(Measurement(end(ids[0]), end(ids[1])), None)) == words
+    assert snap_words((end(ids[0]), end(ids[1]))) == words
 
 
-def test_two_ends_make_a_measurement_of_the_document() -> None:
+def test_two_ends_make_a_distance_of_the_document() -> None:
     session = Session("scan")
     measuring = Tool(ToolContext(SimpleNamespace(session=session), "measuring"))  # type: ignore[arg-type]
     first, second = end(3), replace(end(4), position=(1, 0, 0))
@@ -47,13 +47,13 @@ def test_two_ends_make_a_measurement_of_the_document() -> None:
     measuring.set_end(first)
     assert (measuring.begun, measuring.made.all) == (first, ()), "the same place twice is no distance"
     measuring.set_end(second)
-    assert (measuring.begun, measuring.made.all) == (None, (Measurement(first, second),))
+    assert (measuring.begun, measuring.made) == (None, Landmarks().with_distance([first], [second]))
     measuring.clear()
-    assert measuring.made.all == ()
+    assert measuring.made == Landmarks()
     for name, count in (("Clear distances", 1), ("Measure", 0)):
         assert session.history.undoes == name
         session.history.undo()
-        assert len(measuring.made.all) == count
+        assert len(measuring.made.distances) == count
     measuring.clear()
     assert session.history.redoes is not None, "clearing nothing is no change"
 

@@ -99,7 +99,6 @@ def spot_at(position: NDArray[np.float64], pose: Pose, sigma: float = math.nan) 
         frame=pose.index,
         time=float(pose.time),
         position=vector(position),
-        snapped="surface",
         id=id,
         spacing=spacing,
         level=0,

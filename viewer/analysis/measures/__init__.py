@@ -19,13 +19,15 @@ Quantity = Literal["length", "angle", "area", "volume"]
 class Measure:
     """A measure of a kind, of these landmarks by name, in their order.
 
-    options: choices of the kind, by name, as words.
+    options: choices of the kind, by name, as words. owns_landmarks: whether its landmarks are its own, as the
+    ends of a distance that was clicked: no list of landmarks shows them, and they go with it.
     """
 
     name: str
     kind: str
     landmarks: tuple[str, ...] = ()
     options: Mapping[str, str] = field(default_factory=dict)
+    owns_landmarks: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ...choice.choose import Choice
 from ...document.journal import Journal, journal_folder, journals, saved, written
 from ...document.landmarks import Landmarks
-from ...document.measurements import Measurements
 from ...document.recording import Entry, Recorder, Recording
 from ...drawing.request import Request
 from ...errors import InputError, explained
@@ -83,8 +82,8 @@ class Capture:
             return None
         entry = Entry.of(
             request, session.scan, session.hash, viewport.size, self._playback.unit,
-            self._marks() if marks is None else marks, session.document.part(Measurements).all,
-            session.document.shown_unit, session.document.part(Landmarks).notes,
+            self._marks() if marks is None else marks, session.document.shown_unit,
+            session.document.part(Landmarks).notes,
             self._drawn(request.pose.index), self._choice(request),
         )  # fmt: skip
         return replace(entry, labels=self._places().spots if entry.marks else ())

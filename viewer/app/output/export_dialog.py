@@ -24,7 +24,6 @@ _MARKS = {
     "scale_bar": "Scale bar",
     "color_bar": "Colour bar",
     "stamp": "Frame and time",
-    "measurements": "Distances",
     "notes": "Notes",
     "landmarks": "Landmarks",
     "trajectories": "Landmark paths",

@@ -19,7 +19,6 @@ from .viewport import Viewport
 
 SHOWN_FIRST = Marks(scale_bar=True, color_bar=True)  # until the user chooses
 _OF_TOOLS = (
-    "measurements",
     "notes",
     "landmarks",
     "trajectories",

@@ -61,7 +61,7 @@ def keyed_landmarks(known: KnownScan, keys: int = 1) -> list[Landmark]:
             place = known.paths[frame, number]
             row, _ = nearest_row(known.source.load(frame), place)
             time = float(known.source.times()[frame])
-            spot = Spot(frame, time, vector(place), "surface", row, known.spacing, 0, _EXACT)
+            spot = Spot(frame, time, vector(place), row, known.spacing, 0, _EXACT)
             landmark = landmark.with_key(spot)
         landmarks.append(landmark)
     return landmarks

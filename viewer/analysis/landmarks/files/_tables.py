@@ -15,12 +15,11 @@ import numpy as np
 from ....csv_text import text_of_cell
 from ....errors import InputError, shortened
 from ....scan.units import conversion, usable_unit
-from ...track import Known
+from ...track import STATES, Known
 from ..landmark_set import LandmarkSet, check_cells
 from ._text import at_line, count_of, number_of, read_all
 
 LONG_COLUMNS = ("kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit")
-STATES = {Known.PENDING: "", Known.GAP: "gap", Known.TRACKED: "tracked", Known.PLACED: "placed"}
 _KNOWN = {word: known for known, word in STATES.items()}
 _NAMES = ("name", "label", "landmark", "id")
 _AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE | re.DOTALL)

@@ -18,9 +18,8 @@ import numpy as np
 from ....errors import InputError, shortened
 from ....files import parsed_json
 from ....scan.units import conversion
-from ...track import Known
+from ...track import STATES, Known
 from ..landmark_set import LandmarkSet
-from ._tables import STATES
 from ._text import own_frames, own_number, read_all
 
 TITLE = "3D Slicer markups"

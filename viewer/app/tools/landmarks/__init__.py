@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ....analysis.landmarks import Landmark, Template
 from ....analysis.landmarks.mirroring import Proposal, proposal_for
 from ....analysis.pick import are_seen
-from ....analysis.spot import Spot, moved_spot, slack_before
+from ....analysis.spot import Spot, slack_before
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
@@ -89,7 +89,7 @@ class Tool:
         """The landmarks in the frame that is shown."""
         of = self.made.all, self.context.followed.tracks, self.frame
         if self._shown is None or not _same(self._shown[0], of):
-            self._shown = of, ShownLandmarks.of(*of)
+            self._shown = of, ShownLandmarks.of(self.made.listed, *of[1:])
         return self._shown[1]
 
     @property
@@ -187,7 +187,7 @@ class Tool:
         """The words that say what a click does."""
         if self.notebook.is_pinning:
             return "Note: click where it belongs. Esc to stop."
-        target, names = self.target, [one.name for one in self.made.all]
+        target, names = self.target, [one.name for one in self.made.listed]
         if target is not None and target.state == "not placed":
             number = names.index(target.name) + 1
             return f"{target.title}, {number} of {len(names)}: click it. Esc to stop."
@@ -216,7 +216,7 @@ class Tool:
         """Set one at what is seen, and go on to the next. name, merge: of the step of the history."""
         if click.picked is None:
             raise InputError("No surface here: click on the scan.")
-        spot = moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
+        spot = Spot.of(click.picked, click.pose, place=click.motion)
         if click.through_gap:
             self.context.note("No data there: placed on the nearest surface in front.")
         self.corrects = self.corrects and bool(landmark.keys)
@@ -287,12 +287,13 @@ class Tool:
         """The rows of the list: landmarks by number, and regions by name, before their corners where these
         are shown."""
         rows: dict[int | str, None] = {}
-        for number, landmark in enumerate(self.made.all):
+        listed = self.made.listed
+        for number, landmark in enumerate(listed):
             region = self.regions.get(landmark.name)
             if region is None:
                 rows[number] = None
             elif region not in rows:
-                corners = [n for n, one in enumerate(self.made.all) if self.regions.get(one.name) == region]
+                corners = [n for n, one in enumerate(listed) if self.regions.get(one.name) == region]
                 rows |= dict.fromkeys([region, *(corners if region in self.open_regions else ())])
         return list(rows)
 
@@ -399,7 +400,7 @@ class Tool:
         """The landmarks over a frame of pictures that are saved."""
         is_now = frame == self.frame
         shown = (
-            self.shown if is_now else ShownLandmarks.of(self.made.all, self.context.followed.tracks, frame)
+            self.shown if is_now else ShownLandmarks.of(self.made.listed, self.context.followed.tracks, frame)
         )
         has_names: bool = self.context.settings.names
         return DrawnMarks(drawn_landmarks(shown, has_names, self.regions))
@@ -408,7 +409,7 @@ class Tool:
         """The gaps, for the timeline."""
         of = self.made.all, self.context.followed.tracks
         if not _same(self._spans[0], of):
-            self._spans = of, gap_spans(*of, self.regions)
+            self._spans = of, gap_spans(self.made.listed, self.context.followed.tracks, self.regions)
         return self._spans[1]
 
     def on_file(self, path: Path) -> bool:
@@ -481,11 +482,12 @@ COMMANDS = {
                 ),
                 Command(
                     "save_template", "Save as template...",
-                    lambda tool: tool.exchange.ask_to_save_template(), can=lambda tool: bool(tool.made.all),
+                    lambda tool: tool.exchange.ask_to_save_template(),
+                    can=lambda tool: bool(tool.made.listed),
                 ),
                 Command(
                     "save_landmarks", "Export landmarks...", lambda tool: tool.exchange.ask_to_save(),
-                    can=lambda tool: any(one.keys for one in tool.made.all),
+                    can=lambda tool: any(one.keys for one in tool.made.listed),
                 ),
             ),
         )),

@@ -105,7 +105,7 @@ class Exchange:
     def _save_template(self, file: Path) -> None:
         refuse_input(file, self._context.timeline)
         made = self._context.document.part(Landmarks)
-        template = template_of(file.name.removesuffix(".json"), made.all, made.measures)
+        template = template_of(file.name.removesuffix(".json"), made.listed, made.measures)
         save_template(file, template)
         self.templates[template.name] = template
         told = f"{len(template.landmarks)} landmarks and {len(template.measures)} measures"
@@ -146,7 +146,7 @@ class Exchange:
     def _save(self, file: Path) -> None:
         timeline, context = self._context.timeline, self._context
         refuse_input(file, timeline)
-        landmarks, tracks = context.document.part(Landmarks).all, context.followed.tracks
+        landmarks, tracks = context.document.part(Landmarks).listed, context.followed.tracks
         frame, unit = context.index if context.pose is None else context.pose.index, context.unit
         is_one, is_whole = holds_one_moment(file), all(track.is_whole for track in tracks.values())
 

@@ -34,6 +34,7 @@ class Following:
         self._is_done = False
         self._begins_at = 0.0  # by the clock
         self._looked_at = -1
+        self._waiting: tuple[object, Mapping[str, Track]] = None, {}
 
     @property
     def is_running(self) -> bool:
@@ -62,12 +63,22 @@ class Following:
             self._go_on(self._tracker, is_wanted)
         is_same = timeline is self._timeline  # else what is there is of the scan before
         found: Mapping[str, Track] = self._tracker.tracks if self._tracker and is_same else {}
-        changed = self._context.followed.take_tracks(found)
+        changed = self._context.followed.take_tracks({**found, **self._placed(timeline, landmarks, found)})
         if changed:
             self.pending = sum(not track.is_whole for track in found.values())
         is_left = self.pending > 0 and not (self._is_done or self.is_stopped)
         self._context.followed.is_following = self.is_running or (is_wanted and is_left)
         return changed
+
+    def _placed(
+        self, timeline: Timeline, landmarks: Sequence[Landmark], found: Mapping[str, Track]
+    ) -> Mapping[str, Track]:
+        """The tracks of landmarks that wait for others to be let go of: what was placed of them."""
+        waiting = tuple(one for one in landmarks if one.keys and one.name not in found)
+        of = timeline, waiting
+        if of != self._waiting[0]:
+            self._waiting = of, Tracker(timeline, waiting).tracks if waiting else {}
+        return self._waiting[1]
 
     def _take_up(self, timeline: Timeline, landmarks: Sequence[Landmark]) -> None:
         """Begin with other landmarks, and keep what still holds of the same scan."""

@@ -47,7 +47,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         )
     if tool.is_active and tool.target is not None and tool.target.about:
         widgets.faint(tool.target.about)
-    if tool.made.all:
+    if tool.made.listed:
         _draw_list(tool)
     else:
         widgets.faint("No landmarks yet. Choose a template, or press Place and click on the surface.")
@@ -80,7 +80,7 @@ def _draw_template(tool: Tool) -> None:
         imgui.separator()
         if imgui.selectable("Load template...###template file", False)[0]:
             tool.exchange.ask_for_template()
-        if tool.made.all and imgui.selectable("Save as template...###save template", False)[0]:
+        if tool.made.listed and imgui.selectable("Save as template...###save template", False)[0]:
             tool.exchange.ask_to_save_template()
         imgui.end_combo()
 
@@ -179,7 +179,7 @@ def _draw_partner(tool: Tool, landmark: Landmark) -> None:
     """Declare the choice of the landmark that is another's mirror image."""
     widgets.label("Mirror partner", "The landmark on the other side, its mirror image")
     if imgui.begin_combo("##partner", widgets.unhidden(landmark.partner or _NONE)):
-        for name in ("", *(one.name for one in tool.made.all if one.name != landmark.name)):
+        for name in ("", *(one.name for one in tool.made.listed if one.name != landmark.name)):
             label = widgets.labelled(name or _NONE, f"partner {name}")
             if imgui.selectable(label, name == landmark.partner)[0] and name != landmark.partner:
                 tool.pair(name)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ....analysis.landmarks import Landmark
 from ....analysis.pick import SURE
 from ....analysis.spot import Spot
-from ....analysis.track import Known, Track
+from ....analysis.track import KNOWN_WORDS, Known, Track
 from ....geometry import vector
 from ....output.overlays import DrawnLandmark
 
@@ -89,7 +89,7 @@ class ShownLandmarks:
         if known is Known.GAP:
             reason = self.reasons.get(number, "")
             return f"no data: {reason}" if reason else "no data"
-        return {Known.PENDING: "not tracked yet", Known.TRACKED: "tracked", Known.PLACED: "placed"}[known]
+        return KNOWN_WORDS[known]
 
 
 def names_over(shown: ShownLandmarks, regions: Mapping[str, str]) -> dict[int, str]:

@@ -1,44 +1,46 @@
-"""Distances between places that are clicked; they follow their points, and are kept with the scan."""
+"""Distances between two clicked places: two landmarks each, which are tracked, and a measure of them."""
 
 from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
+from numpy.typing import NDArray
 
-from ....analysis.measure import Measurement, Reading, reading_of, readings_in_frames, table
-from ....analysis.measured_table import is_measurement_table, read_measurements
-from ....analysis.pick import is_seen
-from ....analysis.spot import Spot, spot_slack
+from ....analysis.measures.distances import Ends, distance_rows, is_distance_table, read_distances
+from ....analysis.spot import Spot
 from ....csv_text import save_rows, to_text
-from ....document.measurements import Measurements
+from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....files import working_folder
+from ....output.overlays import DrawnMarks
+from ....rigid import STILL, Rigid
 from ....scan.inputs import refuse_input
-from ....scan.timeline import Timeline
 from ...commands import Command, Menu
 from ...read_dialog import ReadDialog
 from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
+from .._seen import seen_in_view
 from . import overlay, panel
-from .words import distance_words
+from .distances import Distance, distances_in
 
 log = logging.getLogger(__name__)
-TITLE = "Distances (this frame)"
+TITLE = "Distances"
 
 
 class Tool:
-    """The tool that measures. What was measured is in the document.
+    """The tool that measures distances. These are in the document, as measures that own their landmarks.
 
-    begun: the first end of the one that is being made, None where none is. filled: whether ends may be set
-    where holes are filled. saving, reading: dialogs that name a file.
+    begun: the first end of the one that is being made, as the scan has it; None where none is. filled:
+    whether ends may be set where holes are filled. saving, reading: dialogs that name a file.
     """
 
     def __init__(self, context: ToolContext) -> None:
@@ -49,23 +51,23 @@ class Tool:
         about = "A table that 'Export distances...' has written of this scan"
         self.reading = ReadDialog("Import distances", about, ".csv", self._read, context.redraw)
         self.begun: Spot | None = None
-        self._seen: tuple[object, dict[Spot, bool]] = None, {}
-        self._told: list[str] = []
-        self._learned: Timeline | None = None  # the last that was asked whether points can be followed
-        self._followed = ""  # the scan that was found to have one topology, last
+        self._shown: tuple[tuple[object, ...], list[Distance]] = (), []
+        self._seen: tuple[tuple[object, ...], NDArray[np.bool_]] = (), np.empty(0, bool)
+        self._logged = ""
 
     @property
-    def made(self) -> Measurements:
-        """The measurements of the open scan."""
-        return self.context.document.part(Measurements)
+    def made(self) -> Landmarks:
+        """The landmarks of the open scan, and the measures of them."""
+        return self.context.document.part(Landmarks)
 
-    def delete(self, number: int) -> None:
-        """Take away the one at this place, counted from 0."""
-        self.context.change("Delete distance", self.made.without(number))
+    def delete(self, name: str) -> None:
+        """Delete a distance."""
+        self.context.change("Delete distance", self.made.without_measures([name]))
 
     def clear(self) -> None:
-        """Take away all."""
-        self.context.change("Clear distances", Measurements())
+        """Delete all distances."""
+        names = [measure.name for measure in self.made.distances]
+        self.context.change("Clear distances", self.made.without_measures(names))
 
     @property
     def is_active(self) -> bool:
@@ -73,7 +75,7 @@ class Tool:
         return self.context.has_clicks
 
     def toggle(self) -> None:
-        """Take up the tool or put it away; a measurement that was begun goes with it."""
+        """Take up the tool or put it away; a distance that was begun goes with it."""
         self.begun = None
         if self.is_active:
             self.context.leave_clicks()
@@ -90,11 +92,11 @@ class Tool:
         return was_active
 
     def is_under_way(self) -> bool:
-        """Whether a measurement was begun."""
+        """Whether a distance was begun."""
         return self.begun is not None
 
     def abandon(self) -> None:
-        """Let go of a measurement that was begun."""
+        """Let go of a distance that was begun."""
         self.begun = None
 
     def prompt(self) -> str:
@@ -108,10 +110,56 @@ class Tool:
         end = Spot.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
             self.context.note("No data there: placed on the nearest surface in front.")
-        log.debug("end at %s: %s, frame %d", *_place_words(end), end.frame)
+        log.debug("end at %r, point %s, frame %d", end.position, end.id, end.frame)
         self.set_end(end)
-        _learn_topology(self.context.timeline, click.pose.index)
         return True
+
+    def set_end(self, end: Spot) -> None:
+        """Begin a distance, or complete the one that was begun.
+
+        An end at the very place and frame of the first, as a second click of a double click sets it, changes
+        nothing.
+        """
+        first, self.begun = self.begun, None
+        if first is None or (first.frame, first.position) == (end.frame, end.position):
+            self.begun = first or end
+            return
+        self.context.change("Measure", self.made.with_distance([first], [end]))
+        self.context.reveal()
+
+    # --- in the window ----------------------------------------------------------------
+
+    @property
+    def motion(self) -> Rigid:
+        """The motion of the pose that is shown."""
+        return STILL if self.context.pose is None else self.context.motion(self.context.pose)
+
+    @property
+    def shown(self) -> list[Distance]:
+        """The distances in the frame that is shown; none before the first."""
+        pose, followed = self.context.pose, self.context.followed
+        if pose is None:
+            return []
+        of = self.made, followed.tracks, followed.series, pose.index
+        if not _same(of, self._shown[0]):
+            self._shown = of, list(distances_in(self.context, pose.index))
+        return self._shown[1]
+
+    def seen(self, distances: Sequence[Distance]) -> NDArray[np.bool_]:
+        """(N,): of which distances both ends are in the picture and not behind it; found once a picture."""
+        viewport, pose = self.context.viewport, self.context.pose
+        of = viewport.request, viewport.surface, distances
+        if not _same(of, self._seen[0]):
+            found = np.ones(len(distances), bool)
+            if distances and pose is not None:
+                radius = viewport.bounds(pose).radius
+                slacks = np.repeat([one.slack(radius) for one in distances], 2)
+                places = self.motion.points(np.concatenate([one.positions for one in distances]))
+                found = np.logical_and.reduce(
+                    seen_in_view(self.context, places, slacks).reshape(-1, 2), axis=1
+                )
+            self._seen = of, found
+        return self._seen[1]
 
     def panel(self, ui: Ui) -> None:
         """Declare the section of the panel."""
@@ -123,95 +171,59 @@ class Tool:
         self.reading.draw()
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
-        """Draw what was measured, and tell what changes by it."""
-        readings = self.readings()
-        self.watch(readings)
-        overlay.draw(self, readings, canvas, view)
+        """Draw the distances, and note in the log what they read."""
+        words = "; ".join(f"{one.label}: {one.words(self.context.scale)}, {one.state}" for one in self.shown)
+        if words != self._logged:
+            self._logged = words
+            log.debug("distances: %s", words or "none")
+        known = [one for one in self.shown if np.isfinite(one.value)]
+        overlay.draw(self, known if len(known) < len(self.shown) else self.shown, canvas, view)
 
-    def set_end(self, end: Spot) -> None:
-        """Begin a measurement, or complete the one that was begun.
-
-        An end at the very place and frame of the first, as a second click of a double click sets it, changes
-        nothing.
-        """
-        first, self.begun = self.begun, None
-        if first is None or (first.frame, first.position) == (end.frame, end.position):
-            self.begun = first or end
-            return
-        made = Measurement(first, end)
-        self.context.change("Measure", self.made.added(made))
-        self.context.reveal()
-        log.debug("measured %r, uncertainty %r", made.distance, made.uncertainty)
-
-    def readings(self) -> list[Reading]:
-        """The measurements as they stand in the frame that is shown; none before the first."""
-        pose, one_topology = self.context.pose, self.context.timeline.one_topology
-        if pose is None:
-            return []
-        motion = self.context.motion(pose)
-        return [reading_of(measurement, pose, one_topology, motion) for measurement in self.made.all]
-
-    def watch(self, readings: Sequence[Reading]) -> None:
-        """Tell when measurements that followed their points no longer can; note in the log what they read."""
-        scan, timeline = self.context.scan, self.context.timeline
-        one_topology = timeline.one_topology
-        if readings and self._learned is not timeline:  # opened again, with measurements of before
-            self._learned = timeline
-            _learn_topology(timeline, self.context.index)
-        if one_topology:
-            self._followed = scan
-        elif self._followed == scan and one_topology is False:
-            self._followed = ""
-            if readings:
-                self.context.note("Not all frames have the same points: distances stay fixed in space.")
-        told = [f"{distance_words(reading, self.context.scale)}, {reading.motion}" for reading in readings]
-        if told != self._told:
-            self._told = told
-            log.debug("measurements: %s", "; ".join(told) or "none")
-
-    def is_seen(self, end: Spot) -> bool:
-        """Whether an end is in the picture and not behind what that shows; found once a picture."""
-        surface, shown = self.context.viewport.surface, self.context.viewport.request
-        if surface is None or shown is None or not self.context.viewport.is_there:
-            return True
-        if self._seen[0] is not shown:
-            self._seen = shown, {}
-        known = self._seen[1]
-        if end not in known:
-            slack = spot_slack(end, self.context.viewport.bounds(shown.pose).radius)
-            known[end] = is_seen(surface, end.position, slack)
-        return known[end]
+    def drawn(self, frame: int) -> DrawnMarks:
+        """The distances over a frame of pictures that are saved."""
+        pose = self.context.pose
+        radius = 0.0 if pose is None else self.context.viewport.bounds(pose).radius
+        found = (one for one in distances_in(self.context, frame) if np.isfinite(one.value))
+        return DrawnMarks(measure_lines=tuple(one.drawn(self.context.scale, radius) for one in found))
 
     # --- out of the window ------------------------------------------------------------
 
+    def _table(self, frames: Iterable[int]) -> list[list[object]]:
+        made, context, found = self.made, self.context, self.context.followed
+        landmarks = {landmark.name: landmark for landmark in made.all}
+        return distance_rows(
+            made.distances,
+            landmarks,
+            found.tracks,
+            found.series,
+            context.timeline.name,
+            context.scale,
+            frames,
+        )
+
     def copy(self) -> None:
-        """Put a table of all into the clipboard, for spreadsheets."""
-        imgui.set_clipboard_text(to_text(self._table(), "\t"))
-        self.context.note(f"Copied {len(self.made.all)} distances as a table.")
+        """Put a table of all into the clipboard, for spreadsheets: as they were placed, and as they are in
+        the frame that is shown."""
+        keys = {key.frame for end in self.made.all for key in end.keys}
+        frames = sorted({*keys, self.context.index} & set(range(len(self.context.timeline))))
+        imgui.set_clipboard_text(to_text(self._table(frames), "\t"))
+        self.context.note(f"Copied {len(self.made.distances)} distances as a table.")
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""
         self.saving.ask(self.context.free_file("_distances.csv"))
 
     def _save(self, file: Path) -> None:
-        timeline, pose = self.context.timeline, self.context.pose
+        timeline, tracks = self.context.timeline, self.context.followed.tracks
         refuse_input(file, timeline)
-        is_still = pose is None or self.context.motion(pose).is_identity
-        if not (timeline.one_topology and len(timeline) > 1 and is_still):
-            save_rows(file, self._table())
-            self.context.note(f"Saved {file}")
-            return
-        made, scale = self.made.all, self.context.scale
-
-        def save_all_frames() -> None:
-            rows = readings_in_frames(made, len(timeline), timeline.visit, one_topology=True)
-            save_rows(file, table(rows, timeline.name, scale.unit, scale.factor))
-
-        told = f"Saved {file}, in all {len(timeline)} frames"
-        self.context.run(f"Saving {file.name}", save_all_frames, lambda _: self.context.note(told))
+        save_rows(file, self._table(range(len(timeline))))
+        ends = [tracks[name] for measure in self.made.distances for name in measure.landmarks]
+        gaps = "" if all(track.is_whole for track in ends) else "; some frames are not tracked yet"
+        frames = f", in all {len(timeline)} frames" if len(timeline) > 1 else ""
+        self.context.note(f"Saved {file}{gaps or frames}")
 
     def ask_to_read(self) -> None:
-        """Open the dialog that reads measurements back."""
+        """Open the dialog that reads distances back."""
         self.reading.ask(working_folder())
 
     def _read(self, file: Path) -> None:
@@ -219,60 +231,53 @@ class Tool:
             raise InputError("holds no distances", file, "Choose a table that 'Export distances...' wrote")
 
     def on_file(self, path: Path) -> bool:
-        """Add the measurements of a table that was saved of this scan, but those that are there; whether the
+        """Add the distances of a table that was saved of this scan, but those that are there; whether the
         file is such a table."""
-        if not is_measurement_table(path):
+        if not is_distance_table(path):
             return False
-        pose, timeline = self.context.pose, self.context.timeline
-        if pose is not None and not self.context.motion(pose).is_identity:
-            self.context.note("The scan is moved: turn off Remove head motion, then open the table again.")
-            return True
-        work = partial(
-            read_measurements, path, timeline.name, self.context.unit, len(timeline), timeline.pose
-        )
+        timeline = self.context.timeline
+        work = partial(read_distances, path, timeline.name, self.context.unit, len(timeline), timeline.pose)
         self.context.run(f"Reading {path.name}", work, self._add)
         return True
 
-    def _add(self, read: Sequence[Measurement]) -> None:
-        known = {_places(measurement) for measurement in self.made.all}
-        new = tuple(measurement for measurement in read if _places(measurement) not in known)
+    def _add(self, read: Mapping[str, Ends]) -> None:
+        made = self.made
+        known = {_places(self._keys(measure.landmarks)) for measure in made.distances}
+        new = {name: ends for name, ends in read.items() if _places(ends) not in known}
+        for name, ends in new.items():
+            made = made.with_distance(*ends, name)
         if new:
-            self.context.change("Import distances", Measurements((*self.made.all, *new)))
+            self.context.change("Import distances", made)
             self.context.reveal()
         there = f", {len(read) - len(new)} exist already" if len(new) < len(read) else ""
         self.context.note(f"Imported {len(new)} distances{there}.")
 
-    def _table(self) -> list[list[object]]:
-        """Each measurement as it was made; and where it follows its points, as it stands in another frame."""
-        rows: list[tuple[int, Reading]] = []
-        for number, (made, reading) in enumerate(zip(self.made.all, self.readings(), strict=True), 1):
-            rows.append((number, Reading(made, reading.fixed)))
-            if reading.measurement != made:
-                rows.append((number, reading))
-        scale = self.context.scale
-        return table(rows, self.context.timeline.name, scale.unit, scale.factor)
+    def _keys(self, names: Iterable[str]) -> Ends:
+        first, second = (found.keys for name in names if (found := self.made.named(name)))
+        return first, second
 
 
-def _places(measurement: Measurement) -> tuple[object, ...]:
+def _places(ends: Ends) -> tuple[object, ...]:
     """The frames and places of the ends, to a millionth of their distance: what tells it from others."""
-    digits = 6 - math.floor(math.log10(measurement.distance or 1))
-    return tuple((end.frame, *(round(x, digits) for x in end.position)) for end in measurement.ends)
+    digits = 6 - math.floor(math.log10(math.dist(ends[0][0].position, ends[1][0].position) or 1))
+    return tuple(
+        (number, end.frame, *(round(x, digits) for x in end.position))
+        for number, own in enumerate(ends)
+        for end in own
+    )
 
 
-def _place_words(end: Spot) -> tuple[str, str]:
-    return ", ".join(map(repr, end.position)), "surface" if end.id is None else f"at point {end.id}"
-
-
-def _learn_topology(timeline: Timeline, index: int) -> None:
-    """Have a second frame read where only one is known, since that tells whether points can be followed."""
-    if timeline.one_topology is None and len(timeline) > 1:
-        timeline.request((index + 1) % len(timeline))
-        timeline.request(index)
+def _same(now: tuple[object, ...], before: tuple[object, ...]) -> bool:
+    """Whether each is the very object that it was before, or an equal number."""
+    return len(now) == len(before) and all(
+        one is other or (isinstance(one, int) and one == other)
+        for one, other in zip(now, before, strict=True)
+    )
 
 
 def _at_all(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:
-    """A command that does something with all measurements."""
-    return Command(f"{name}_measurements", title, act, can=lambda tool: bool(tool.made.all))
+    """A command that does something with all distances."""
+    return Command(f"{name}_distances", title, act, can=lambda tool: bool(tool.made.distances))
 
 
 COMMANDS = {
@@ -286,7 +291,7 @@ COMMANDS = {
             (
                 _at_all("copy", "Copy as table", Tool.copy),
                 _at_all("save", "Export distances...", Tool.ask_to_save),
-                Command("read_measurements", "Import distances...", Tool.ask_to_read),
+                Command("read_distances", "Import distances...", Tool.ask_to_read),
                 _at_all("clear", "Clear", Tool.clear),
             ),
         )),

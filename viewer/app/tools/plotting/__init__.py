@@ -93,7 +93,7 @@ class Tool:
     @property
     def placed(self) -> list[str]:
         """The names of the landmarks that are placed, in their order."""
-        return [landmark.name for landmark in self.landmarks.all if landmark.state == "placed"]
+        return [landmark.name for landmark in self.landmarks.listed if landmark.state == "placed"]
 
     @property
     def times(self) -> NDArray[np.float64]:
@@ -160,9 +160,8 @@ class Tool:
         self.settings = replace(self.settings, is_open=True)
 
     def delete(self, name: str) -> None:
-        """Take away a measure."""
-        measures = tuple(one for one in self.landmarks.measures if one.name != name)
-        self.context.change("Delete measure", replace(self.landmarks, measures=measures))
+        """Delete a measure."""
+        self.context.change("Delete measure", self.landmarks.without_measures([name]))
 
     def rename(self, old: str, new: str) -> None:
         """Give a measure another name. Raises InputError for one that is taken."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ....analysis.landmarks import Landmark
 from ....analysis.measures import Measure
-from ....analysis.spot import Spot, moved_spot
+from ....analysis.spot import Spot
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
@@ -90,7 +90,7 @@ class Lasso:
         click = self._context.seen_at(vector(place))
         if click is None or click.picked is None or not click.picked.measured:
             return None
-        return moved_spot(Spot.of(click.picked, click.pose, place=click.motion), click.motion.inverse)
+        return Spot.of(click.picked, click.pose, place=click.motion)
 
     def draw(self, canvas: Canvas, view: ViewPlace) -> None:
         """Draw the outline as far as it goes."""

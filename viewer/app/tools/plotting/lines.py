@@ -18,7 +18,7 @@ from ....rigid import Rigid
 from ....scan.units import Scale
 from ...scene.canvas import Canvas, Label, ViewPlace
 from ...tool_context import ToolContext
-from .seen import seen_in_view
+from .._seen import seen_in_view
 from .shown import Kept
 from .words import with_note, with_spread
 
@@ -76,8 +76,8 @@ class MeasureLines:
         series, tracks = self._context.followed.series, self._context.followed.tracks
         numbers = {name: number for number, name in enumerate(series)}
         for measure in measures:
-            if measure.name in hidden or measure.name not in series:
-                continue
+            if measure.owns_landmarks or measure.name in hidden or measure.name not in series:
+                continue  # the tool that has made it draws it, or nobody
             if not all(name in tracks for name in measure.landmarks):
                 continue
             color = color_of_curve(numbers[measure.name])

@@ -18,8 +18,8 @@ from ....output.plots import color_of_way
 from ....rigid import STILL, Rigid
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import ToolContext
+from .._seen import seen_in_view
 from .choices import ANCHORS, CurveChoices, Settings
-from .seen import seen_in_view
 from .shown import Kept
 
 Still = tuple[Rigid | None, ...]

@@ -1,0 +1,205 @@
+"""Distances between two landmarks: their wording, and the table that they are exported to and imported from.
+
+A table has what a person needs, not all that a key of a landmark holds. Reading it finds the points that an
+end follows again, and takes its covariance to be as wide in all directions as it was in the widest. So ± may
+be wider than it was, never narrower.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from io import StringIO
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from ...csv_text import text_of_cell
+from ...errors import InputError, explained
+from ...files import open_plain, read_text
+from ...scan.pose import Pose
+from ...scan.units import Scale, conversion
+from ..landmarks import Landmark
+from ..landmarks.placed import spot_at
+from ..pick import SURE
+from ..spot import Spot
+from ..track import STATES, Known, Track
+from . import Measure, Series
+from .series import series_of
+
+_DECIMALS = (-6, 12)  # that a number is written out with
+_COVERED = "(95 %)"  # of cases in which the true distance is within what ± says
+_MOST_BYTES = 16 * 2**20  # of a table
+_HINT = "Use a table that 'Export distances...' has written, unchanged"
+_OF_END = ("state", "point", "x", "y", "z", "uncertainty", "spacing", "level")
+COLUMNS = (
+    "scan", "measure", "frame", "time", "distance", "uncertainty", "unit",
+    *(f"{name}_{number}" for number in (1, 2) for name in _OF_END),
+)  # fmt: skip
+
+Ends = tuple[tuple[Spot, ...], tuple[Spot, ...]]  # where each end was placed, by frame
+
+
+def distance_of(one: Spot, other: Spot) -> tuple[float, float]:
+    """The distance between two places and its standard deviation, scan units; NaN where one is unknown."""
+    measure = Measure("", "distance", ("1", "2"))
+    series = series_of(measure, {"1": Track.of(one), "2": Track.of(other)})
+    return float(series.values[0]), float(series.sigmas[0])
+
+
+def distance_in_words(distance: float, sigma: float, unit: str, factor: float = 1.0) -> str:
+    """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm (95 %)".
+
+    sigma: its standard deviation, NaN or 0 where unknown. unit, factor: that it is shown in, and how many of
+    it one unit of the scan is.
+    """
+    distance, uncertainty = factor * distance, factor * SURE * sigma
+    if not uncertainty > 0:
+        return f"{distance:.6g} {unit}"
+    power = math.floor(math.log10(uncertainty))
+    decimals = (
+        -power if float(f"{uncertainty:.0e}") >= 2 * 10.0**power else 1 - power
+    )  # two digits from 1.0 to 1.9
+    if not _DECIMALS[0] <= decimals <= _DECIMALS[1]:
+        return f"{distance:.6g} ± {uncertainty:.1g} {unit} {_COVERED}"
+    shown = (f"{round(value, decimals):.{max(decimals, 0)}f}" for value in (distance, uncertainty))
+    return f"{' ± '.join(shown)} {unit} {_COVERED}"
+
+
+# --- as a table -----------------------------------------------------------------------------
+
+
+def distance_rows(
+    measures: Iterable[Measure],
+    landmarks: Mapping[str, Landmark],
+    tracks: Mapping[str, Track],
+    found: Mapping[str, Series],
+    scan: str,
+    scale: Scale,
+    frames: Iterable[int],
+) -> list[list[object]]:
+    """The table of distances: a row of `COLUMNS`, then one for each distance and frame in which it is known
+    or one of its ends was placed. None stands for what is unknown. Frames count from 1, as in the window.
+
+    landmarks, tracks, found: by the name of the landmark or measure. scale: lengths are in its unit. frames:
+    that are wanted.
+    """
+    rows: list[list[object]] = [list(COLUMNS)]
+    for measure, frame in product(measures, frames):
+        if (series := found.get(measure.name)) is not None:
+            ends = [
+                _end_cells(landmarks[name], tracks[name], frame, scale.factor) for name in measure.landmarks
+            ]
+            if series.known[frame] >= Known.TRACKED or STATES[Known.PLACED] in (end[0] for end in ends):
+                value, sure = scale.factor * series.values[frame], SURE * scale.factor * series.sigmas[frame]
+                head = scan, measure.name, frame + 1, float(series.times[frame])
+                rows.append([*head, _cell(value), _cell(sure), scale.unit, *ends[0], *ends[1]])
+    return rows
+
+
+def _end_cells(landmark: Landmark, track: Track, frame: int, factor: float) -> list[object]:
+    key = landmark.key_at(frame)
+    spacing = None if key is None or key.spacing is None else factor * key.spacing
+    lengths = (*track.positions[frame], SURE * track.sigmas[frame])
+    return [
+        STATES[Known(int(track.known[frame]))],
+        None if key is None else key.id,
+        *(_cell(factor * length) for length in lengths),
+        spacing,
+        None if key is None else key.level,
+    ]
+
+
+def _cell(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def is_distance_table(path: Path) -> bool:
+    """Whether a file is a table of distances, by its first line."""
+    if path.suffix.lower() != ".csv":
+        return False
+    head = ",".join(COLUMNS).encode()
+    try:
+        with open_plain(path) as stream:
+            return stream.read(len(head)) == head
+    except OSError:
+        return False
+
+
+def read_distances(
+    path: Path, scan: str, unit: str, count: int, pose_of: Callable[[int], Pose]
+) -> dict[str, Ends]:
+    """The distances of a table: name -> where both ends were placed.
+
+    scan: its name, which all rows must have. unit: of the scan; lengths in another are converted. count: of
+    the scan's frames. pose_of: gives one by its index. Raises InputError, with the line, for what cannot be
+    used, and where no row is of the scan.
+    """
+    found: dict[str, tuple[list[Spot], list[Spot]]] = {}
+    others = set()
+    for where, row in _rows(path):
+        if (name := text_of_cell(row["scan"])) != scan:
+            others.add(name)
+            continue
+        factor = conversion(row["unit"], unit)
+        if factor is None:
+            what = f"lengths are in '{row['unit']}', those of the scan in '{unit}'"
+            raise InputError(what, where, "Set the scan's unit in the panel first")
+        for number, spots in enumerate(found.setdefault(text_of_cell(row["measure"]), ([], [])), 1):
+            if row[f"state_{number}"] == STATES[Known.PLACED]:
+                spots.append(_spot(row, number, where, factor, count, pose_of))
+    if others or not found:
+        what = f"is of '{min(others)}', not of '{scan}'" if others else "holds no distances"
+        raise InputError(what, path, "Open that scan first" if others else _HINT)
+    if unplaced := next((name for name, ends in found.items() if not all(ends)), None):
+        raise InputError(f"does not say where both ends of '{unplaced}' were placed", path, _HINT)
+    return {name: (tuple(first), tuple(second)) for name, (first, second) in found.items()}
+
+
+def _rows(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
+    """The rows of a table, each after its place in words. Raises InputError for what is no such table."""
+    try:
+        text = read_text(path, _MOST_BYTES)
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(f"cannot be read: {what}", path, hint) from error
+    except UnicodeDecodeError as error:
+        raise InputError("is no text in UTF-8", path, _HINT) from error
+    rows = csv.DictReader(StringIO(text, newline=""), strict=True)
+    try:
+        for row in rows:
+            where = f"{path}, line {rows.line_num}"
+            if None in row or None in row.values() or not row.keys() >= set(COLUMNS):
+                raise InputError("a column is missing, or one too many", where, _HINT)
+            yield where, row
+    except csv.Error as error:
+        raise InputError(f"is no table: {error}", f"{path}, line {rows.line_num}", _HINT) from error
+
+
+def _spot(
+    row: Mapping[str, str],
+    number: int,
+    where: str,
+    factor: float,
+    count: int,
+    pose_of: Callable[[int], Pose],
+) -> Spot:
+    """Read the key of an end, with the points that it follows. factor: from the row's unit to the scan's."""
+
+    def read(column: str) -> float:
+        try:
+            value = float(row[column])
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise InputError(f"'{column}' is no number but '{row[column][:40]}'", where, _HINT)
+        return value
+
+    frame = read("frame")
+    if not (frame == int(frame) and 1 <= frame <= count):
+        raise InputError(f"'frame' is {frame:g}, and not from 1 to {count}", where, _HINT)
+    position = np.array([read(f"{axis}_{number}") for axis in "xyz"]) * factor
+    sure = abs(read(f"uncertainty_{number}")) * factor if row[f"uncertainty_{number}"] else math.nan
+    return spot_at(position, pose_of(int(frame) - 1), sure / SURE)
