@@ -94,8 +94,10 @@ def check_import(extension: Extension) -> None:
 
 
 def package_of(module: str) -> str:
-    """Name and version of the package that brings an extension, by its module; "" for Scan4D's own."""
-    return next((extension.package for extension in installed_extensions() if extension.module == module), "")
+    """Name and version of the package that extends Scan4D by a module, or one beside it; "" for Scan4D."""
+    top = module.partition(".")[0]
+    found = (each.package for each in installed_extensions() if each.module.partition(".")[0] == top)
+    return next(found, "")
 
 
 def extension_problems() -> dict[Extension, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import cached_property
+from pathlib import Path
 
 from ..errors import Scan4DError
 from ..resources import resource_path
@@ -88,7 +89,8 @@ class Source:
             if found is None:
                 lines.append(line)
             else:
-                lines.append(self._expand(found[1]) if found[1] else self._expand_part(found[2]))
+                included = self._expand(_beside(name, found[1])) if found[1] else self._expand_part(found[2])
+                lines.append(included)
                 lines.append(f"#line {index * _LINES + number + 1}")
         if lines[-1].startswith("#line"):
             lines.pop()  # NVIDIA takes none that nothing follows
@@ -102,6 +104,12 @@ class Source:
             return f"{self.files[index]}:{line}" if index < len(self.files) else match[0]
 
         return _PLACE.sub(place, log)
+
+
+def _beside(name: str, included: str) -> str:
+    """The name of an included file: beside the file of another package that includes it, else Scan4D's."""
+    beside = Path(name).parent / included
+    return str(beside) if beside.is_absolute() and beside.is_file() else included
 
 
 def _declared(declaration: str) -> list[str]:

@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ...extensions import package_of
 from ...files import parsed_json, read_text, whole_file
 from ...folders import cache_folder
 from . import Measure
+from .kinds import measure_kinds
 from .regions import Refused
 from .surface import Found
 
@@ -36,7 +38,9 @@ class KeptValues:
     """
 
     def __init__(self, measure: Measure, positions: NDArray[np.float64]) -> None:
-        definition = json.dumps([VERSION, measure.kind, sorted(measure.options.items()), positions.shape])
+        version = [VERSION, package_of(measure_kinds()[measure.kind].compute.__module__)]
+        options = sorted(measure.options.items())
+        definition = json.dumps([version, measure.kind, options, positions.shape])
         name = blake2b(definition.encode() + positions.tobytes(), digest_size=16).hexdigest()
         self.path = measures_folder() / f"{name}.json"
         self._values = self._read()
