@@ -85,23 +85,29 @@ def backends_page() -> str:
     parts = [
         "# Parameters",
         wrapped(
-            "This page lists the parameters of all renderers and of the look. The panel of the window shows "
-            "them, and the command line sets them with `--set name=value` and `--look name=value`. "
-            "Parameters for every user come first. The other ones are for research."
+            "This page lists the parameters of all renderers and of the look. You can change them in the "
+            "panel of the window. On the command line, `--set name=value` sets a parameter of the renderer, "
+            "and `--look name=value` one of the look. For each renderer, parameters for every user come "
+            "first, and those for research follow."
         ),
         wrapped(
-            "*Affects* says what a change does. `draw` changes the picture, `derive` also prepares each pose "
-            "again, and `speed` changes the time alone."
+            "The column *affects* says what a change of the parameter does. With `draw`, the picture "
+            "changes. With `derive`, Scan4D must also prepare each pose again. With `speed`, only the time "
+            "changes."
         ),
         wrapped(
-            "The declarations in the code make this page: `python -m pytest tests/test_docs.py --bless`."
+            "The command `python -m pytest tests/test_docs.py --bless` writes this page from the "
+            "declarations in the code."
         ),
     ]
     for backend in backends().values():
         parts += [f"## {backend.title} (`--backend {backend.name}`)", wrapped(backend.about)]
         parts += tables_by_reader(backend.parameters)
         if backend.values:
-            parts += ["Numbers that it computes, for `--look color_by=`:", values_table(backend.values)]
+            parts += [
+                "The renderer computes these numbers, which `--look color_by=` can show:",
+                values_table(backend.values),
+            ]
     parts += ["## Look (`--look key=value`)", wrapped(Look.__doc__ or ""), *tables_by_reader(describe(Look))]
     return "\n\n".join(parts) + "\n"
 
@@ -125,10 +131,15 @@ def keys_page() -> str:
         mouse += getattr(module, "MOUSE", ())
     parts = [
         "# Keys and mouse",
-        "`F1` shows and searches this list in the window. The menus have every command.\n"
-        "[Your own keys](../guide/looking.md#keyboard) replace the default keys.",
-        "This page is made from the declarations in the code:\n"
-        "`python -m pytest tests/test_docs.py --bless`.",
+        wrapped(
+            "This page lists all keys and mouse actions. In the window, `F1` shows and searches this list. The "
+            "menus contain every command, also those without a key. You can [set your own "
+            "keys](../guide/looking.md#keyboard), which replace the default keys."
+        ),
+        wrapped(
+            "The command `python -m pytest tests/test_docs.py --bless` writes this page from the "
+            "declarations in the code."
+        ),
         "## Mouse",
         "\n".join(
             [

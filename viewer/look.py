@@ -54,12 +54,12 @@ _EYE_DOME = {"eye_dome": (None, True)}
 
 @dataclass(frozen=True)
 class Look:
-    """Lighting, colouring and background.
+    """Colours, light and background of a picture, for all renderers.
 
-    `color_by` and `light` are "auto" by default. Then the picture has the scan's own colours. It is lit from
-    the viewer if the scan has normals, else it has eye-dome lighting, which needs depth alone. Photographs of
-    range images are shown unlit. "level" shows measured pixels in grey and filled pixels in a colour for each
-    level.
+    By default, `color_by` and `light` are `auto`. The picture then shows the scan's own colours. If the scan
+    has normals, the light comes from the viewer. Otherwise eye-dome lighting shades the picture from its
+    depth alone. Photographs of range images appear without light. With `color_by=level`, measured pixels are
+    grey, and filled pixels have a colour for each level.
     """
 
     quality: str = param(

@@ -1,6 +1,7 @@
-"""Each point as a square of pixels; the nearest wins. The fastest renderer, with exact positions.
+"""Draws each point as a square of pixels, and shows the nearest square at each pixel.
 
-A surface can have gaps between its points. `hide_hidden` leaves out the points seen through these gaps.
+It is the fastest renderer, and its positions are exact. A surface can have gaps between its points, through
+which farther points are visible. `hide_hidden` leaves out these points.
 """
 
 from __future__ import annotations

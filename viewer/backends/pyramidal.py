@@ -1,7 +1,8 @@
-"""A filled surface: holes between samples are filled from pictures of smaller size.
+"""Draws range images and points, and fills the holes between their samples.
 
-Pyramidal projection, Farooq 2013, chapters 4 to 6. The renderer scatters samples into the picture and
-reduces it to targets of half, a quarter, ... of its size. The finest target that covers a hole fills it.
+The method is pyramidal projection (Farooq 2013, chapters 4 to 6). The renderer draws the samples into the
+picture, and computes targets from it: copies of half the size, a quarter, and so on. It fills each hole from
+the finest target whose samples surround the hole.
 """
 
 from __future__ import annotations

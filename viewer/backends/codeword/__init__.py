@@ -1,8 +1,9 @@
-"""Discs as 64-bit code words from a table of shapes, drawn in whole numbers.
+"""Draws discs in whole numbers, from 64-bit code words and a table of shapes.
 
-Maršík 2010. The encoder turns each disc into code words, one for each picture line. A word names the shape of
-the disc by its size and normal, in steps. An engine draws the words in a window that slides down the picture.
-Here each GPU work group draws one band of the picture. viewer/codewords/ has the words, tables and lighting.
+The method is that of Maršík 2010. The encoder turns each disc into code words. A word stores the shape of its
+disc as an index into a table of sizes and normals. An engine then draws the words, line by line of the
+picture. In the paper it uses a window that slides down the picture. Here, each GPU work group draws one band
+of the picture. The package `viewer/codewords/` has the words, tables and lighting.
 """
 
 from __future__ import annotations

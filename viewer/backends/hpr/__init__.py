@@ -1,12 +1,14 @@
-"""Only the points that the viewer can see; needs no normals and no faces.
+"""Draws only the points that the viewer can see, without normals or faces.
 
-Machado e Silva 2014 approximates the operator of Katz 2007: flip the points about a sphere around the eye; a
-point is visible if its flip lies on the convex hull. Directions are divided into sectors, and each sector
-keeps the point whose flip lies farthest along it (sections 3 to 5). The radius, the number of sectors and the
-number of steps follow section 6. Scan4D differs in two ways. It divides angles evenly, so that sectors have
-about the same size up to 45 degrees off the middle. Around an eye near the scan it uses six such grids, like
-the faces of a cube. It also compares points that lost their sector with the candidates around them, which
-keeps points that share a sector and needs fewer sectors.
+Machado e Silva 2014 approximates the operator of Katz 2007. The operator flips the points about a sphere
+around the eye; a point is visible if its flipped position lies on the convex hull. The renderer divides
+directions into sectors, and each sector stores the point whose flipped position reaches farthest along its
+direction (sections 3 to 5). The radius, the number of sectors and the number of steps follow section 6.
+
+Scan4D differs from the paper in two ways. It divides angles evenly, so that sectors have about the same size
+up to 45 degrees from the middle; around an eye near the scan it uses six such grids, like the faces of a
+cube. It also compares each point with the candidates in the sectors around it. Points that share a sector can
+then all be visible, and fewer sectors are enough.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
-"""Several range views merged without visible seams, one frequency band at a time.
+"""Merges several range views without visible seams, one frequency band at a time.
 
-Laplacian projection: Farooq 2013, chapter 6, and the GRAPP 2009 paper behind it; Burt and Adelson 1983. Each
-view gives a picture of the visible surface. The multi-resolution spline merges these pictures band by band;
-the transition between two views is as wide as the waves of the band. A view that wins a place gives its
-detail alone, so nothing appears twice. Differences in gain or colour fade over the coarsest band.
+The method is Laplacian projection (Farooq 2013, chapter 6, and the GRAPP 2009 paper; Burt and Adelson 1983).
+The renderer draws a picture of the visible surface from each view. The multi-resolution spline splits these
+pictures into frequency bands and merges each band; the coarser the band, the wider is the transition between
+two views. At each place, the fine detail comes from a single view, so nothing appears twice. Differences in
+gain or colour fade over the width of the coarsest band.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""An octree of the points, drawn as discs or cubes, coarser where far away.
+"""Draws an octree of the points as discs or cubes, which are coarser where they are far away.
 
-Slomp 2014, section VI. The octree divides octants as long as that separates points. A picture draws the
-octants that are about as large as a pixel.
+The method is that of Slomp 2014, section VI. The octree divides octants until nearly every point has an
+octant of its own. A picture draws the octants that are about as large as a pixel.
 """
 
 from __future__ import annotations
