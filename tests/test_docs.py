@@ -132,8 +132,8 @@ def keys_page() -> str:
     parts = [
         "# Keys and mouse",
         wrapped(
-            "This page lists all keys and mouse actions. In the window, `F1` shows and searches this list. The "
-            "menus contain every command, also those without a key. You can [set your own "
+            "This page lists all keys and mouse actions. In the window, `F1` shows and searches this list. "
+            "The menus contain every command, also those without a key. You can [set your own "
             "keys](../guide/looking.md#keyboard), which replace the default keys."
         ),
         wrapped(
