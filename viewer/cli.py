@@ -38,9 +38,9 @@ def _end_quietly_when_interrupted() -> None:
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else it is ignored
         signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-    def on_error(kind: type[BaseException], error: BaseException, place: TracebackType | None) -> None:
+    def on_error(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         if not _interrupts_again(kind):
-            sys.__excepthook__(kind, error, place)
+            sys.__excepthook__(kind, error, trace)
 
     def on_loss(lost: sys.UnraisableHookArgs) -> None:
         if not _interrupts_again(lost.exc_type):

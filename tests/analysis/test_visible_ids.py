@@ -54,6 +54,6 @@ def test_the_scan_is_where_layers_have_it() -> None:
     moved = Camera(eye=eye, target=target, fov_y=20)
     matrix = np.eye(4)
     matrix[:3, 3] = shift
-    layers = Layers(place=Rigid(matrix))
+    layers = Layers(world_from_pose=Rigid(matrix))
     found = visible_ids(Request(POSE, moved, layers=layers), (400, 300))
     np.testing.assert_array_equal(found, visible_ids(Request(POSE, CAMERA), (400, 300)))

@@ -255,11 +255,11 @@ def test_what_tools_lay_is_merged_and_goes_with_the_scan() -> None:
     assert laid.layers(BARE) is layers, "so that nothing is drawn again"
     assert layers.scalars["q"] is second
     assert layers.scalars["a"] is first
-    np.testing.assert_array_equal(layers.place.points(np.zeros(3)), (0, 3, 0))
+    np.testing.assert_array_equal(layers.world_from_pose.points(np.zeros(3)), (0, 3, 0))
     laid.lay("a", lambda pose: {"q": first}, moved)
     layers = laid.layers(BARE)
     assert layers.scalars["q"] is first
-    np.testing.assert_array_equal(layers.place.points(np.array([1.0, 0, 0])), (3, 1, 0))
+    np.testing.assert_array_equal(layers.world_from_pose.points(np.array([1.0, 0, 0])), (3, 1, 0))
     laid.take_away("b")
     np.testing.assert_array_equal(laid.place(7).points(np.zeros(3)), (7, 0, 0))
     session.turn_to("two")
@@ -272,11 +272,11 @@ def test_a_pose_that_is_replayed_stands_where_it_was_and_has_its_own_numbers() -
     laid.lay("a", lambda pose: {"q": np.ones(3), "a": np.ones(3)}, moved)
     laid.replay(pose.index, moved(-1))
     assert list(laid.layers(pose).scalars) == ["a"]
-    np.testing.assert_array_equal(laid.layers(pose).place.points(np.zeros(3)), (-1, 0, 0))
+    np.testing.assert_array_equal(laid.layers(pose).world_from_pose.points(np.zeros(3)), (-1, 0, 0))
     np.testing.assert_array_equal(laid.place(4).points(np.zeros(3)), (4, 0, 0))
     laid.lay("b", lambda pose: {}, lambda index: STILL)
     assert list(laid.layers(pose).scalars) == ["q", "a"]
-    np.testing.assert_array_equal(laid.layers(pose).place.points(np.zeros(3)), (3, 0, 0))
+    np.testing.assert_array_equal(laid.layers(pose).world_from_pose.points(np.zeros(3)), (3, 0, 0))
 
 
 def test_a_change_of_a_parameter_is_called_by_its_name() -> None:

@@ -171,4 +171,4 @@ def test_convert_keeps_what_an_eye_sees(run: Run, scans: Path, tmp_path: Path) -
 def test_convert_refuses_what_is_no_place_of_an_eye(text: str, run: Run, scans: Path, tmp_path: Path) -> None:
     done = run("convert", scans / "ball.npz", tmp_path / "a.ply", "--visible-from", text)
     assert done.code == 2
-    assert "not a place" in done.err
+    assert "not a position" in done.err

@@ -81,11 +81,11 @@ def test_an_entry_holds_all_of_a_request() -> None:
 
 def test_an_entry_has_the_place_that_the_scan_is_moved_to() -> None:
     place = Rigid(np.array([[0.6, -0.8, 0, 1e6], [0.8, 0.6, 0, 1 / 3], [0, 0, 1, -2], [0, 0, 0, 1]]))
-    request = Request(POSE, FIRST.camera, "points", FIRST.params, FIRST.look, Layers(place=place))
+    request = Request(POSE, FIRST.camera, "points", FIRST.params, FIRST.look, Layers(world_from_pose=place))
     entry = Entry.of(request, "knot", None, (96, 64), "mm")
     again = Entry.from_json(json.loads(json.dumps(entry.to_json())))
     assert again == entry
-    np.testing.assert_array_equal(again.request(POSE).layers.place.matrix, place.matrix)
+    np.testing.assert_array_equal(again.request(POSE).layers.world_from_pose.matrix, place.matrix)
     back = replace(entry, place=None)
     assert back.to_json(entry) == {"place": None}
     for place_of_none in ([[1, 0], [0, 1]], (2 * np.eye(4)).tolist(), "here"):

@@ -165,7 +165,7 @@ def test_a_pose_that_is_shifted_gives_the_very_picture(
         Look(color_by="depth", light="fixed"),
         Look(color_by="normal"),
     ):
-        one = drawn(renderer, POSE, camera, Layers(place=place), backend, look)
+        one = drawn(renderer, POSE, camera, Layers(world_from_pose=place), backend, look)
         other = drawn(renderer, there, camera, None, backend, look)
         assert (one.row != NOTHING).any()
         np.testing.assert_array_equal(one.image(), other.image())
@@ -182,7 +182,7 @@ def test_a_pose_that_is_turned_gives_the_picture_of_turned_points(
     there = Pose(0, 0.0, "x", moved(CLOUD, place))
     camera = camera_of(there.cloud, projection)
     for look in (Look(), Look(color_by="height"), Look(light="fixed"), Look(color_by="normal", light="flat")):
-        one = drawn(renderer, POSE, camera, Layers(place=place), backend, look)
+        one = drawn(renderer, POSE, camera, Layers(world_from_pose=place), backend, look)
         other = drawn(renderer, there, camera, None, backend, look)
         same = one.row == other.row
         assert (one.row[same] != NOTHING).sum() > 1000
@@ -213,7 +213,7 @@ def test_sectors_of_a_turned_pose_show_nearly_what_those_of_turned_points_do(
 ) -> None:
     there = Pose(0, 0.0, "x", moved(CLOUD, TURNED))
     camera = camera_of(there.cloud, projection)
-    one = drawn(renderer, POSE, camera, Layers(place=TURNED), SECTORS)
+    one = drawn(renderer, POSE, camera, Layers(world_from_pose=TURNED), SECTORS)
     other = drawn(renderer, there, camera, None, SECTORS)
     covered = (one.row != NOTHING) & (other.row != NOTHING)
     assert covered.sum() > 1000
@@ -232,7 +232,7 @@ def positions(surface: Surface) -> NDArray[np.float64]:
 
 def test_picking_gives_places_in_the_world(renderer: Renderer) -> None:
     there = Pose(0, 0.0, "x", moved(CLOUD, TURNED))
-    camera, layers = camera_of(there.cloud), Layers(place=TURNED)
+    camera, layers = camera_of(there.cloud), Layers(world_from_pose=TURNED)
     one = drawn(renderer, POSE, camera, layers, "surfels")
     other = drawn(renderer, there, camera, None, "surfels")
     np.testing.assert_allclose(positions(one), positions(other), atol=1e-5)
@@ -244,7 +244,7 @@ def test_picking_gives_places_in_the_world(renderer: Renderer) -> None:
 
 def test_ends_of_distances_go_with_the_pose(renderer: Renderer) -> None:
     there = moved(CLOUD, TURNED)
-    surface = drawn(renderer, POSE, camera_of(there), Layers(place=TURNED), "surfels")
+    surface = drawn(renderer, POSE, camera_of(there), Layers(world_from_pose=TURNED), "surfels")
     places = [pick(surface, x, y) for y, x in np.argwhere(surface.row != NOTHING)[[100, 3000]].tolist()]
     ends = [Spot.of(place, POSE, place=TURNED) for place in places if place is not None]
     for end, place in zip(ends, places, strict=True):
@@ -267,7 +267,7 @@ def test_a_moved_pose_is_judged_where_it_is(renderer: Renderer) -> None:
     camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
     judge = Judge.of(renderer.gpu, truth, camera, size, Look(light="head"), cloud, None)
     errors = []
-    for pose, layers in ((POSE, Layers(place=TURNED)), (Pose(0, 0.0, "x", cloud), Layers())):
+    for pose, layers in ((POSE, Layers(world_from_pose=TURNED)), (Pose(0, 0.0, "x", cloud), Layers())):
         surface = Surface(renderer.gpu, size)
         render_frame(renderer, Request(pose, camera, "surfels", None, Look(light="head"), layers), surface)
         errors.append(judge.errors(surface))

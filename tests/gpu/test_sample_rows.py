@@ -53,7 +53,7 @@ def both(
     """Pictures of range views by their samples, and of the points that they see."""
     views = SCENES[scene]
     poses = Pose.of(0, 0.0, "x", views), Pose(0, 0.0, "x", merge(views))
-    camera = Camera.orbit(layers.place.bounds(poses[0].bounds), 30, 20, aspect=SIZE[0] / SIZE[1])
+    camera = Camera.orbit(layers.world_from_pose.bounds(poses[0].bounds), 30, 20, aspect=SIZE[0] / SIZE[1])
     surfaces = []
     for pose, backend in zip(poses, (sampling.BACKEND, "points"), strict=True):
         params = sampling.BACKEND.params_class(point_size=point_size)
@@ -102,7 +102,7 @@ def test_colours_are_those_of_the_points(renderer: Renderer, scene: str, color_b
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("place", [False, True])
 def test_heights_are_those_of_the_points(renderer: Renderer, scene: str, place: bool) -> None:
-    layers = Layers(place=TURNED) if place else NO_LAYERS
+    layers = Layers(world_from_pose=TURNED) if place else NO_LAYERS
     for up in ("+x", "-z"):
         samples, points = both(renderer, scene, replace(FLAT, color_by="height", up=up), layers)
         np.testing.assert_array_equal(samples.value, points.value)
@@ -137,7 +137,7 @@ def test_numbers_of_samples_are_packed_once_and_counted(renderer: Renderer) -> N
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_normals_are_those_of_the_samples_around(renderer: Renderer, scene: str) -> None:
-    samples, points = both(renderer, scene, Look(light="head"), Layers(place=TURNED))
+    samples, points = both(renderer, scene, Look(light="head"), Layers(world_from_pose=TURNED))
     assert not is_merged(samples)
     seen = samples.row != NOTHING
     np.testing.assert_allclose(np.linalg.norm(samples.normal[seen], axis=1), 1, rtol=1e-5)
@@ -174,7 +174,7 @@ def test_channels_are_resolved_from_samples(renderer: Renderer) -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_picks_and_measurements_are_those_of_the_points(renderer: Renderer, scene: str) -> None:
-    samples, points = both(renderer, scene, layers=Layers(place=TURNED))
+    samples, points = both(renderer, scene, layers=Layers(world_from_pose=TURNED))
     pose = samples.pose.pose
     for x, y in measured(samples):
         one, other = pick(samples, x, y), pick(points, x, y)

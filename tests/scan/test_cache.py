@@ -47,9 +47,9 @@ def test_what_is_to_be_kept_is_not_evicted() -> None:
     cache = PoseCache(3 * 120)
     for index in range(3):
         cache.put(pose(index))
-    assert cache.put(pose(3), keep={0, 1}.__contains__)
+    assert cache.put(pose(3), is_needed={0, 1}.__contains__)
     assert set(cache) == {0, 1, 3}
-    assert not cache.put(pose(4), keep={0, 1, 3}.__contains__)
+    assert not cache.put(pose(4), is_needed={0, 1, 3}.__contains__)
     assert set(cache) == {0, 1, 3}
 
 

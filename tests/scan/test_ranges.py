@@ -71,7 +71,7 @@ def test_heights_are_where_layers_move_points_to(folder: Path) -> None:
     matrix = np.eye(4)
     matrix[2, 3] = 5e6
     lower, higher = (
-        point_values(pose, look, Layers(place=place)) for place in (Rigid(np.eye(4)), Rigid(matrix))
+        point_values(pose, look, Layers(world_from_pose=place)) for place in (Rigid(np.eye(4)), Rigid(matrix))
     )
     assert lower is not None
     assert higher is not None

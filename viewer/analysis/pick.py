@@ -123,7 +123,7 @@ def pick(
     depth, row, level = surface.texel(across, down)
     if level == EMPTY:
         return None
-    view, place, pixel = surface.view, surface.layers.place, np.array([x + 0.5, y + 0.5])
+    view, place, pixel = surface.view, surface.layers.world_from_pose, np.array([x + 0.5, y + 0.5])
     ids, points = surface.points_around(across, down, _reach(surface, depth))
     if row == NOTHING:
         found = local_surface(view, pixel, view.unproject(pixel[None], np.array([depth]))[0], points)
@@ -212,7 +212,7 @@ def _nearest(surface: Surface, cloud: PointCloud, at: int) -> tuple[NDArray[np.i
 def _position(surface: Surface, pixel: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
     """The place in the world, (3,), that a place of the picture (2,) shows at a depth."""
     found = surface.view.unproject(pixel[None], np.array([depth]))[0]
-    return surface.layers.place.points(found + surface.view.origin)
+    return surface.layers.world_from_pose.points(found + surface.view.origin)
 
 
 def _told(
@@ -236,10 +236,10 @@ def _told(
         - _position(surface, pixel - step, found.depth - step @ found.slope)
         for step in steps
     ]
-    deeper = surface.layers.place.directions(surface.view.along(pixel)) * found.deviation
+    deeper = surface.layers.world_from_pose.directions(surface.view.along(pixel)) * found.deviation
     off = np.column_stack([*(side / np.sqrt(12) for side in aside), deeper])
     kept = found.used[:FOLLOWED]
-    offsets = surface.layers.place.points(points[kept] + surface.view.origin) - position
+    offsets = surface.layers.world_from_pose.points(points[kept] + surface.view.origin) - position
     neighbors = (Neighbor(id, vector(offset)) for id, offset in zip(ids[kept].tolist(), offsets, strict=True))
     return off @ off.T, tuple(neighbors)
 
@@ -301,7 +301,7 @@ def are_seen(
 
     positions: (N, 3), NaN for what is not seen. slacks: (N,).
     """
-    unmoved = surface.layers.place.inverse.points(positions) - surface.view.origin
+    unmoved = surface.layers.world_from_pose.inverse.points(positions) - surface.view.origin
     seen = surface.view.contains(unmoved)
     pixels, depths = surface.view.project(unmoved[seen])
     across, down = pixels.astype(np.intp).T
@@ -316,7 +316,7 @@ def is_seen(surface: Surface, position: ArrayLike, slack: float) -> bool:
     Reads one pixel from the GPU. position: (3,), scan units. slack: how far before the place, scan units, the
     surface may be that still is the place's own.
     """
-    unmoved = surface.layers.place.inverse.points(np.asarray(position, np.float64))
+    unmoved = surface.layers.world_from_pose.inverse.points(np.asarray(position, np.float64))
     offset = (unmoved - surface.view.origin)[None]
     if not surface.view.contains(offset)[0]:
         return False

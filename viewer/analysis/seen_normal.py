@@ -36,5 +36,5 @@ def seen_normal(surface: Surface, x: int, y: int) -> NDArray[np.float64] | None:
         off = np.abs((kept - center) @ normal)
         kept = kept[off <= max(_OFF * float(np.median(off)), 1e-6 * radius)]
     toward_eye = -view.along(np.array([x + 0.5, y + 0.5]))
-    facing_eye = surface.layers.place.directions(normal if normal @ toward_eye >= 0 else -normal)
+    facing_eye = surface.layers.world_from_pose.directions(normal if normal @ toward_eye >= 0 else -normal)
     return facing_eye.astype(np.float64)

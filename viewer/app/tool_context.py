@@ -145,7 +145,7 @@ class ToolContext:
 
     def motion(self, pose: Pose) -> Rigid:
         """The motion of a pose from the scan's coordinates to where it is shown, by what all tools lay."""
-        return self._toolbox.session.laid.layers(pose).place
+        return self._toolbox.session.laid.layers(pose).world_from_pose
 
     def lay(self, numbers: NumbersOf | None = None, place: PlaceOf | None = None) -> None:
         """Lay numbers over the points of the open scan, and move its poses; what the tool laid before goes.

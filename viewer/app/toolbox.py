@@ -286,7 +286,7 @@ class Toolbox:
         surface = self.viewport.surface
         if surface is None:
             return None
-        unmoved = surface.layers.place.inverse.points(np.array([position])) - surface.view.origin
+        unmoved = surface.layers.world_from_pose.inverse.points(np.array([position])) - surface.view.origin
         if not surface.view.contains(unmoved)[0]:
             return None
         across, down = np.floor(surface.view.project(unmoved)[0][0]).astype(int).tolist()
@@ -303,7 +303,7 @@ class Toolbox:
         meant = before_gap(surface, *at)
         picked = pick(surface, *at, shown=meant, spacing=in_full)
         is_farther = meant != at and surface.texel(*at).depth < np.inf
-        return Click(picked, request.pose, is_farther, request.layers.place, meant)
+        return Click(picked, request.pose, is_farther, request.layers.world_from_pose, meant)
 
     @property
     def spans(self) -> list[FrameSpan]:

@@ -163,7 +163,7 @@ def point_materials(
         table = map_palette(color_table(look.color_map), rgba(look.plain))
         return table, mapped(values, low, high)
     if look.color_by == "normal" and cloud.normals is not None:
-        return palette_of(_direction_colors(layers.place.directions(cloud.normals)))
+        return palette_of(_direction_colors(layers.world_from_pose.directions(cloud.normals)))
     if look.color_by == "id":
         return palette_of(_id_colors(np.arange(len(cloud)) if cloud.ids is None else cloud.ids))
     if look.color_by in ("plain", "normal") or cloud.colors is None:
@@ -186,7 +186,7 @@ def _values(pose: Pose, view: View, look: Look, layers: Layers, source: str) -> 
         relative = pose.cloud.positions + (pose.origin - view.origin)
         values = view.depths(relative) + view.base
     elif source == "height":
-        values = layers.place.points(pose.cloud.world()) @ up_vector(look.up)
+        values = layers.world_from_pose.points(pose.cloud.world()) @ up_vector(look.up)
     else:
         values = np.asarray({**pose.cloud.scalars, **layers.scalars}[source], np.float64)
     low, high = look.low, look.high

@@ -15,11 +15,11 @@ from . import _drawing as drawing
 from ._console import warn
 
 AUTO = "auto"
-_OTHERS = {"set": "is for one renderer", "quality": "is more than one picture, where one is to keep a bound"}
+_OTHERS = {"set": "is for one renderer", "quality": "is more than one picture, where one is to meet a limit"}
 
 
 def add_goal_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
-    """The arguments of what an automatic choice is to keep."""
+    """The arguments with the limits of an automatic choice."""
     parser.add_argument(
         "--budget", metavar="TIME", help="choose the best renderer that takes at most this time, such as 50ms"
     )
@@ -58,5 +58,5 @@ def choice_of(
     if choice is None:
         raise InputError("there is no renderer to choose from for this scan", hint="Name one with --backend")
     if not choice.keeps:
-        warn(f"no renderer is expected to keep {goal}; the nearest is drawn: {choice}")
+        warn(f"no renderer is expected to meet {goal}; Scan4D draws with the nearest: {choice}")
     return choice

@@ -27,9 +27,9 @@ _is_quiet = False
 NAMES_AS_THEY_ARE = "scan4d.names"
 
 
-def escaped(text: str, keep: str = "") -> str:
-    """The text with its control characters escaped, but for those to keep."""
-    return _CONTROLS.sub(lambda found: found[0] if found[0] in keep else repr(found[0])[1:-1], text)
+def escaped(text: str, except_for: str = "") -> str:
+    """The text with its control characters escaped, except for these."""
+    return _CONTROLS.sub(lambda found: found[0] if found[0] in except_for else repr(found[0])[1:-1], text)
 
 
 def warn(text: str) -> None:
@@ -40,7 +40,7 @@ def warn(text: str) -> None:
 
 def complain(text: str) -> None:
     """Text on standard error, above a progress bar if there is one. Where nobody can read it, it is lost."""
-    text = escaped(text, keep="\n")
+    text = escaped(text, except_for="\n")
     with suppress(OSError):
         if "tqdm" in sys.modules:
             sys.modules["tqdm"].tqdm.write(text, file=sys.stderr)
@@ -98,15 +98,15 @@ def progress(total: int, as_lines: bool = False) -> Iterator[Callable[[], object
 
 
 class Delays:
-    """Tells each thing that is announced once, where someone watches."""
+    """Prints each announcement once, where someone watches."""
 
     def __init__(self) -> None:
-        self._told: set[str] = set()
+        self._announced: set[str] = set()
 
     def __call__(self, what: str) -> None:
         """A line on standard error, only in a terminal."""
-        if what not in self._told and sys.stderr.isatty():
-            self._told.add(what)
+        if what not in self._announced and sys.stderr.isatty():
+            self._announced.add(what)
             warn(f"{what} ...")
 
 
@@ -127,7 +127,7 @@ class PlainOutput:
 
     def write(self, text: str) -> int:
         """Write as a stream does."""
-        return self._do(lambda: self._stream.write(escaped(text, keep="\n")))
+        return self._do(lambda: self._stream.write(escaped(text, except_for="\n")))
 
     def write_name(self, path: Path) -> None:
         """The name of a file, on a line of its own."""

@@ -22,7 +22,7 @@ from ._scans import framing
 _NAMED = 3  # landmarks that a message names
 
 
-def check_place(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
+def check_on_scan(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
     """Raise InputError where landmarks of a file are not of this scan, or there are none."""
     if not found.is_defined.any():
         raise InputError("has no landmark that is placed", path, "Place some in the window first")
@@ -48,19 +48,19 @@ def put_on_surface(found: LandmarkSet, timeline: Timeline, frame: int) -> Landma
             continue
         surface = surface_of(timeline, timeline.visit(index))
         for column in columns:
-            place = surface.nearest(positions[row, column])
-            if place is None:
+            position = surface.nearest(positions[row, column])
+            if position is None:
                 astray.append(found.names[column])
             else:
-                moves.append(float(np.linalg.norm(place - positions[row, column])))
-                positions[row, column] = place
+                moves.append(float(np.linalg.norm(position - positions[row, column])))
+                positions[row, column] = position
     unit = timeline.unit
     if max(moves) > 0:
         mean = np.mean(moves[1:])
         tell(f"landmarks are moved onto the surface by up to {max(moves):.3g} {unit}, {mean:.3g} on average")
     if astray:
         few = ", ".join(f"'{name}'" for name in list(dict.fromkeys(astray))[:_NAMED])
-        warn(f"{len(astray)} places lie off the surface and stay there, such as {few}")
+        warn(f"{len(astray)} positions lie off the surface and stay there, such as {few}")
     return replace(found, positions=positions)
 
 

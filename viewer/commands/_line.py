@@ -1,4 +1,4 @@
-"""A command line is run, and what becomes of it is told."""
+"""Runs a command line, and reports how it ends."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def run(words: Sequence[str], then_ends: bool = False) -> int:
     try:
         with redirect_stdout(output):
             code = _run(words)
-        output.flush()  # here, where it can be told that this fails
+        output.flush()  # here, where a failure can still be reported
         return code
     except ReaderGone:
         return 1
@@ -111,7 +111,7 @@ def prepare_streams() -> None:
     """Make the standard streams of this process such that printing can fail, but do no harm.
 
     What they cannot show is escaped, but for names of files where no terminal shows them. Those that are
-    closed are opened on nothing, so that no other file takes their place; standard output still fails then.
+    closed are opened on nothing, so that no other file gets their number; standard output still fails then.
     """
     modes = (("stdin", os.O_RDONLY, "r"), ("stdout", os.O_RDONLY, "w"), ("stderr", os.O_WRONLY, "w"))
     for number, (name, flags, mode) in enumerate(modes):

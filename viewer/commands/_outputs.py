@@ -22,7 +22,7 @@ def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
     """Raise InputError, before any work, where these files are not to be written.
 
     Refused are inputs of the command, under whatever name (links as well); and what is there already, unless
-    force is told or a person at the terminal agrees. inputs: they need not be there.
+    force is set or a person at the terminal agrees. inputs: they need not be there.
     """
     for path in found_among(outputs, inputs):
         raise InputError("is read by this command, and is not replaced", path, "Write to another file")

@@ -53,7 +53,7 @@ class _Parser(ArgumentParser):
 
     @property
     def see(self) -> str:
-        """The place where more is told."""
+        """A hint where to find more."""
         return f"See '{self.prog} --help'"
 
     @property
@@ -89,7 +89,7 @@ class _Parser(ArgumentParser):
         option = None  # that the word before belongs to
         for word in words:
             action = self.options.get(option or "")
-            is_first = single[-1:] == [option]  # which is told to be wrong, where it is
+            is_first = single[-1:] == [option]  # an error names it, if it is wrong
             if action and not _is_option(word) and (is_first or _is_meant(word, action)):
                 if is_first:
                     single.pop()
@@ -208,7 +208,7 @@ def _no_command(words: Sequence[str], commands: Sequence[str]) -> InputError:
 
 
 def _too_many(words: Sequence[str], parser: _Parser) -> InputError:
-    """The error for words that the command has no place for."""
+    """The error for words that the command does not take."""
     more = ", ".join(f"'{shortened(word)}'" for word in words[:_MOST_NAMED])
     rest = ", ..." if len(words) > _MOST_NAMED else ""
     what = f"{more}{rest}: too much, as '{parser.prog}' takes {parser.takes or 'options alone'}"

@@ -56,7 +56,7 @@ def planned(args: Namespace) -> Iterator[Plan]:
 
 
 def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
-    """The files that the scans of the entries are read from; what is wrong with these is told later."""
+    """The files that the scans of the entries are read from; errors in these come later."""
     for scan in dict.fromkeys(args.scan or entry.scan for entry in entries):
         with suppress(InputError):
             if scan is not None:
@@ -149,10 +149,12 @@ def _completed(
     if not (entry.anonymous or args.anonymous):
         return shown
     time = float(request.pose.time)
-    place = matrix_of(request.layers.place)
+    world_from_pose = matrix_of(request.layers.world_from_pose)
     if not entry.anonymous:
         shown = shown.drawn_from(middle_of(timeline.pose(entry.pose)))
-    return replace(shown, time=time, camera=request.camera, look=request.look, place=place).without_names()
+    return replace(
+        shown, time=time, camera=request.camera, look=request.look, place=world_from_pose
+    ).without_names()
 
 
 def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry]) -> bool:
@@ -186,13 +188,13 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Time
 def _open(scan: str, path: Path) -> tuple[str, Timeline]:
     """A scan that a recording names, and how it was found: beside the recording, or as it is named.
 
-    Raises InputError where it is in neither place, or unusable.
+    Raises InputError where it is in neither folder, or unusable.
     """
-    for place in places_to_open(scan, path):
+    for folder in places_to_open(scan, path):
         try:
-            return place, open_scan(place)
+            return folder, open_scan(folder)
         except InputError as error:
-            if os.path.exists(place):
+            if os.path.exists(folder):
                 raise
             missing = error
     if is_demo(scan) or os.path.isabs(scan):

@@ -24,7 +24,7 @@ from ..scan.open import entries, open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import TIMES_FILE, frame_in_words
-from ..scan.upright import UNTOLD, Upright
+from ..scan.upright import UNKNOWN, Upright
 from ._console import warn
 
 _FRAMED = 5  # poses that a camera is fitted to
@@ -85,7 +85,7 @@ def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
     where none is left.
     """
     said, found = 0, False
-    for place, index in enumerate(indices):
+    for number, index in enumerate(indices):
         try:
             pose = timeline.pose(index)
         except InputError:
@@ -94,8 +94,8 @@ def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
             said = report(timeline, said)
             continue
         said, found = report(timeline, said), True
-        if place + 1 < len(indices):
-            timeline.request(indices[place + 1])
+        if number + 1 < len(indices):
+            timeline.request(indices[number + 1])
         yield pose
     if not found:
         raise InputError(f"none of its {len(indices)} frames can be read", timeline.name)
@@ -117,14 +117,14 @@ def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:
     return Bounds.of_frames(boxes[0], boxes)
 
 
-def told_upright(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> Upright:
-    """The up and the front: as the arguments tell, else as is guessed of the first of these poses that can
-    be read."""
+def stated_upright(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> Upright:
+    """The up axis and the front: from the arguments, else guessed from the first readable one of these
+    poses."""
     if args.up:
-        return Upright(args.up, "as told", 1.0)
+        return Upright(args.up, "as stated", 1.0)
     with suppress(InputError):
         return first_readable(timeline, indices).upright
-    return UNTOLD
+    return UNKNOWN
 
 
 def frame_title(timeline: Timeline, index: int) -> str:
@@ -196,15 +196,15 @@ def _check_times_file(path: Path, names: set[str]) -> None:
         return
     try:
         with open(path, newline="", encoding="utf-8") as stream:
-            told = {text_of_cell(row[0]) for row in csv.reader(stream) if row}
+            listed = {text_of_cell(row[0]) for row in csv.reader(stream) if row}
     except (OSError, UnicodeDecodeError, csv.Error):
-        told = {"?"}
-    if told - names - {"file"}:
+        listed = {"?"}
+    if listed - names - {"file"}:
         raise InputError("holds the times of other files", path, "Write into a folder of its own")
 
 
 def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
-    """Raise InputError where a times.csv beside these outputs would have to tell when other frames are.
+    """Raise InputError where a times.csv beside these outputs would have to state the times of other frames.
 
     These are files of the same kind, and several of another one: a single file needs no times. Those in a
     folder `frames` as well, and those of the scan itself that are in several folders.
@@ -216,7 +216,7 @@ def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
         found += [file for file in timeline.files if file.parent != folder]
     kinds = Counter(file.suffix.lower() for file in found)
     if kinds[out.suffix.lower()] or any(count > 1 for count in kinds.values()):
-        what = f"holds other frames, such as {found[0].name}, whose times its {TIMES_FILE} would not tell"
+        what = f"holds other frames, such as {found[0].name}, whose times its {TIMES_FILE} would not state"
         raise InputError(what, folder, "Write into a folder of its own")
 
 

@@ -30,7 +30,7 @@ from ..scan.range_folders._pictures import read_color
 from . import _drawing as drawing
 from ._console import progress, say, tell, warn
 from ._outputs import claim
-from ._scans import chosen_poses, frame_title, open_timeline, read_poses, told_upright
+from ._scans import chosen_poses, frame_title, open_timeline, read_poses, stated_upright
 
 BACKEND = "codeword"
 _SUFFIXES = (".png", ".npz", FILM_SUFFIX, SUFFIX)
@@ -92,7 +92,7 @@ def _draw(args: Namespace) -> None:
         indices, size = chosen_poses(args, timeline) or [0], args.size or _SIZE
         shots = drawing.shots(indices, args.turntable)
         check_output(args.out, _SUFFIXES, several=len(shots) > 1)
-        upright = told_upright(args, timeline, indices)
+        upright = stated_upright(args, timeline, indices)
         if "up" not in dict(args.look):
             look = replace(look, up=upright.up)
         inputs = [*scan_inputs(timeline), *_given(args.camera), *_given(args.behind)]
@@ -131,7 +131,7 @@ def _background(path: Path | None, size: tuple[int, int]) -> NDArray[np.uint8] |
 
 def _params(args: Namespace) -> Params:
     params = parse(Params, dict(args.set), f"parameter of '{BACKEND}'")
-    params.steps  # noqa: B018  # wrong ones are told before anything is read
+    params.steps  # noqa: B018  # refuses wrong ones before anything is read
     return params
 
 
@@ -158,8 +158,8 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
         return pose.with_cloud(replace(pose.cloud, **found))
     except ImportError:  # the library that finds neighbours is linked to EGL
         effects = {"normals": "discs face the eye", "radii": "they are of one size"}
-        told = " and ".join(effects[name] for name in missing)
-        warn(f"no {' and '.join(missing)} can be estimated here: {told}")
+        effect = " and ".join(effects[name] for name in missing)
+        warn(f"no {' and '.join(missing)} can be estimated here: {effect}")
         return pose
 
 

@@ -107,7 +107,7 @@ def _eye(text: str) -> tuple[float, ...]:
     except ValueError:
         eye = ()
     if len(eye) != 3 or not all(map(math.isfinite, eye)):
-        raise ArgumentTypeError(f"'{text}' is not a place X,Y,Z such as 0,1.5,3")
+        raise ArgumentTypeError(f"'{text}' is not a position X,Y,Z such as 0,1.5,3")
     return eye
 
 
@@ -141,21 +141,21 @@ class _Poses:
 
     def counts(self) -> str:
         """How many points are seen, as a line."""
-        told = f"{sum(self._seen):,} of {self._all:,} points are seen"
+        stated = f"{sum(self._seen):,} of {self._all:,} points are seen"
         each = f", {min(self._seen):,} to {max(self._seen):,} in each of {len(self._seen)} poses"
-        return told + (each if len(self._seen) > 1 else "")
+        return stated + (each if len(self._seen) > 1 else "")
 
 
 def _stop(args: Namespace) -> Stop | None:
     """The rule by which octrees end; None: the default. Raises InputError where there are no octrees."""
-    told: dict[str, Any] = {}
+    stated: dict[str, Any] = {}
     if args.delta is not None:
-        told = {"rule": "delta", "delta": args.delta}
+        stated = {"rule": "delta", "delta": args.delta}
     elif args.depth is not None:
-        told = {"rule": "depth", "depth": args.depth}
-    if told and args.out.suffix.lower() not in formats.scan_suffixes():
-        raise InputError(f"--{told['rule']} is for octrees", args.out, "Write a .svo, or leave it out")
-    return Stop(**told) if told else None
+        stated = {"rule": "depth", "depth": args.depth}
+    if stated and args.out.suffix.lower() not in formats.scan_suffixes():
+        raise InputError(f"--{stated['rule']} is for octrees", args.out, "Write a .svo, or leave it out")
+    return Stop(**stated) if stated else None
 
 
 def _write_scan(

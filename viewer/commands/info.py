@@ -105,13 +105,13 @@ class _Found:
 
     def add(self, positions: NDArray[np.float32], attributes: Mapping[str, NDArray]) -> None:
         """Add points, (n, 3), and their attributes."""
-        keep = finite_rows(positions)
-        kept = positions if keep is None else positions[keep]
-        self.count, self.dropped = self.count + len(kept), self.dropped + len(positions) - len(kept)
-        self.low = np.minimum(self.low, kept.min(axis=0, initial=np.inf))
-        self.high = np.maximum(self.high, kept.max(axis=0, initial=-np.inf))
+        is_finite = finite_rows(positions)
+        retained = positions if is_finite is None else positions[is_finite]
+        self.count, self.dropped = self.count + len(retained), self.dropped + len(positions) - len(retained)
+        self.low = np.minimum(self.low, retained.min(axis=0, initial=np.inf))
+        self.high = np.maximum(self.high, retained.max(axis=0, initial=-np.inf))
         for name, values in attributes.items():
-            both = [self.ranges[name], _range(values if keep is None else values[keep])]
+            both = [self.ranges[name], _range(values if is_finite is None else values[is_finite])]
             self.ranges[name] = _range(np.array([span for span in both if span is not None]))
 
 
@@ -150,9 +150,9 @@ def _view_facts(view: RangeView) -> dict[str, Any]:
     return facts | ({"assumed": view.assumed} if view.assumed else {})
 
 
-def _told(view: dict[str, Any]) -> str:
-    told = "{}, {} x {} pixels".format(view["name"], *view["size"])
-    return f"{told}; {view['assumed']}" if "assumed" in view else told
+def _shown_view(view: dict[str, Any]) -> str:
+    text = "{}, {} x {} pixels".format(view["name"], *view["size"])
+    return f"{text}; {view['assumed']}" if "assumed" in view else text
 
 
 def _attributes(cloud: PointCloud) -> dict[str, NDArray]:
@@ -182,7 +182,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         ("pose", f"{facts['pose']}, {facts['label']}"),
         *([("unreadable", f"{broken} of {broken + 1} poses that were tried")] if broken else []),
         ("points", points),
-        *(("view", _told(view)) for view in facts["views"]),
+        *(("view", _shown_view(view)) for view in facts["views"]),
         *(("beside", text) for text in facts["beside"]),
         ("unit", unit),
         ("size", " x ".join(f"{b - a:g}" for a, b in zip(low, high, strict=True))),
@@ -200,14 +200,14 @@ def _as_text(facts: dict[str, Any]) -> str:
 
 def _stream_as_text(facts: dict[str, Any]) -> str:
     depth = facts["depth"]
-    told = "finer than Z" if facts["finer"] else f"to {depth['error']:.3g}"
+    text = "finer than Z" if facts["finer"] else f"to {depth['error']:.3g}"
     rows = [
         ("code words", facts["name"]),
         ("picture", "{} x {} pixels".format(*facts["size"])),
         ("strips", f"{facts['strips']}"),
         ("words", f"{facts['words']:,}, {facts['tiles']:,} of them tiles, of {facts['elements']:,} elements"),
         ("projection", facts["projection"]),
-        ("depth", f"{depth['nearest']:g} to {depth['farthest']:g}, {told}"),
+        ("depth", f"{depth['nearest']:g} to {depth['farthest']:g}, {text}"),
         ("materials", f"{facts['materials']}"),
         ("background", ", ".join(map(str, facts["background"]))),
         ("memory", f"{facts['bytes'] / 1e6:.1f} MB"),
@@ -219,7 +219,7 @@ def _stream_as_text(facts: dict[str, Any]) -> str:
 
 
 def _in_columns(rows: Sequence[tuple[str, Any]]) -> str:
-    """Names and what is told of each, below one another."""
+    """Names and their values, below one another."""
     shown = [(escaped(shortened(name)), escaped(str(value))) for name, value in rows]
     width = max(len(name) for name, _ in shown)
     return "\n".join(f"{name:{width}}  {value}" for name, value in shown)

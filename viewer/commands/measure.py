@@ -61,7 +61,7 @@ from ..scan.timeline import Timeline
 from ..scan.units import Scale
 from ..task import Task
 from ._console import progress, tell, warn
-from ._followed import check_place, put_on_surface, tracks_in_frames, with_noise
+from ._followed import check_on_scan, put_on_surface, tracks_in_frames, with_noise
 from ._outputs import add_force_argument, claim
 from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline
 
@@ -166,7 +166,7 @@ def run(args: Namespace) -> int:
             warn(f"{args.landmarks}: {told}")
         frame = indices[0] if args.placed_in is None else args.placed_in
         timeline.label(frame)  # raises where there is none
-        check_place(args.landmarks, found, timeline)
+        check_on_scan(args.landmarks, found, timeline)
         with _shown(f"Measuring {timeline.name}"):
             if not args.no_snap:
                 found = put_on_surface(found, timeline, frame)

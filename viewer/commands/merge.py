@@ -1,8 +1,8 @@
 """Merge the range views of each pose into one surface.
 
-Where several views show a patch, the view that sees it best keeps it. OUT is a .exr file of range views, or
-the remaining points as .ply, .pcd or .npz. A sequence needs a numbered pattern such as out%04d.exr; Scan4D
-writes the times into times.csv beside it.
+Where several views show a patch, the view that sees it best contributes it. OUT is a .exr file of range
+views, or the remaining points as .ply, .pcd or .npz. A sequence needs a numbered pattern such as
+out%04d.exr; Scan4D writes the times into times.csv beside it.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ from ._scans import (
     frame_title,
     open_timeline,
     read_poses,
-    told_upright,
+    stated_upright,
 )
 
 _SIZE = (1920, 1280)
@@ -154,7 +154,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
     look, values, goal = parse(Look, dict(args.look), "look"), dict(args.set), goal_of(args)
     name = None if args.backend == AUTO else args.backend
     if name:
-        find_backend(name).params(values)  # wrong names are told before anything is read
+        find_backend(name).params(values)  # refuses wrong names before anything is read
     camera = Camera.load(args.camera) if args.camera else None
     scan, size = args.scan or DEMO, args.size or _SIZE
     with open_timeline(args, scan) as timeline:
@@ -162,7 +162,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         shots = drawing.shots(indices, args.turntable)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
         outputs = drawing.outputs(args.out, [shot.number for shot in shots], args.stats)
-        upright = told_upright(args, timeline, indices)
+        upright = stated_upright(args, timeline, indices)
         if "up" not in dict(args.look):
             look = replace(look, up=upright.up)
         look = replace(look, quality="fast" if goal else args.quality or look.quality)

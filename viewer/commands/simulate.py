@@ -57,15 +57,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_force_argument(parser)
     add_pose_arguments(parser)
     pods = parser.add_argument_group("scanner")
-    places = pods.add_mutually_exclusive_group()
-    places.add_argument(
+    arrangement = pods.add_mutually_exclusive_group()
+    arrangement.add_argument(
         "--pods",
         type=int,
         default=2,
         metavar="N",
         help="number of pods, 1 to 8; default 2, left and right of the front",
     )
-    places.add_argument(
+    arrangement.add_argument(
         "--azimuths", type=float, nargs="+", action="extend", metavar="A", help="azimuth of each pod, degrees"
     )
     pods.add_argument(
@@ -164,7 +164,7 @@ def _mesh_maker(timeline: Timeline, shared: Path | None, first: int) -> Callable
     """A function from a pose to the mesh to scan: its points with its faces, or the demo's own surface.
 
     shared: the file that has the faces of all poses. first: the pose whose faces are asked for at once, so
-    that one without is told before all are looked at.
+    the first without ends the search.
     """
     if isinstance(source := timeline.source, DemoSource) and shared is None:
         from ..bench.truth.head_mesh import head_mesh

@@ -29,7 +29,7 @@ from ..scan.timeline import Timeline
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
-from ._scans import SCAN_HELP, framing, open_timeline, read_poses, told_upright
+from ._scans import SCAN_HELP, framing, open_timeline, read_poses, stated_upright
 from .doctor import display
 
 _SIZE = (1200, 800)
@@ -50,7 +50,7 @@ def run(args: Namespace) -> int:
     with ExitStack() as opened:
         refused: InputError | None = None
         problems: list[InputError] = []
-        try:  # what is wrong is told before anything is drawn
+        try:  # errors come before anything is drawn
             named = _named(args.scans or [DEMO])
             scans, problems = named_scans(named.scans)
             if not scans:
@@ -154,7 +154,7 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     """Draw all poses of a scan into the folder, and say what is there."""
     name = _stem(args.fallback, prefix, timeline)
     indices = list(range(len(timeline)))
-    upright = told_upright(args, timeline, indices)
+    upright = stated_upright(args, timeline, indices)
     on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
     fps = drawing.film_rate(timeline, indices, args.fps)
     thumbnails = []

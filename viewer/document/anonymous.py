@@ -36,7 +36,7 @@ def anonymous_request(request: Request, start: float) -> Request:
     pose = request.pose
     middle = middle_of(pose)
     look = raised(unnamed(request.look, request.layers.names(pose.overview.scalars)), -middle)
-    layers = replace(request.layers, place=request.layers.place.in_frame(middle))
+    layers = replace(request.layers, world_from_pose=request.layers.world_from_pose.in_frame(middle))
     anonymous, camera = anonymous_pose(pose, start), request.camera.moved(-middle)
     return replace(request, pose=anonymous, camera=camera, look=look, layers=layers)
 

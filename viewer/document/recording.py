@@ -168,7 +168,7 @@ class Entry:
         entry = cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
-            shown_unit, matrix_of(layers.place),
+            shown_unit, matrix_of(layers.world_from_pose),
             notes=notes if marks.notes else (),
             scale=1.0 if choice is None else choice.way.scale,
             automatic=None if choice is None else choice.told,
@@ -189,7 +189,7 @@ class Entry:
 
     def request(self, pose: Pose) -> Request:
         """The picture to draw. pose: number `self.pose` of the scan."""
-        layers = NO_LAYERS if self.place is None else Layers(place=self.motion)
+        layers = NO_LAYERS if self.place is None else Layers(world_from_pose=self.motion)
         return Request(pose, self.camera, self.backend, self.params, self.look, layers)
 
     @property

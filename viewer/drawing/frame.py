@@ -276,8 +276,8 @@ def render(
     renderer, layers = shared_renderer(), layers or NO_LAYERS
     resident = renderer.resident(pose)
     name, chosen = backend_for(pose, backend, params)
-    views = pose.views if layers.place.is_identity else ()
-    bounds = layers.place.bounds(resident.bounds)
+    views = pose.views if layers.world_from_pose.is_identity else ()
+    bounds = layers.world_from_pose.bounds(resident.bounds)
     request = Request(
         pose=pose,
         camera=camera or first_camera(views, bounds, size[0] / size[1], pose.upright),

@@ -86,7 +86,7 @@ def colorable(request: Request) -> Request:
 
 def view_of(request: Request, size: tuple[int, int]) -> View:
     """The view that a request shows its pose by, in a picture of this size, pixels."""
-    pose, camera, place = request.pose, request.camera, request.layers.place
+    pose, camera, place = request.pose, request.camera, request.layers.world_from_pose
     origin = origin_near(camera, size, pose.origin, place)
     bounds = drawn_bounds(pose, camera)
     return View.of(camera, size, origin, bounds, place).straightened(bounds)

@@ -90,7 +90,7 @@ def shade(surface: Surface, look: Look) -> None:
             "BY_LOG": int(by_log),
             "LIGHT": _LIGHT_CODES[light],
             "EYE_DOME": int(eye_dome),
-            "TURNED": int(not surface.layers.place.is_identity),
+            "TURNED": int(not surface.layers.world_from_pose.is_identity),
             "HAS_IDS": int(has_ids),
             **surface.sample_defines(by_sample),
             "LEVEL_COLORS": len(LEVEL_COLORS) if by_level else 0,
@@ -167,7 +167,7 @@ def _shading(surface: Surface, look: Look, by_log: bool) -> _Shading:
         plain=_fractions(look.plain),
         background=_fractions(look.background),
         height_axis=(*surface.height_axis, 0.0),
-        to_world=_columns(surface.layers.place.rotation),
+        to_world=_columns(surface.layers.world_from_pose.rotation),
         light=(*light_direction(look), 0.0),
         phong=(look.ambient, look.diffuse, look.specular, look.shininess),
         value_range=ends,
@@ -205,7 +205,7 @@ def value_range(surface: Surface, look: Look) -> tuple[float, float]:
     elif source == "depth":
         low, high = robust_range(surface.view.depths(pose.sample) + surface.view.base)
     elif source == "height":
-        world = surface.layers.place.points(pose.sample + pose.origin)
+        world = surface.layers.world_from_pose.points(pose.sample + pose.origin)
         low, high = robust_range(world @ up_vector(look.up))
     else:
         low, high = surface.scalar_range(source or "", pose)

@@ -87,7 +87,7 @@ class Surface(RenderTarget):
         length = np.linalg.norm(fetched, axis=2, keepdims=True)
         usable = np.isfinite(length) & (length > 0)
         along_pose = np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
-        return self.layers.place.directions(along_pose)
+        return self.layers.world_from_pose.directions(along_pose)
 
     @property
     def coverage(self) -> NDArray[np.float32]:
@@ -267,7 +267,9 @@ class Surface(RenderTarget):
         assert find is not None
         if source != "height":
             return find(rows)
-        return self.layers.place.points(find(rows) + self.pose.pose.origin) @ up_vector(self.look.up)
+        return self.layers.world_from_pose.points(find(rows) + self.pose.pose.origin) @ up_vector(
+            self.look.up
+        )
 
     def _points_of(self, rows: NDArray) -> NDArray:
         """Rows in `scan` of the points that rows (n,) stand for; see `point_of`."""

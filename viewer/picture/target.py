@@ -404,7 +404,7 @@ class RenderTarget:
         far from zero keep their steps."""
         source = self.value_source
         if source == "height":
-            return float(self.layers.place.points(self.pose.origin) @ up_vector(self.look.up))
+            return float(self.layers.world_from_pose.points(self.pose.origin) @ up_vector(self.look.up))
         if source == "depth":
             return self.view.base
         if source is None or source in self.finds:
@@ -437,7 +437,7 @@ class RenderTarget:
     def height_axis(self) -> tuple[float, float, float]:
         """The look's up along the pose's axes."""
         up = np.array(up_vector(self.look.up), np.float64)
-        x, y, z = (float(v) for v in self.layers.place.inverse.directions(up))
+        x, y, z = (float(v) for v in self.layers.world_from_pose.inverse.directions(up))
         return x, y, z
 
     @property

@@ -14,9 +14,9 @@ _DEFAULT_BUDGET = 1 << 30
 
 
 def default_budget() -> int:
-    """Bytes of poses to keep: 1 GiB, or what SCAN4D_CACHE_MB says."""
-    told = megabytes(BUDGET_VARIABLE)
-    return _DEFAULT_BUDGET if told is None else told
+    """Bytes of poses to hold: 1 GiB, or what SCAN4D_CACHE_MB says."""
+    stated = megabytes(BUDGET_VARIABLE)
+    return _DEFAULT_BUDGET if stated is None else stated
 
 
 def megabytes(variable: str) -> int | None:
@@ -68,14 +68,14 @@ class PoseCache:
             self._poses.move_to_end(index)
         return pose
 
-    def put(self, pose: Pose, keep: Callable[[int], bool] = lambda _: False) -> bool:
-        """Hold this pose and evict others for it, but none to `keep`; False where it does not fit."""
+    def put(self, pose: Pose, is_needed: Callable[[int], bool] = lambda _: False) -> bool:
+        """Hold this pose and evict others for it, but none that `is_needed`; False where it does not fit."""
         self._drop(pose.index)
         room, needed, victims = self.budget - self.nbytes, pose.nbytes, []
         for index in self._poses:
             if room >= needed:
                 break
-            if not keep(index):
+            if not is_needed(index):
                 victims.append(index)
                 room += self._sizes[index]
         if room < needed:
@@ -88,7 +88,7 @@ class PoseCache:
         return True
 
     def exchange(self, change: Callable[[Pose], Pose]) -> None:
-        """Hold what a function makes of each pose in its place, which has the same points."""
+        """Hold what a function makes of each pose instead of it; it has the same points."""
         for index, pose in self._poses.items():
             self._poses[index] = change(pose)
 

@@ -1,6 +1,6 @@
 """Colours between the 8-bit sRGB of files and points and the linear half that range views may have.
 
-Every 8-bit value survives the way to half and back.
+Every 8-bit value survives the conversion to half and back.
 """
 
 from __future__ import annotations

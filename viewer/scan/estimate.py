@@ -72,7 +72,7 @@ def cloud_normals(cloud: PointCloud, viewpoint: ArrayLike | None = None) -> NDAr
 def cloud_radii(cloud: PointCloud, k: int = 7) -> NDArray[np.float32]:
     """Splat radii that close the surface between points, (N,) float32, scan units, above 0.
 
-    The distance to the k-th nearest other point, so that about k splats overlap at each place
+    The distance to the k-th nearest other point, so that about k splats overlap everywhere
     (on a square grid of spacing s: s sqrt(2)), kept within a factor of two of what is usual
     among those neighbours, so that a stray point does not get a huge splat. 1 where all points
     coincide.
@@ -105,7 +105,7 @@ def _in_lines(points: Vectors, near: NDArray[np.int32]) -> NDArray[np.intp]:
     as far as float32 tells, which points were stored in."""
     rows = np.arange(len(points))
     rounding = 4 * _FLOAT.eps * np.maximum(np.abs(points), np.abs(points[near[:, -1]])).max(axis=1)
-    for column in range(1, near.shape[1] - 1):  # most points are told by the first
+    for column in range(1, near.shape[1] - 1):  # the first decides most points
         off, along = (points[near[rows, to]] - points[rows] for to in (column, -1))
         aside = np.linalg.norm(np.cross(off, along), axis=1)
         rows = rows[aside <= rounding[rows] * np.linalg.norm(along, axis=1)]

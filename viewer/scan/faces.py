@@ -66,8 +66,8 @@ class Faces:
             return self.corners.reshape(-1, 3)
         fans = np.maximum(self.sizes.astype(np.int64), 2) - 2  # triangles of each polygon
         first = np.repeat(np.cumsum(self.sizes, dtype=np.int64) - self.sizes, fans)
-        place = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)  # in its fan
-        return self.corners[np.stack([first, first + place + 1, first + place + 2], axis=1)]
+        step = np.arange(len(first)) - np.repeat(np.cumsum(fans) - fans, fans)  # in its fan
+        return self.corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
 
 
 def topology(points: int, pieces: Iterable[Faces]) -> str | None:

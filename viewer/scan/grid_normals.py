@@ -1,6 +1,6 @@
 """Normals of a range image: of a plane through each pixel and its neighbours.
 
-In a pinhole's picture, one over the depth of a plane is linear in the pixel's place, and in a parallel
+In a pinhole's picture, one over the depth of a plane is linear in the pixel's position, and in a parallel
 projection the depth itself, so that the plane is found by linear least squares (Badino et al. 2011).
 """
 
@@ -21,26 +21,26 @@ def normals_of_grid(
     focal: tuple[float, float],
     center: tuple[float, float],
     parallel: bool = False,
-    places: NDArray[np.floating] | None = None,
+    positions: NDArray[np.floating] | None = None,
 ) -> NDArray[np.float64]:
     """Normals of the pixels that have a depth, in row order, (N, 3), of unit length, towards the eye, in
     camera space (right, up, back).
 
     depth: (H, W), along the view axis; NaN: none. focal, center: pixels; of a parallel projection, focal is
-    pixels for a unit of depth. places: (2, H, W), how far right and down of the center the pixels see, in
-    pixels, where that is not their own place. Neighbours across an edge, whose depth steps by more than ten
+    pixels for a unit of depth. positions: (2, H, W), what the pixels see, in pixels right and down of the
+    center; None: their own positions. Neighbours across an edge, whose depth steps by more than ten
     pixel footprints, do not count. Pixels whose neighbours span no plane face the eye.
     """
     height, width = depth.shape
     around = np.pad(np.asarray(depth, np.float64), _REACH, constant_values=np.nan)
-    if places is not None:
-        seen = np.where(np.isfinite(depth), places, 0.0)
-        places = np.pad(seen, ((0, 0), (_REACH, _REACH), (_REACH, _REACH)))
+    if positions is not None:
+        seen = np.where(np.isfinite(depth), positions, 0.0)
+        positions = np.pad(seen, ((0, 0), (_REACH, _REACH), (_REACH, _REACH)))
     rows = max(1, _AT_ONCE // width)
     parts = []
     for top in range(0, height, rows):
         strip = slice(top, top + rows + 2 * _REACH)
-        own = None if places is None else places[:, strip]
+        own = None if positions is None else positions[:, strip]
         parts.append(_normals(around[strip], top, focal, center, parallel, own))
     return np.concatenate(parts)
 
@@ -51,11 +51,11 @@ def _normals(
     focal: tuple[float, float],
     center: tuple[float, float],
     parallel: bool,
-    places: NDArray[np.floating] | None,
+    positions: NDArray[np.floating] | None,
 ) -> NDArray[np.float64]:
-    """Normals of a strip of rows, the first of which is `top`. around: its depths, places: those of its
+    """Normals of a strip of rows, the first of which is `top`. around: its depths, positions: those of its
     pixels, both with a margin."""
-    slope_x, slope_y, level, seen = _fit(around, STEEPEST / min(focal), parallel, places)
+    slope_x, slope_y, level, seen = _fit(around, STEEPEST / min(focal), parallel, positions)
     alone = np.isnan(slope_x)
     across = np.stack([slope_x * focal[0], -slope_y * focal[1]], axis=1)
     if parallel:  # depth rises by `across` with a unit to the right and one up
@@ -63,10 +63,10 @@ def _normals(
         normals = np.column_stack([across, np.ones(len(across))])
         return normals / np.linalg.norm(normals, axis=1, keepdims=True)
     row, column = np.nonzero(seen)
-    if places is None:
+    if positions is None:
         right, down = column + 0.5 - center[0], row + top + 0.5 - center[1]
     else:
-        right, down = places[:, _REACH + row, _REACH + column]
+        right, down = positions[:, _REACH + row, _REACH + column]
     ray = np.stack([right / focal[0], -down / focal[1]], axis=1)
     # Along a ray (x, y, -1), depth of the pixel / depth of the plane = away . (x, y, -1).
     away = np.column_stack([across, (across * ray).sum(axis=1) - level])
@@ -75,7 +75,7 @@ def _normals(
 
 
 def _fit(
-    around: NDArray[np.float64], steepest: float, parallel: bool, places: NDArray[np.floating] | None
+    around: NDArray[np.float64], steepest: float, parallel: bool, positions: NDArray[np.floating] | None
 ) -> tuple[NDArray, NDArray, NDArray, NDArray[np.bool_]]:
     """How a value changes with a pixel to the right and one down, and what it is at the pixel, for those with
     a depth, (N,); NaN where neighbours span no plane. And which they are, (H, W).
@@ -97,16 +97,16 @@ def _fit(
             else:
                 same = np.abs(other - depth) <= steepest * np.minimum(other, depth)
                 change = np.divide(depth, other, out=np.ones_like(depth), where=same) - 1
-            if places is None:
+            if positions is None:
                 x, y = right - _REACH, down - _REACH
             else:
-                x, y = places[:, *there] - places[:, *own]
+                x, y = positions[:, *there] - positions[:, *own]
             weight = _WEIGHTS[down] * _WEIGHTS[right] * same
             value = weight * change
-            for place, term in enumerate((1, x, y, x * x, x * y, y * y)):
-                sums[place] += weight * term
-            for place, term in enumerate((1, x, y), 6):
-                sums[place] += value * term
+            for term_number, term in enumerate((1, x, y, x * x, x * y, y * y)):
+                sums[term_number] += weight * term
+            for term_number, term in enumerate((1, x, y), 6):
+                sums[term_number] += value * term
     seen = np.isfinite(depth)
     total, x, y, xx, xy, yy, value, value_x, value_y = sums[:, seen]
     xx, xy, yy = xx - x * x / total, xy - x * y / total, yy - y * y / total

@@ -23,7 +23,7 @@ def view_of_camera(
 
     grid: (H, W, 3) in the image's axes (x right, y down, z ahead), the top row first; not finite: no sample.
     The pinhole is fitted by least squares. Where its rays do not meet all points up to rounding, x and y are
-    kept as measured.
+    stored as measured.
     """
     valid = np.isfinite(grid).all(axis=2)
     seen = np.flatnonzero(valid)
@@ -31,11 +31,11 @@ def view_of_camera(
         return None
     some = np.unravel_index(seen[:: max(1, len(seen) // _SAMPLE)], valid.shape)
     points = grid[some].astype(np.float64)
-    places = points[:, :2] / points[:, 2:]
-    if not (np.ptp(places, axis=0) > 0).all():
+    rays = points[:, :2] / points[:, 2:]
+    if not (np.ptp(rays, axis=0) > 0).all():
         return None
     row, column = some
-    (fx, cx), (fy, cy) = _line(places[:, 0], column + 0.5), _line(places[:, 1], row + 0.5)
+    (fx, cx), (fy, cy) = _line(rays[:, 0], column + 0.5), _line(rays[:, 1], row + 0.5)
     pinhole = fx, fy, cx, cy
     apart = np.median(_apart(points, row, column, pinhole))
     if min(fx, fy) <= 0 or not apart <= _MOST_APART * max(valid.shape):
@@ -86,7 +86,7 @@ def view_of_grid(grid: NDArray[np.floating], to_grid: NDArray[np.float64], name:
     """The range view of measured points, a height field over the plane that its rows and columns go along.
 
     grid: (H, W, 3), the top row first, seen from the side where its columns go to the right; not finite: no
-    sample. to_grid: (4, 4) from the world to the grid's coordinates. Its x and y are kept as measured. The
+    sample. to_grid: (4, 4) from the world to the grid's coordinates. Its x and y are stored as measured. The
     calibration is the parallel one that fits rows and columns best, which a scanner's optics leave by some
     pixels. Raises InputError where the points lie along a line.
     """

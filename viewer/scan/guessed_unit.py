@@ -1,4 +1,4 @@
-"""Which unit a scan is in, where nothing tells: guessed of its size, for a user to agree with."""
+"""The likely unit of a scan whose files state none: guessed from its size, for the user to confirm."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _SUBJECTS = (
 
 
 def guess_unit(bounds: Bounds, up: str) -> tuple[str, str] | None:
-    """The unit that a scan of this size is likely to be in, and what it is of then; None where nothing tells.
+    """The likely unit of a scan of this size, and what it is a scan of then; None if no unit is likely.
 
-    up: as `first_elevation` takes it, which tells ground: that is surveyed in metres.
+    up: as `first_elevation` takes it, which recognises ground: that is surveyed in metres.
     """
     if first_elevation(bounds, up):
         return "m", "ground"

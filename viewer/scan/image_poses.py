@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..rigid import is_rigid
 
-UPRIGHT = np.eye(4)  # of a camera whose place nobody tells: the world is its own space
+UPRIGHT = np.eye(4)  # of a camera without a pose: the world is its own space
 IMAGE_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # +y down and +z ahead, to up and back; and from there
 _ROUNDED = 1e-2  # how far a rotation may be from orthonormal: files of three digits are
 

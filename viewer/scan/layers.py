@@ -19,11 +19,11 @@ class Layers:
 
     scalars: name -> (N,) array of any real type, by row of the pose's cloud; it has precedence over a scalar
     of the scan with that name. Scan4D does not upload the same array twice, even in other Layers; for other
-    numbers, give a new array. place: from the scan's coordinates to the world's.
+    numbers, give a new array. world_from_pose: from the scan's coordinates to the world's.
     """
 
     scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
-    place: Rigid = STILL
+    world_from_pose: Rigid = STILL
 
     def check(self, pose: Pose) -> None:
         """Raise InputError unless there is one number for each point."""

@@ -1,4 +1,4 @@
-"""Lens distortion as OpenCV has it: from where a pinhole sees a place to where the lens shows it, and back.
+"""Lens distortion as OpenCV has it: from where a pinhole sees a point to where the lens shows it, and back.
 
 Places are x and y at depth 1, x to the right and y down. With r² = x² + y² and the coefficients
 k1 k2 p1 p2 [k3 [k4 k5 k6]], the rest of which are 0:
@@ -19,7 +19,7 @@ COUNTS = (4, 5, 8)  # of coefficients
 _MOST_STEPS = 30  # of Newton's method; real lenses take 4
 _EXACT = 1e-14  # the step, at depth 1, after which it ends
 _ROUNDED = 1e-10  # how far what is found may be from what was looked for
-_ALONG = 16  # places looked at between the middle of the picture and another
+_ALONG = 16  # positions tried between the middle of the picture and another
 
 _Places = tuple[NDArray[np.float64], NDArray[np.float64]]
 
@@ -33,19 +33,19 @@ def distorted(x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequ
 
 
 def undistorted(x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float]) -> _Places:
-    """The places that the lens shows at x and y, any shape; NaN where it shows none there."""
+    """The pinhole's position for what the lens shows at x and y, any shape; NaN where it shows nothing."""
     with np.errstate(all="ignore"):
-        *_, (place_x, place_y, _) = _approached(x, y, coefficients, _EXACT)
-        seen_x, seen_y, *slopes = _seen(place_x, place_y, coefficients)
+        *_, (shown_x, shown_y, _) = _approached(x, y, coefficients, _EXACT)
+        seen_x, seen_y, *slopes = _seen(shown_x, shown_y, coefficients)
         lost = ~((np.abs(seen_x - x) < _ROUNDED) & (np.abs(seen_y - y) < _ROUNDED) & _upright(*slopes))
-    place_x[lost] = place_y[lost] = np.nan
-    return place_x, place_y
+    shown_x[lost] = shown_y[lost] = np.nan
+    return shown_x, shown_y
 
 
 def steps_to_undo(
     x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float], last: float
 ) -> int:
-    """The number of steps of Newton's method, from what is seen, of which none at these places, any shape, is
+    """The number of steps of Newton's method, from what is seen, of which none at these positions is
     longer than `last` at the end: what is missing then is about the square of that."""
     with np.errstate(all="ignore"):
         return sum(1 for _ in _approached(x, y, coefficients, last))
@@ -54,25 +54,24 @@ def steps_to_undo(
 def _approached(
     x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float], last: float
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64], float]]:
-    """The places that the lens shows at x and y, after each of Newton's steps, and the longest; until that is
-    below `last`."""
-    place_x, place_y = np.array(x, np.float64), np.array(y, np.float64)
+    """The position after each of Newton's steps, and the longest step; until that is below `last`."""
+    shown_x, shown_y = np.array(x, np.float64), np.array(y, np.float64)
     for _ in range(_MOST_STEPS):
-        seen_x, seen_y, xx, xy, yy = _seen(place_x, place_y, coefficients)
+        seen_x, seen_y, xx, xy, yy = _seen(shown_x, shown_y, coefficients)
         off_x, off_y, area = x - seen_x, y - seen_y, xx * yy - xy * xy
         step_x, step_y = (yy * off_x - xy * off_y) / area, (xx * off_y - xy * off_x) / area
-        place_x, place_y = place_x + step_x, place_y + step_y
+        shown_x, shown_y = shown_x + step_x, shown_y + step_y
         longest = float(max(np.abs(step_x).max(initial=0), np.abs(step_y).max(initial=0)))
-        yield place_x, place_y, longest
+        yield shown_x, shown_y, longest
         if not longest > last:
             return
 
 
 def can_be_undone(x: NDArray[np.float64], y: NDArray[np.float64], coefficients: Sequence[float]) -> bool:
-    """Whether the lens shows one place at each of these, (N,), and on the way there from the middle."""
-    place_x, place_y = undistorted(x, y, coefficients)
+    """Whether the lens shows one position at each of these, (N,), and between the middle and there."""
+    shown_x, shown_y = undistorted(x, y, coefficients)
     part = np.linspace(0, 1, _ALONG + 1)[:, None]
-    return bool(np.isfinite(distorted(part * place_x, part * place_y, coefficients)).all())
+    return bool(np.isfinite(distorted(part * shown_x, part * shown_y, coefficients)).all())
 
 
 def _seen(
@@ -95,5 +94,5 @@ def _seen(
 
 
 def _upright(xx: NDArray[np.float64], xy: NDArray[np.float64], yy: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Whether slopes keep the picture's sides, so that no two places near each other are shown at one."""
+    """Whether slopes keep the picture's sides, so that no two positions near each other are shown at one."""
     return (xx + yy > 0) & (xx * yy > xy * xy)

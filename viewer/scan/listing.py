@@ -32,7 +32,7 @@ class Listed:
 
     path: as `open_scan` takes it. title: its name for people. kind: "whole" is the folder itself.
     frames: that it plays; 1 for a file, which may hold several, and 0 for a folder that is no scan.
-    size: in bytes, of a folder None. changed: when it was last, seconds since 1970, None where nothing tells.
+    size: in bytes, of a folder None. changed: when it was last, seconds since 1970, None if unknown.
     """
 
     path: str
@@ -44,7 +44,7 @@ class Listed:
 
 
 def is_there(scan: str) -> bool:
-    """Whether a scan can be opened, as far as its name tells; of a pattern its folder must be there."""
+    """Whether a scan can be opened, by its name alone; of a pattern, the folder must exist."""
     is_pattern = "%" in scan or glob.has_magic(scan)
     return is_demo(scan) or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
 

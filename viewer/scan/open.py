@@ -42,8 +42,8 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
 
     path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo", of which
     "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed. unit: the
-    name of its unit of length, for example "mm"; None: what the scan tells, else "units". fps: frame numbers
-    a second, where no times.csv tells the times. Without it the times stored in the file count, and without
+    name of its unit of length, for example "mm"; None: what the scan states, else "units". fps: frame numbers
+    a second, where no times.csv states the times. Without it the times stored in the file count, and without
     those 25 a second. Raises InputError where there is nothing to open, and says what is near.
     """
     if fps is not None and not (np.isfinite(fps) and fps > 0):
@@ -54,14 +54,16 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
     if recorded is None or (fps is not None and not measured):
         recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
-    told, others = source.unit, left_aside(path, source)
-    timeline = Timeline(source, recorded, unit or usable_unit(told) or UNKNOWN_UNIT)
+    stated, others = source.unit, left_aside(path, source)
+    timeline = Timeline(source, recorded, unit or usable_unit(stated) or UNKNOWN_UNIT)
     timeline.is_measured = measured
     if others:
         what = f"The folder also holds {_listed(others)}, which this scan does not use"
         timeline.messages.append(ScanMessage("beside", f"{what}. Open such a file by its name to see it."))
-    if told and not usable_unit(told):
-        what = f"the scan names '{shortened(told)}' as its unit of length, which is no short word such as mm"
+    if stated and not usable_unit(stated):
+        what = (
+            f"the scan names '{shortened(stated)}' as its unit of length, which is no short word such as mm"
+        )
         timeline.messages.append(ScanMessage("unit", f"{what}: its unit is not set"))
     if measured and fps is not None:
         timeline.messages.append(
@@ -82,13 +84,13 @@ def left_aside(path: str | os.PathLike[str], source: FrameSource) -> list[str]:
 
 
 def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> None:
-    """Have the frames of a scan follow each other at this rate, or as their names tell; else as they did when
-    it was opened. A times.csv tells the times whatever is asked for."""
+    """Have the frames of a scan follow each other at this rate, or as their names state; else as when it was
+    opened. A times.csv overrides both."""
     source = timeline.source
-    told = times_in_names(_labels(source)) if by_names and not timeline.is_measured else None
-    if told is None and fps is not None and not timeline.is_measured:
-        told = _paced(source, fps)
-    timeline.retime(timeline.opened_with if told is None else told)
+    stated = times_in_names(_labels(source)) if by_names and not timeline.is_measured else None
+    if stated is None and fps is not None and not timeline.is_measured:
+        stated = _paced(source, fps)
+    timeline.retime(timeline.opened_with if stated is None else stated)
 
 
 def has_times_in_names(timeline: Timeline) -> bool:
@@ -135,10 +137,10 @@ def folder_frames(folder: Path) -> list[Path]:
     They are in the folder, or in its folder `frames`, whatever stands beside that. Raises InputError where
     there are none, and where text tables seem to belong to range images that are missing.
     """
-    for place in (folder / "frames", folder):
-        if os.path.isdir(place) and (frames := _choose_frames(entries(place), place)):
+    for searched in (folder / "frames", folder):
+        if os.path.isdir(searched) and (frames := _choose_frames(entries(searched), searched)):
             are_notes = all(frame.suffix.lower() in formats.NOTES for frame in frames)
-            if are_notes and (lacking := lacking_part(place)):
+            if are_notes and (lacking := lacking_part(searched)):
                 raise InputError(
                     f"{lacking}: Scan4D reads no points from its text tables", folder, _NAME_TABLES
                 )

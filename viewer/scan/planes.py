@@ -2,8 +2,8 @@
 
 Few neighbours follow the surface, many average noise out. So a plane goes through the seven nearest where
 noise hardly turns it; elsewhere through as many as leave the least error, of noise and of curvature together.
-Noise is told by the distances to planes of fewer and of more neighbours. Both are judged over the points
-around, as one neighbourhood tells little of its own error.
+The distances to planes show the noise: planes of fewer and of more neighbours. Both are judged over the
+points around, as one neighbourhood says little about its own error.
 """
 
 from __future__ import annotations
@@ -83,14 +83,14 @@ def _chosen(
     from . import plane_kernels
 
     points = search.points
-    told = [count for count in _COUNTS if count <= min(most, len(points))] or [len(points)]
-    counts = np.array(told)
+    usable = [count for count in _COUNTS if count <= min(most, len(points))] or [len(points)]
+    counts = np.array(usable)
     taking_part = np.unique(np.append(around[rows], rows))
     normals = np.empty((len(taking_part), len(counts), 3), np.float32)
     widths = np.empty((len(taking_part), len(counts), 3))
     for start, end in _parts(len(taking_part), _AT_ONCE // 4):
         some = taking_part[start:end]
-        near = around[some] if told[-1] <= around.shape[1] else search.of(points[some], told[-1])[0]
+        near = around[some] if usable[-1] <= around.shape[1] else search.of(points[some], usable[-1])[0]
 
         def fit(first: int, last: int, start: int = start, near: NDArray[np.int32] = near) -> None:
             part = slice(start + first, start + last)
@@ -99,16 +99,25 @@ def _chosen(
             )
 
         _share(end - start, fit)
-    places = np.full(len(points), -1, np.int32)
-    places[taking_part] = np.arange(len(taking_part))
+    in_part = np.full(len(points), -1, np.int32)
+    in_part[taking_part] = np.arange(len(taking_part))
     if len(counts) < _LEAST_TOLD:
-        return normals[places[rows], 0], np.zeros(len(rows), bool)
+        return normals[in_part[rows], 0], np.zeros(len(rows), bool)
     chosen, further = np.empty((len(rows), 3), np.float32), np.empty(len(rows), bool)
 
     def choose(first: int, last: int) -> None:
         part, some = slice(first, last), rows[first:last]
         plane_kernels.choose(
-            some, around[some], places, counts, normals, widths, _QUIET, _SETTLED, chosen[part], further[part]
+            some,
+            around[some],
+            in_part,
+            counts,
+            normals,
+            widths,
+            _QUIET,
+            _SETTLED,
+            chosen[part],
+            further[part],
         )
 
     _share(len(rows), choose)

@@ -12,7 +12,7 @@ from ..bounds import Bounds
 from ..camera import Camera
 from ..geometry import Vector, up_vector, vector
 from .range_view import RangeView
-from .upright import UNTOLD, Upright, first_elevation
+from .upright import UNKNOWN, Upright, first_elevation
 
 _AGREE = 0.75  # length of the mean of directions that agree: they lie within 41 degrees of it, or so
 _UPRIGHT = 0.5  # cosine of how far a pod that stands upright is tilted
@@ -21,13 +21,13 @@ _WIDEST = 120.0  # field of view, degrees
 
 
 def first_camera(
-    views: Sequence[RangeView], bounds: Bounds, aspect: float, upright: Upright = UNTOLD
+    views: Sequence[RangeView], bounds: Bounds, aspect: float, upright: Upright = UNKNOWN
 ) -> Camera:
-    """A camera that sees what the pods see: from the place of one alone, with its field of view; in the mean
-    direction of several, or above heights, as near as shows the bounds whole. Where there is no pod, or they
-    look from all around or straight down on ground, it looks from the front, on ground from above.
+    """A camera that sees what the pods see: from the position of a single pod, with its field of view; in the
+    mean direction of several, or above heights, as near as shows the bounds whole. Where there is no pod, or
+    they look from all around or straight down on ground, it looks from the front, on ground from above.
 
-    aspect: width / height of the picture. upright: the scan's, whose up is kept to unless it is along
+    aspect: width / height of the picture. upright: the scan's, whose up it keeps unless that is along
     the view axis, or nearly what is up in the picture of one pod alone.
     """
     axes = _mean_axes(views)
@@ -44,11 +44,11 @@ def first_camera(
 
 
 def subject_of(
-    views: Sequence[RangeView], points: NDArray[np.float64], bounds: Bounds, upright: Upright = UNTOLD
+    views: Sequence[RangeView], points: NDArray[np.float64], bounds: Bounds, upright: Upright = UNKNOWN
 ) -> NDArray[np.float64] | None:
     """The points of what one pod alone looks at, without the background far behind it: those about what is
     in the middle of its picture, as far round as the picture reaches there. None where `first_camera` takes
-    no pod's place, or no point is there.
+    no pod's position, or no point is there.
 
     points: (N, 3) scan units. bounds, upright: as for `first_camera`.
     """

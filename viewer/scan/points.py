@@ -86,7 +86,7 @@ class PointCloud:
         positions: (N, 3) absolute, any real type. colors: (N, 3) or (N, 4), uint8 or
         float in 0..1. axes: (N, 4), of which rows without two lengths count as round, with the radius
         given; the others set it. origin: (3,); chosen by `choose_origin` where None. precise: whether what
-        the coordinates have beyond float32 offsets is kept. viewpoint: (3,) absolute.
+        the coordinates have beyond float32 offsets is stored. viewpoint: (3,) absolute.
         Raises InputError where shapes do not fit, and where the viewpoint is not finite.
         """
         points = np.asarray(positions)
@@ -95,8 +95,8 @@ class PointCloud:
         if points.dtype.kind not in "fiu":
             raise InputError(f"positions are of type {points.dtype}, expected numbers")
         count = len(points)
-        keep = finite_rows(points)
-        kept = count if keep is None else int(np.count_nonzero(keep))
+        finite = finite_rows(points)
+        retained = count if finite is None else int(np.count_nonzero(finite))
 
         def pick(values: ArrayLike | None, name: str, columns: tuple[int, ...]) -> NDArray | None:
             if values is None:
@@ -105,14 +105,14 @@ class PointCloud:
             width = array.shape[1] if array.ndim == 2 else 1 if array.ndim == 1 else -1
             if len(array) != count or width not in columns or array.dtype.kind not in "fiub":
                 raise InputError(f"{name} have shape {array.shape} ({array.dtype}) for {count} points")
-            return array if keep is None else array[keep]
+            return array if finite is None else array[finite]
 
         normals_ = pick(normals, "normals", (3,))
         colors_ = pick(colors, "colors", (3, 4))
         radii_ = pick(radii, "radii", (1,))
         axes_ = pick(axes, "axes", (4,))
-        if keep is not None:
-            points = points[keep]
+        if finite is not None:
+            points = points[finite]
         radii_ = None if radii_ is None else np.ascontiguousarray(radii_, np.float32)
         shortened = 0
         if radii_ is not None or axes_ is not None:
@@ -130,8 +130,8 @@ class PointCloud:
             axes=axes_,
             scalars={name: np.ascontiguousarray(pick(values, f"values of '{name}'", (1,)))
                      for name, values in (scalars or {}).items()},
-            ids=None if keep is None else np.flatnonzero(keep).astype(np.uint32),
-            dropped=count - kept,
+            ids=None if finite is None else np.flatnonzero(finite).astype(np.uint32),
+            dropped=count - retained,
             shortened=shortened,
             remainders=remainders,
             viewpoint=None if viewpoint is None else checked_viewpoint(viewpoint),
@@ -198,10 +198,10 @@ class PointCloud:
         """Some of the points: rows (M,), ascending. They keep their ids."""
         names = ("positions", "normals", "colors", "radii", "axes", "remainders")
         arrays = {name: getattr(self, name) for name in names}
-        kept = {name: values[rows] for name, values in arrays.items() if values is not None}
+        retained = {name: values[rows] for name, values in arrays.items() if values is not None}
         ids = rows.astype(np.uint32) if self.ids is None else self.ids[rows]
         scalars = {name: values[rows] for name, values in self.scalars.items()}
-        return replace(self, **kept, scalars=scalars, ids=ids)
+        return replace(self, **retained, scalars=scalars, ids=ids)
 
     def splat_reach(self) -> NDArray[np.float32]:
         """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
@@ -235,7 +235,7 @@ class PointCloud:
         return 0.0 if self.radii is None else self.remember(PointCloud._find_longest_reach)
 
     def remember(self, find: Callable[Concatenate[PointCloud, P], T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Find a small fact about the points, once for the same arguments, and keep it."""
+        """Find a small fact about the points, once for the same arguments."""
         key = (find, *args, *kwargs.items())
         if key not in self._facts:
             self._facts[key] = find(self, *args, **kwargs)
@@ -293,20 +293,20 @@ def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:
     """
     if points.dtype.kind != "f":
         return None
-    keep = None
+    finite = None
     for start in range(0, len(points), _CHUNK):
         part = points[start : start + _CHUNK]
         low, high = _extremes(part)  # NaN where there is one, and then not within
         if (low > -_LARGEST).all() and (high < _LARGEST).all():
             continue
-        if keep is None:
-            keep = np.ones(len(points), bool)
-        keep[start : start + _CHUNK] = (np.abs(part) < _LARGEST).all(axis=1)
-    return keep
+        if finite is None:
+            finite = np.ones(len(points), bool)
+        finite[start : start + _CHUNK] = (np.abs(part) < _LARGEST).all(axis=1)
+    return finite
 
 
 def _are_same(ours: NDArray, theirs: NDArray) -> bool:
-    """Whether two arrays hold the same bits; soon told where they do not."""
+    """Whether two arrays hold the same bits; it ends at the first difference."""
     if ours.shape != theirs.shape or ours.dtype != theirs.dtype:
         return False
     parts = [slice(0, _SAMPLE), *(slice(start, start + _CHUNK) for start in range(0, len(ours), _CHUNK))]
@@ -395,7 +395,7 @@ def _splats(
     if axes is None:
         return radii, None, shortened
     mean = np.zeros(len(axes), np.float32) if radii is None else radii.copy()
-    kept, shorter = np.zeros(axes.shape, np.float32), 0
+    retained, shorter = np.zeros(axes.shape, np.float32), 0
     for start in range(0, len(axes), _CHUNK):
         checkpoint()
         part = axes[start : start + _CHUNK].astype(np.float64)
@@ -403,11 +403,11 @@ def _splats(
             lengths = np.stack([np.linalg.norm(part[:, :3], axis=1), part[:, 3]])
         rows = np.flatnonzero(((lengths > _SMALLEST) & (lengths < _LARGEST)).all(axis=0))
         factors = np.minimum(1, longest / lengths[:, rows])
-        kept[start + rows, :3] = part[rows, :3] * factors[0][:, None]
-        kept[start + rows, 3] = part[rows, 3] * factors[1]
+        retained[start + rows, :3] = part[rows, :3] * factors[0][:, None]
+        retained[start + rows, 3] = part[rows, 3] * factors[1]
         mean[start + rows] = np.sqrt((lengths[:, rows] * factors).prod(axis=0))
         shorter += int((factors < 1).any(axis=0).sum())
-    return (mean, kept, shorter) if kept.any() else (radii, None, shortened)
+    return (mean, retained, shorter) if retained.any() else (radii, None, shortened)
 
 
 def _rgba8(colors: NDArray) -> NDArray[np.uint8]:

@@ -27,7 +27,7 @@ class Life:
 class Pose:
     """One moment of a scan, on the CPU.
 
-    index: its place on the timeline. time: seconds. label: the file or frame it came from. points: its
+    index: its number on the timeline. time: seconds. label: the file or frame it came from. points: its
     points, or those of the range views where it was scanned as such. life: see `Life`.
 
     Merging the points of range views takes time and memory. It happens when something first reads `cloud`;
@@ -108,10 +108,10 @@ class Pose:
         """How far points lie off the planes through their neighbours, scan units, see `spacing.roughness`."""
         return roughness(self.points) if isinstance(self.points, PointCloud) else self.points.roughness
 
-    def around(self, place: NDArray[np.float64], least: int = ENOUGH) -> PointCloud:
-        """A cloud that has at least so many of the points nearest to a place, (3,) scan units: all, or those
-        that range views see in pixels round it."""
-        return self.points if isinstance(self.points, PointCloud) else self.points.around(place, least)
+    def around(self, position: NDArray[np.float64], least: int = ENOUGH) -> PointCloud:
+        """A cloud that has at least so many of the points nearest to a position, (3,) scan units: all, or
+        those that range views see in pixels round it."""
+        return self.points if isinstance(self.points, PointCloud) else self.points.around(position, least)
 
     @property
     def nbytes(self) -> int:

@@ -1,4 +1,4 @@
-"""Small pictures of poses, made without a GPU: to tell scans from each other before one is opened."""
+"""Small pictures of poses, made without a GPU: so that a user recognises a scan before it is opened."""
 
 from __future__ import annotations
 

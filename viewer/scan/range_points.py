@@ -17,7 +17,7 @@ from .points import PointCloud, stride
 from .range_view import RangeView, merge, merge_some
 from .spacing import ENOUGH, PLANE, plane_residual, spacing_at
 
-_WINDOW = 8  # pixels round a place that are looked at first
+_WINDOW = 8  # pixels around a position that are searched first
 _ROUGH = 8  # pixels that a calibration beside measured x and y may be off
 _BENT = 2.0  # by which a lens enlarges what lies round a pixel, at most
 _FAR = 1e8  # pixels
@@ -30,7 +30,7 @@ class RangePoints:
     """The points that range views see.
 
     overview: some thousands of them, spread evenly, with the origin and the attributes that all have: what is
-    known without merging. count: the valid pixels; each is a point unless float32 cannot hold its place.
+    known without merging. count: the valid pixels; each is a point unless float32 cannot hold its position.
     """
 
     views: tuple[RangeView, ...]
@@ -48,7 +48,7 @@ class RangePoints:
 
     @property
     def cloud(self) -> PointCloud:
-        """All points as `merge` gives them: merged by whoever asks first, on any thread, and kept."""
+        """All points as `merge` gives them: merged once, on the thread that asks first."""
         if self._merged is None:
             with self._lock:
                 if self._merged is None:
@@ -115,8 +115,8 @@ class RangePoints:
             rows, width = max(1, _PART // view.depth.shape[1]), view.depth.shape[1]
             for top in range(0, len(view.depth), rows):
                 band = view.cropped(slice(top, top + rows), slice(None))
-                places = band.positions() - self.overview.origin
-                yield np.flatnonzero(band.valid()) + (first + top * width), places.astype(np.float32)
+                offsets = band.positions() - self.overview.origin
+                yield np.flatnonzero(band.valid()) + (first + top * width), offsets.astype(np.float32)
 
     def row_of(self, sample: int) -> int:
         """The row in `cloud` of a sample that sees a point. Counts pixels where points are not merged."""
@@ -128,19 +128,19 @@ class RangePoints:
         before = [*(earlier.valid() for earlier in self.views[:number]), begun.valid().ravel()[:within]]
         return int(sum(np.count_nonzero(pixels) for pixels in before))
 
-    def around(self, place: NDArray[np.float64], least: int = 1) -> PointCloud:
-        """Some of the points, with at least so many of those nearest to a place, if there are, none of which
-        is left out. place: (3,) scan units."""
+    def around(self, position: NDArray[np.float64], least: int = 1) -> PointCloud:
+        """Some of the points: all that are near a position, (3,) in scan units, and at least so many of them
+        if there are."""
         reach, origin = _WINDOW, self.overview.origin
         while True:
-            windows = [_window(view, place, reach) for view in self.views]
+            windows = [_window(view, position, reach) for view in self.views]
             both = list(zip(self.views, windows, strict=True))
             crops = [view.cropped(window.rows, window.columns) for view, window in both]
             sure, reach = min(window.sure for window in windows), 2 * reach
             if not any(crop.valid().any() for crop in crops):
                 continue
             cloud = merge(crops, origin=origin)
-            near = np.linalg.norm(cloud.positions + (origin - place), axis=1) < sure
+            near = np.linalg.norm(cloud.positions + (origin - position), axis=1) < sure
             if math.isinf(sure) or np.count_nonzero(near) >= least:
                 break
         numbers = [
@@ -170,9 +170,9 @@ class RangePoints:
         it; found without merging."""
         overview, found = self.overview, []
         for row in np.linspace(0, len(overview) - 1, _PLACES).astype(int):
-            place = overview.positions[row] + overview.origin
-            near = self.around(place, PLANE)
-            away = np.linalg.norm(near.positions + (near.origin - place), axis=1)
+            position = overview.positions[row] + overview.origin
+            near = self.around(position, PLANE)
+            away = np.linalg.norm(near.positions + (near.origin - position), axis=1)
             found.append(plane_residual(near.positions[np.argsort(away)[:PLANE]]))
         return float(np.median(found))
 
@@ -201,7 +201,7 @@ class RangePoints:
 
 @dataclass(frozen=True)
 class _Window:
-    """Pixels of a view round a place: rows and columns. sure: all that the view sees less far from the place
+    """Pixels of a view around a position: rows and columns. sure: all that the view sees nearer to it
     than this, scan units, is in them."""
 
     rows: slice
@@ -214,9 +214,9 @@ class _Window:
         return np.add.outer(rows * width, columns).ravel()
 
 
-def _window(view: RangeView, place: NDArray[np.float64], reach: int) -> _Window:
-    """The pixels up to so many away from the one that sees a place, (3,), at least one."""
-    size, sees = np.array(view.depth.shape[::-1]), view.project(place[None])[0][0]
+def _window(view: RangeView, position: NDArray[np.float64], reach: int) -> _Window:
+    """The pixels up to so many away from the one that sees a position, (3,), at least one."""
+    size, sees = np.array(view.depth.shape[::-1]), view.project(position[None])[0][0]
     is_seen = bool(np.isfinite(sees).all())
     at = np.floor(np.clip(sees, -_FAR, _FAR)) if is_seen else size // 2
     (left, top), (right, bottom) = (
@@ -226,7 +226,7 @@ def _window(view: RangeView, place: NDArray[np.float64], reach: int) -> _Window:
     rows, columns = slice(top, max(bottom, top + 1)), slice(left, max(right, left + 1))
     if (rows.stop - rows.start, columns.stop - columns.start) == view.depth.shape:
         return _Window(rows, columns, math.inf)
-    x, y, z = view.world_to_camera[:3, :3] @ place + view.world_to_camera[:3, 3]
+    x, y, z = view.world_to_camera[:3, :3] @ position + view.world_to_camera[:3, 3]
     if not is_seen:
         return _Window(rows, columns, max(float(z), 0.0))  # how far it is behind all that the pod sees
     outside = float(np.maximum(-at, at - size + 1).max())

@@ -47,7 +47,7 @@ class RangeView:
     distortion:      the lens' 4, 5 or 8 coefficients, see `viewer/scan/lens.py`; none where depth is height
     world_to_camera: (4, 4) float64, a rotation and a translation, for column vectors
     name:            the pod's. unit: the name of the unit of length
-    assumed:         what was assumed since nothing tells it, to be told to the user; else empty
+    assumed:         what Scan4D assumed because no file states it, in words for the user; else empty
 
     With x = (column + 0.5 - cx) / fx and y = (cy - row - 0.5) / fy, less the lens' distortion, a pixel sees
     the point d (x, y, -1) in camera space where its depth d is z, d (x, y, -1) / |(x, y, -1)| where it is
@@ -162,7 +162,7 @@ class RangeView:
 
         From the pixels around each on the same surface; see `normals_of_grid`.
         """
-        depth, places = np.where(self.valid(), self.depth, np.float32(np.nan)), None
+        depth, cells = np.where(self.valid(), self.depth, np.float32(np.nan)), None
         if self.kind == "range" or self.distortion or self.xy is not None:
             x, y = self._rays(*np.ogrid[: depth.shape[0], : depth.shape[1]])
             if self.kind == "range":
@@ -172,9 +172,9 @@ class RangeView:
                 if self.kind == "z":
                     with np.errstate(all="ignore"):
                         x, y = x / depth, y / depth
-            places = np.stack(np.broadcast_arrays(x * self.fx, -y * self.fy))
+            cells = np.stack(np.broadcast_arrays(x * self.fx, -y * self.fy))
         focal, center = (self.fx, self.fy), (self.cx, self.cy)
-        normals = normals_of_grid(depth, focal, center, self.kind == "height", places)
+        normals = normals_of_grid(depth, focal, center, self.kind == "height", cells)
         return (normals @ self._camera_to_world().T).astype(np.float32)
 
     def scaled(self, factor: float, unit: str) -> RangeView:
@@ -207,18 +207,18 @@ class RangeView:
         """Raise InputError where the lens' coefficients are none, or cannot be undone in the picture."""
         if not self.distortion:
             return
-        told = ", ".join(f"{value:g}" for value in self.distortion)
+        shown = ", ".join(f"{value:g}" for value in self.distortion)
         if self.kind == "height":
-            raise InputError(f"a range view of heights has no lens, but its distortion ({told})")
+            raise InputError(f"a range view of heights has no lens, but its distortion ({shown})")
         if len(self.distortion) not in COUNTS or not np.isfinite(self.distortion).all():
             counts = "k1 k2 p1 p2 [k3 [k4 k5 k6]]"
-            raise InputError(f"a range view's distortion is ({told}), expected the numbers {counts}")
+            raise InputError(f"a range view's distortion is ({shown}), expected the numbers {counts}")
         height, width = self.depth.shape
         columns, rows = np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)]).T
         x, y = self._seen(rows, columns)
         if not can_be_undone(x, -y, self.distortion):
             raise InputError(
-                f"a range view's distortion ({told}) folds the picture over before its corners",
+                f"a range view's distortion ({shown}) folds the picture over before its corners",
                 hint="Check the coefficients and their order: k1 k2 p1 p2 k3 k4 k5 k6",
             )
 
@@ -264,8 +264,8 @@ def assumed_pinhole(width: int, height: int) -> dict[str, Any]:
     """Default calibration for pictures of this size, and `assumed`, as in RangeView: 45 degrees across the
     longer edge."""
     focal = max(width, height) / (2 * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
-    told = f"Scan4D found no calibration and assumes a field of view of {_FIELD_OF_VIEW:g} degrees"
-    return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": told}
+    shown = f"Scan4D found no calibration and assumes a field of view of {_FIELD_OF_VIEW:g} degrees"
+    return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": shown}
 
 
 def mask_of(numbers: NDArray) -> NDArray[np.bool_]:
@@ -299,11 +299,11 @@ def merge_some(views: Sequence[RangeView], pixels: Sequence[NDArray[np.integer]]
 
     pixels: of each view, their numbers in row order, ascending. Raises InputError where there is none.
     """
-    places = [np.divmod(some, view.depth.shape[1]) for view, some in zip(views, pixels, strict=True)]
+    cells = [np.divmod(some, view.depth.shape[1]) for view, some in zip(views, pixels, strict=True)]
     before = np.cumsum([0, *(view.depth.size for view in views)])[:-1]
     ids = np.concatenate([some + first for some, first in zip(pixels, before, strict=True)])
-    points = np.concatenate([view.unproject(*place) for view, place in zip(views, places, strict=True)])
-    return _cloud(views, places, [len(some) for some in pixels], points, ids.astype(np.uint32))
+    points = np.concatenate([view.unproject(*cell) for view, cell in zip(views, cells, strict=True)])
+    return _cloud(views, cells, [len(some) for some in pixels], points, ids.astype(np.uint32))
 
 
 def _cloud(

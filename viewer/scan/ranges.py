@@ -51,7 +51,7 @@ def point_values(pose: Pose, look: Look, layers: Layers = NO_LAYERS) -> NDArray 
     scalars = {**pose.overview.scalars, **layers.scalars}
     source = value_source(drawable(look, scalars), scalars)
     if source == "height":
-        return layers.place.points(pose.sample + pose.origin) @ up_vector(look.up)
+        return layers.world_from_pose.points(pose.sample + pose.origin) @ up_vector(look.up)
     return None if source in (None, "depth") else strided(scalars[source])
 
 
@@ -100,7 +100,7 @@ class ValueRanges:
         return _union(found) if found else None
 
     def gather(self, timeline: Timeline, look: Look, indices: Iterable[int]) -> None:
-        """Take in frames of the scan; those that have to be read are read one at a time and not kept."""
+        """Take in frames of the scan; it reads those that it has to read one at a time, and drops them."""
         for index in indices:
             if self.has(index, look):
                 continue

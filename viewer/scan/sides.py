@@ -30,7 +30,7 @@ _GRID = 1024  # cells along an axis at most
 # and in other sizes again, since what must turn as a whole may not be one patch.
 _PATCHES = ((10, 40, 160), (10, 40, 160, 640), (5, 20, 80, 320))
 _FIRM = 0.3  # weight of links within patches, at least
-_LEVELS = 255  # of weights that are told apart
+_LEVELS = 255  # of weights that differ
 _SEEN = 0.1  # that a view from outside weighs in links
 _TURNS = 20  # rounds in which points or patches turn, one by one
 _OFTEN = 1 << 12  # steps between checkpoints
@@ -199,7 +199,7 @@ def _visible(
 
 def _half_sphere(count: int) -> Vectors:
     """Directions spread evenly over the half sphere around +z, (count, 3)."""
-    place = np.arange(count) + 0.5
-    z = place / count
-    turn = place * np.pi * (3 - np.sqrt(5))  # the golden angle
+    step = np.arange(count) + 0.5
+    z = step / count
+    turn = step * np.pi * (3 - np.sqrt(5))  # the golden angle
     return np.stack([np.sqrt(1 - z * z) * np.cos(turn), np.sqrt(1 - z * z) * np.sin(turn), z], axis=1)

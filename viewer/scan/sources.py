@@ -32,7 +32,7 @@ class FrameSource(Protocol):
 
     @property
     def unit(self) -> str | None:
-        """The name of its unit of length as its files tell it, perhaps any text; None where none does."""
+        """The name of its unit of length as its files state it, perhaps any text; or None."""
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -64,10 +64,10 @@ class FileSequence:
 
     @cached_property
     def unit(self) -> str | None:
-        """The unit as the first file tells it, where its format knows units."""
+        """The unit that the first file states, where its format knows units."""
         try:
             return formats.read_unit(self.files[0])
-        except InputError:  # asking for its pose will tell
+        except InputError:  # reading its pose will say why
             return None
 
     def __len__(self) -> int:
@@ -121,8 +121,8 @@ class FileSequence:
     def _beside(self, name: str) -> Path | None:
         """The file of this name beside the frames, or beside their folder where that is called `frames`."""
         folders = [self._folder, self._folder.parent] if self._folder.name == "frames" else [self._folder]
-        places = [folder / name for folder in folders]
-        return next((file for file in places if file.is_file() and file not in self.files), None)
+        candidates = [folder / name for folder in folders]
+        return next((file for file in candidates if file.is_file() and file not in self.files), None)
 
 
 class MultiFrameFile:

@@ -38,7 +38,7 @@ def sparse_spacing(cloud: PointCloud) -> float:
 
 
 def spacings(cloud: PointCloud) -> NDArray[np.float64]:
-    """The distance between neighbours at some places of a cloud, (P,), scan units; P > 0.
+    """The distance between neighbours at some positions of a cloud, (P,), scan units; P > 0.
 
     A few points are compared with all others. On a surface of one point per s^2 there are
     k points within s sqrt(k / pi), so the distance to the sixth neighbour gives s; copies of
@@ -49,8 +49,8 @@ def spacings(cloud: PointCloud) -> NDArray[np.float64]:
 
 def roughness(cloud: PointCloud) -> float:
     """How far points lie off the planes through their neighbours, root mean square, scan units: by noise, or
-    as the surface bends between them. The median over the places of `spacings`; 0 of fewer than four points.
-    Found once for each cloud."""
+    as the surface bends between them. The median over the positions of `spacings`; 0 of fewer than four
+    points. Found once for each cloud."""
     return cloud.remember(_roughness)
 
 
@@ -75,11 +75,11 @@ def nearest_rows(cloud: PointCloud, row: int, count: int = ENOUGH) -> NDArray[np
 
 
 def nearest_row(cloud: PointCloud, position: NDArray[np.float64]) -> tuple[int, float]:
-    """(row, distance) of the point nearest to a place, scan units. It looks at every point once."""
-    place = (position - cloud.origin).astype(np.float32)
+    """(row, distance) of the point nearest to a position, scan units. It looks at every point once."""
+    offset = (position - cloud.origin).astype(np.float32)
     row, least = 0, math.inf
     for start, part, x in _chunks(cloud.positions):
-        near, squared = _within(part, x, place, least)
+        near, squared = _within(part, x, offset, least)
         if len(near) and squared.min() < least:
             row, least = start + int(near[squared.argmin()]), float(squared.min())
     return row, math.sqrt(least)
@@ -89,11 +89,11 @@ def _spacings(cloud: PointCloud) -> NDArray[np.float64]:
     count = len(cloud)
     if count < 2:
         return np.ones(1)
-    found = [spacing for spacing in _spacings_at(cloud.positions, _places(count)) if spacing is not None]
+    found = [spacing for spacing in _spacings_at(cloud.positions, _sample_rows(count)) if spacing is not None]
     return np.array(found or [1.0])
 
 
-def _places(count: int) -> list[int]:
+def _sample_rows(count: int) -> list[int]:
     """Rows of some points, of so many, at which neighbours are looked at."""
     return np.linspace(0, count - 1, max(8, min(64, _DISTANCES // count))).astype(int).tolist()
 
@@ -101,7 +101,7 @@ def _places(count: int) -> list[int]:
 def _roughness(cloud: PointCloud) -> float:
     if len(cloud) < _FLAT:
         return 0.0
-    nearest = _nearest(cloud.positions, _places(len(cloud)), PLANE)
+    nearest = _nearest(cloud.positions, _sample_rows(len(cloud)), PLANE)
     return float(np.median([plane_residual(cloud.positions[rows]) for rows in nearest]))
 
 
@@ -145,8 +145,8 @@ def _nearest(points: NDArray[np.float32], rows: Sequence[int], count: int) -> li
     far = [np.empty(0, np.float32)] * len(rows)
     for start, part, x in _chunks(points):
         for number, row in enumerate(rows):
-            kept, squared = _within(part, x, points[row], limits[number])
-            near[number] = np.append(near[number], kept + start)
+            chosen, squared = _within(part, x, points[row], limits[number])
+            near[number] = np.append(near[number], chosen + start)
             far[number] = np.append(far[number], squared)
             if len(near[number]) > _CUT * count:
                 near[number], far[number] = _least(near[number], far[number], count)
@@ -158,8 +158,8 @@ def _least(
     rows: NDArray[np.intp], squared: NDArray[np.float32], count: int
 ) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
     """The entries with the `count` least squared distances, in any order."""
-    kept = np.argpartition(squared, count - 1)[:count]
-    return rows[kept], squared[kept]
+    chosen = np.argpartition(squared, count - 1)[:count]
+    return rows[chosen], squared[chosen]
 
 
 def _chunks(
@@ -181,8 +181,8 @@ def _within(
     """
     beside = np.flatnonzero(np.square(x - point[0]) <= limit)
     squared = _squared(part[beside].T, point)
-    kept = squared <= limit
-    return beside[kept], squared[kept]
+    chosen = squared <= limit
+    return beside[chosen], squared[chosen]
 
 
 def _squared(columns: NDArray[np.float32], point: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -17,7 +17,7 @@ METRE = "m"
 
 @dataclass(frozen=True, kw_only=True)
 class Ground:
-    """The place of a grid of heights: the corner of its first cell, and the steps from cell to cell.
+    """The ground below a grid of heights: the corner of its first cell, and the steps from cell to cell.
 
     left: x of the first column's outer edge, first: y of the first row's. right: how x grows with a column,
     down: how y grows with a row, so below 0 where the first row is the northern one. degrees: whether all

@@ -28,7 +28,7 @@ from .sources import FrameSource
 from .times import frame_in_words
 from .units import usable_unit
 
-_TRACEBACKS = 10  # of broken frames that are kept: each takes a millisecond to write, and kilobytes
+_TRACEBACKS = 10  # of broken frames that are stored: each takes a millisecond to write, and kilobytes
 _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 
 
@@ -38,7 +38,7 @@ class ScanMessage:
 
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite coordinate were left
     out), "shortened" (splats far larger than the scan were), "unit" (lengths in another unit than the scan's,
-    or a name of it that is no unit), "assumed" (what of range views nothing tells), "times" or "beside"
+    or a name of it that is no unit), "assumed" (what range views do not state), "times" or "beside"
     (files in its folder may be another scan). index: the frame; None where it concerns all.
     """
 
@@ -52,13 +52,13 @@ class TimelineClosed(ValueError):
 
 
 class Timeline:
-    """The poses of a scan, read when asked for and kept in a cache bounded in bytes.
+    """The poses of a scan, read when asked for and held in a cache of bounded size.
 
     times:    (T,) float64, seconds, increasing, read-only
     unit:     the name of the scan's unit of length
     name:     the scan's name
-    messages: what there is to report; it only grows, by one of a kind per frame
-    is_measured: whether a file beside the frames tells the times
+    messages: reports for the user; it only grows, by one of a kind per frame
+    is_measured: whether a file beside the frames states the times
     source:   where the frames come from
     opened_with: the times that it began with
     finish:   called with each pose on the thread that has read it, before anybody gets it; for what
@@ -113,8 +113,10 @@ class Timeline:
             yield pose
 
     def retime(self, times: ArrayLike) -> None:
-        """Have the frames be at other times from now on, (T,) seconds; poses in memory make way for the same
-        ones at these. Raises InputError where the times do not fit or increase."""
+        """Have the frames be at other times from now on, (T,) seconds, also those of poses in memory.
+
+        Raises InputError where the times do not fit or increase.
+        """
         checked = _checked_times(times, self.source)
         if np.array_equal(checked, self.times):
             return
@@ -389,7 +391,7 @@ class Timeline:
             self._topologies[index] = pose.overview.topology
             if not self._closed:
                 distance = self._distance(index) if ahead else 0
-                self._cache.put(pose, keep=lambda other: self._distance(other) < distance)
+                self._cache.put(pose, is_needed=lambda other: self._distance(other) < distance)
                 if index == self._wanted:
                     self._in_use = pose
         future.set_result(pose)
@@ -421,7 +423,7 @@ class Timeline:
             raise InputError(f"cannot be read ({type(error).__name__}: {error})", label) from error
 
     def _in_unit(self, index: int, views: tuple[RangeView, ...]) -> tuple[RangeView, ...]:
-        """The views in the unit that the scan tells, where they have another one; told once."""
+        """The views in the unit of the scan; a message says once that they have another one."""
         unit = usable_unit(self.source.unit) or UNKNOWN_UNIT
         converted = in_one_unit(views, unit)
         others = [before.unit for before in views if before.unit != unit]
@@ -449,13 +451,13 @@ def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]
     return checked
 
 
-def _at_rest(error: InputError, is_told: bool) -> InputError:
-    """The error as it is kept: without its frames, which hold what readers held, perhaps a file. is_told:
+def _at_rest(error: InputError, has_traceback: bool) -> InputError:
+    """The error as it is stored: without its stack frames, which hold what readers held. has_traceback:
     whether a note has its traceback.
 
     To be raised as a copy, so that it does not gather the frames of those who ask.
     """
-    kept = copy.copy(error)
-    if is_told:
-        kept.add_note("".join(traceback.format_exception(error)))
-    return kept
+    stored = copy.copy(error)
+    if has_traceback:
+        stored.add_note("".join(traceback.format_exception(error)))
+    return stored

@@ -72,8 +72,8 @@ def times_in_names(labels: Sequence[str]) -> NDArray[np.float64] | None:
     columns = [column for column in zip(*rows, strict=True) if len(set(column)) > 1]
     if len(columns) != 1 or not columns[0][0][:1].isdecimal():
         return None
-    told = [Decimal(text) for text in columns[0]]
-    since = np.array([float(time - told[0]) for time in told])
+    stamps = [Decimal(text) for text in columns[0]]
+    since = np.array([float(time - stamps[0]) for time in stamps])
     steps = np.diff(since)
     units = (1.0,) if any("." in text for text in columns[0]) else (1e-3, 1e-6, 1e-9)
     shortest, longest = _STEPS
@@ -105,12 +105,12 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> NDArray[np.float64]:
         frame_column, time_column = _columns(path, first.pop()[0], names)
     times = np.full(len(labels), np.nan)
     lines = [0] * len(labels)
-    places = {label: index for index, label in enumerate(labels)}
+    indices = {label: index for index, label in enumerate(labels)}
     for line, cells in itertools.chain(first, rows):
         if len(cells) <= max(frame_column, time_column):
             raise _bad_row(path, line, "a column is missing")
         time = _number(path, line, cells[time_column])
-        index = _frame_index(path, line, cells[frame_column], places)
+        index = _frame_index(path, line, cells[frame_column], indices)
         if index is None:
             continue
         if lines[index]:
@@ -127,7 +127,7 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> NDArray[np.float64]:
 
 def _split(name: str) -> list[str | int]:
     """Text and numbers in turn, text first: "a10.ply" is ["a", 10, ".ply"]."""
-    return [int(part) if place % 2 else part for place, part in enumerate(re.split("([0-9]+)", name))]
+    return [int(part) if position % 2 else part for position, part in enumerate(re.split("([0-9]+)", name))]
 
 
 def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
@@ -161,12 +161,12 @@ def _number(path: Path, line: int, text: str) -> float:
     return number
 
 
-def _frame_index(path: Path, line: int, frame: str, places: dict[str, int]) -> int | None:
+def _frame_index(path: Path, line: int, frame: str, indices: dict[str, int]) -> int | None:
     """The frame that a row means; None for a file that is not part of the scan."""
-    index = places.get(frame, places.get(PurePath(frame).name))
+    index = indices.get(frame, indices.get(PurePath(frame).name))
     if index is None and frame.isdecimal():
-        if len(frame) > 9 or int(frame) >= len(places):
-            raise _bad_row(path, line, f"index {shortened(frame)} is outside 0..{len(places) - 1}")
+        if len(frame) > 9 or int(frame) >= len(indices):
+            raise _bad_row(path, line, f"index {shortened(frame)} is outside 0..{len(indices) - 1}")
         index = int(frame)
     return index
 

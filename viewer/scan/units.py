@@ -45,7 +45,7 @@ def conversion(given: str, wanted: str) -> float | None:
 
 @dataclass(frozen=True)
 class Scale:
-    """How lengths of a scan are told. unit: in which unit. factor: how many of it one unit of the scan is."""
+    """The unit in which Scan4D shows lengths. factor: how many of these one unit of the scan is."""
 
     unit: str
     factor: float = 1.0

@@ -1,6 +1,6 @@
-"""Which way is up in a scan, where its user has not said so: guessed from what its frames tell.
+"""Which way is up in a scan: guessed from its frames if the user has not set it.
 
-A cascade, the surest first: the pictures of range views, map coordinates, the place of a depth camera,
+A cascade, the surest first: the pictures of range views, map coordinates, the position of a depth camera,
 ground, and what a body stands on. Nobody measures with x up, so that only y and z are guessed.
 """
 
@@ -58,19 +58,19 @@ class Upright:
     front: float = 0.0
 
 
-UNTOLD = Upright(UP, "nothing in the scan says otherwise", 0.4)
+UNKNOWN = Upright(UP, "nothing in the scan says otherwise", 0.4)
 
 
 def guess_up(cloud: PointCloud, views: Sequence[RangeView] = ()) -> Upright:
     """Guess what is up, from some thousands of the points and the range views that they are of, if any."""
     points = strided(cloud.positions).astype(np.float64) + cloud.origin
     normals = None if cloud.normals is None else strided(cloud.normals).astype(np.float64)
-    if (told := _of_pictures(views, points)) is not None:
-        return told
+    if (known := _of_pictures(views, points)) is not None:
+        return known
     for rule in (_of_a_map, _of_a_camera, _of_ground, _of_a_body):
         if len(points) and (found := rule(points, normals)) is not None:
             return found
-    return UNTOLD
+    return UNKNOWN
 
 
 def first_elevation(bounds: Bounds, up: str) -> float:
@@ -100,8 +100,8 @@ def _is_map(bounds: Bounds) -> bool:
 
 def _of_pictures(views: Sequence[RangeView], points: NDArray[np.float64]) -> Upright | None:
     """Pictures have their own up; those of heights on ground have it towards the eye."""
-    told = up_axis(views)
-    if told is None:
+    known = up_axis(views)
+    if known is None:
         return None
     if len(points) and all(view.kind == "height" for view in views):
         low, high = points.min(axis=0), points.max(axis=0)
@@ -109,7 +109,7 @@ def _of_pictures(views: Sequence[RangeView], points: NDArray[np.float64]) -> Upr
         above = nearest_axis(vector(back))
         if first_elevation(Bounds(low, high), above):
             return Upright(above, "the scan is a map of heights", 0.95)
-    return Upright(told, "it is up in the range images", 0.95)
+    return Upright(known, "it is up in the range images", 0.95)
 
 
 def _of_a_map(points: NDArray[np.float64], normals: object) -> Upright | None:
@@ -163,26 +163,26 @@ def _of_a_body(points: NDArray[np.float64], normals: object) -> Upright | None:
     return Upright("+z", "the scan is longest along it", 0.6) if deep > _SLENDER * max(wide, high) else None
 
 
-def _facing(points: NDArray[np.float64], told: Upright) -> Upright:
+def _facing(points: NDArray[np.float64], known: Upright) -> Upright:
     """Add the front that a body tells: an animal's head is far ahead, unless it is seen from its side, which
     tells more; people are less deep than wide, and their toes point ahead."""
-    above, ahead = np.array(up_vector(told.up)), np.array(front_vector(told.up))
+    above, ahead = np.array(up_vector(known.up)), np.array(front_vector(known.up))
     height, across = points @ above, points @ np.column_stack([ahead, np.cross(above, ahead)])
     low, high = np.quantile(height, [0.003, 0.997])
     level = (height - low) / (high - low)
     edges = np.ptp(np.quantile(across, [0.02, 0.98], axis=0), axis=0)
     parts = across[level < _BAND], across[(level > 2 * _BAND) & (level < _KNEE)], across[level > _NECK]
     if min(map(len, parts)) == 0 or edges.min() > _FLAT * edges.max():
-        return told
+        return known
     toes, legs, head = (part.mean(axis=0) for part in parts)
     long, deep = int(edges.argmax()), int(edges.argmin())
     of_head = float((head - across.mean(axis=0))[long] / edges[long])
     if abs(of_head) > _HEAD:
-        return told if long == 1 else replace(told, front=0.0 if of_head > 0 else 180.0)
+        return known if long == 1 else replace(known, front=0.0 if of_head > 0 else 180.0)
     of_toes = float((toes - legs)[deep] / edges[deep])
     if abs(of_toes) < _TOES or high - low < _TALL * edges[long]:
-        return told
-    return replace(told, front=math.copysign(90.0, of_toes) if deep == 1 else 0.0 if of_toes > 0 else 180.0)
+        return known
+    return replace(known, front=math.copysign(90.0, of_toes) if deep == 1 else 0.0 if of_toes > 0 else 180.0)
 
 
 def _body(points: NDArray[np.float64], share: float = 0.02) -> Bounds:
@@ -217,7 +217,7 @@ def _stands(points: NDArray[np.float64], axis: int) -> bool:
 
 def _is_one_sided(picture: NDArray[np.float64], depth: NDArray[np.float64]) -> bool:
     """Whether points were seen from one side alone: few share a line of sight with one far before or behind.
-    picture: (N, 2) places in what is seen from there, of any unit. depth: (N,)."""
+    picture: (N, 2) positions in what is seen from there, of any unit. depth: (N,)."""
     low, high = picture.min(axis=0), picture.max(axis=0)
     side = max(int(np.sqrt(len(depth) / _EACH)), 1)
     cells = ((picture - low) / np.where(high > low, high - low, 1) * side).astype(int).clip(0, side - 1)

@@ -94,7 +94,7 @@ def test_files_of_a_frame_share_a_budget(tmp_path: Path) -> None:
                     admit(MB, 190 * MB + 1)
         with opened(tmp_path / "b"):
             admit(MB, 200 * MB)
-            budget.kept = 20 * MB
+            budget.retained = 20 * MB
             admit(MB, 180 * MB)
             with pytest.raises(InputError):
                 admit(MB, 180 * MB + 1)

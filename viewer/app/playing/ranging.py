@@ -58,7 +58,7 @@ class Ranging:
         if laid.version != self._laid:
             self._laid, self._ranges = laid.version, ValueRanges(self._ranges.count)
         chosen, layers = self._session.document.look, request.layers
-        is_laid = chosen.color_by in laid.names or not layers.place.is_identity
+        is_laid = chosen.color_by in laid.names or not layers.world_from_pose.is_identity
         self._wanted = None if is_laid or not is_open_range(chosen) else chosen
         if not is_open_range(look) or self._ranges.count == 1:
             return request

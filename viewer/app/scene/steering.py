@@ -79,12 +79,12 @@ class Steering:
 
     def bounds(self, pose: Pose) -> Bounds:
         """The robust bounds of a pose, where tools move it to."""
-        return self._session.laid.layers(pose).place.bounds(self._viewport.bounds(pose))
+        return self._session.laid.layers(pose).world_from_pose.bounds(self._viewport.bounds(pose))
 
     def whole(self, pose: Pose) -> Bounds:
         """The bounds of all frames together, as far as they are known; of the pose alone where tools move it,
         or the view goes with the subject."""
-        is_moved = not self._session.laid.layers(pose).place.is_identity
+        is_moved = not self._session.laid.layers(pose).world_from_pose.is_identity
         return self.bounds(pose) if is_moved or self.follows else self.extent.around(self.bounds(pose))
 
     def fit(self) -> None:
@@ -93,7 +93,7 @@ class Steering:
         if not (pose and camera):
             return
         framed = self._framing(camera, pose)
-        place = self._session.laid.layers(pose).place
+        place = self._session.laid.layers(pose).world_from_pose
         places = np.abs(framed.places_in_picture(place.points(pose.sample + pose.origin)))
         if self._subject(pose) is not None and not (places <= (self._viewport.aspect / 2, 0.5)).all():
             self._note("The view shows what the depth camera looks at. Zoom out to see the rest of the scan.")
@@ -110,7 +110,7 @@ class Steering:
         subject = self._subject(pose)
         if subject is None:
             return camera.fit(self.whole(pose), self._viewport.aspect)
-        place = self._session.laid.layers(pose).place
+        place = self._session.laid.layers(pose).world_from_pose
         return camera.framing(place.points(subject), self._viewport.aspect)
 
     def _subject(self, pose: Pose) -> NDArray[np.float64] | None:
@@ -244,7 +244,7 @@ class Steering:
 
     def _first_camera(self, pose: Pose) -> Camera:
         """The camera that a scan is first shown with."""
-        is_moved = not self._session.laid.layers(pose).place.is_identity
+        is_moved = not self._session.laid.layers(pose).world_from_pose.is_identity
         views = () if is_moved else pose.views
         return first_camera(views, self.whole(pose), self._viewport.aspect, self._upright(pose))
 

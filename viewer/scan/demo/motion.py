@@ -28,7 +28,7 @@ _NECK = np.array((0.0, -110.0, -30.0))  # mm, about which the head turns
 class Twist:
     """A rotation about an axis by an angle that fades in space: p -> c + R(amount * weight(p)) (p - c).
 
-    center: a point of the axis. axis: its unit direction. weight: 0..1 over the place. A point
+    center: a point of the axis. axis: its unit direction. weight: 0..1 over the position. A point
     only slides along its own circle, and where `amount` is small enough for points of a circle
     not to pass each other, the twist is one to one.
     It works on one side of the face, x >= 0; the other side is its mirror image.
@@ -98,8 +98,8 @@ def _jaw(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
 def _mouth_corner(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
     """The corner of the mouth and the cheek beside and above it."""
     square = np.square(x)
-    place = bell(x, 28.0, 15.0) * bell(y, -54.0, 16.0) * bell(z, 80.0, 26.0)
-    return 1.1 * square / (square + 100.0) * place * ramp(z, 0.0, 40.0)
+    near = bell(x, 28.0, 15.0) * bell(y, -54.0, 16.0) * bell(z, 80.0, 26.0)
+    return 1.1 * square / (square + 100.0) * near * ramp(z, 0.0, 40.0)
 
 
 def _unit(*direction: float) -> Triple:

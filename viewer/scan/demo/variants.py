@@ -78,7 +78,7 @@ VARIANTS: dict[str, Callable[[np.random.Generator], HeadMotion]] = {
 
 def demo_motion(scan: str) -> HeadMotion:
     """The motion of the demo by its name: "demo", "demo:VARIANT" or "demo:VARIANT:SEED", of seed 0
-    unless told. Raises InputError for a variant that there is not, and a seed that is no whole number."""
+    by default. Raises InputError for a variant that there is not, and a seed that is no whole number."""
     _, named, which = scan.partition(":")
     if not named:
         return TALK

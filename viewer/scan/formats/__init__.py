@@ -7,8 +7,8 @@ A format module declares
 - where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
   `read_times(path)` (seconds, (T,) float64, or None);
 - where it holds faces: `read_faces(path, frame=0) -> Iterator[Faces]`, in pieces, none where there are none;
-- where frames are told by others: `Frames(path)`, whose `read(frame)` keeps what the next one needs;
-- where it tells the unit of length: `read_unit(path) -> str`, from the header alone;
+- where frames refer to others: `Frames(path)`, whose `read(frame)` remembers what the next one needs;
+- where it states the unit of length: `read_unit(path) -> str`, from the header alone;
 - where it can be written: `write(path, cloud)`, which may return a remark for the user, or
   `write_views(path, views)`, or, all poses in one file,
   `write_poses(path, poses, unit, **options)` and `check(path)`, which says whether it can be read again.
@@ -99,8 +99,8 @@ def read_times(path: Path | str) -> NDArray[np.float64] | None:
 
 
 def read_unit(path: Path | str) -> str | None:
-    """The name of the unit of length as the file tells it, which may be any text (see `usable_unit`); None
-    where it tells none. Raises InputError.
+    """The name of the unit of length that the file states, which may be any text (see `usable_unit`); None
+    if it states none. Raises InputError.
     """
     path = Path(path)
     module = _readable(path)
@@ -288,8 +288,8 @@ def one_message(
     except MemoryError as error:
         raise InputError(f"{failed}: not enough memory", where, "Close other programs") from error
     except OSError as refused:
-        what, told = explained(refused, hint)
-        raise InputError(f"{failed}: {what}", where, told) from refused
+        what, advice = explained(refused, hint)
+        raise InputError(f"{failed}: {what}", where, advice) from refused
     except Exception as error:
         raise InputError(_bounded(f"{failed}: {str(error) or type(error).__name__}"), where, hint) from error
 

@@ -45,12 +45,12 @@ _FREE = 180 << 20  # bytes that reading any file may take
 class ReadBudget:
     """The memory that the files of one frame may take together.
 
-    sizes: bytes of the files read so far, each once, by what tells it from all others. kept: bytes that hold
+    sizes: bytes of the files read so far, each once, by device and number. retained: bytes that hold
     what was read of them.
     """
 
     sizes: dict[tuple[int, int], int] = field(default_factory=dict)
-    kept: int = 0
+    retained: int = 0
 
     @property
     def held(self) -> int:
@@ -63,7 +63,10 @@ _shared: ContextVar[ReadBudget | None] = ContextVar("budget", default=None)  # o
 
 @contextmanager
 def shared() -> Iterator[ReadBudget]:
-    """Have all files that are read meanwhile share one budget; who keeps what was read adds it to `kept`."""
+    """Have all files that are read meanwhile share one budget.
+
+    A caller that holds results adds their bytes to `retained`.
+    """
     token = _shared.set(ReadBudget())
     try:
         budget = _shared.get()
@@ -77,7 +80,7 @@ def shared() -> Iterator[ReadBudget]:
 def opened(path: Path) -> Iterator[BinaryIO]:
     """A file, open to be read. Raises OSError, also where it is no plain file.
 
-    Raises InputError where the file has become shorter when all is read: then there is no telling what was.
+    Raises InputError where the file has become shorter when all is read: then nobody knows what was.
     """
     with open_plain(path) as stream:
         held = size_of(stream)
@@ -96,8 +99,8 @@ def size_of(stream: BinaryIO) -> int:
 
 def most_memory(held: int, ratio: int = _RATIO) -> int:
     """Bytes that reading a file of `held` bytes may take at a time. Raises InputError for a bad variable."""
-    told = megabytes(READ_VARIABLE)
-    return min(ratio * held + _FREE, _half_of_memory()) if told is None else told
+    stated = megabytes(READ_VARIABLE)
+    return min(ratio * held + _FREE, _half_of_memory()) if stated is None else stated
 
 
 def _half_of_memory() -> int:
@@ -113,7 +116,7 @@ def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
     take for each byte. Of a frame of several files, both are those of all (see `shared`).
     """
     if (budget := _shared.get()) is not None:
-        held, needed = max(held, budget.held), needed + budget.kept
+        held, needed = max(held, budget.held), needed + budget.retained
     if needed > most_memory(held, ratio):
         what = f"reading its {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
         hint = f"Where you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"

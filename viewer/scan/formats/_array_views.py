@@ -2,10 +2,10 @@
 
 | array | what it is |
 |---|---|
-| `depth` (H, W) | of the kind that `kind` tells (z, range, height), any real; whole numbers: 0 is none |
+| `depth` (H, W) | of the kind that `kind` states (z, range, height), any real; whole numbers: 0 is none |
 | `depth_scale` | how many of its numbers are one unit; 1 where it is missing |
 | `xyz` (H, W, 3) | instead: points in an image's axes, or with x right, y up and z towards the scanner |
-| `elevation` (H, W) | instead: heights of a terrain, in metres or the unit that is told |
+| `elevation` (H, W) | instead: heights of a terrain, in metres or the unit that `unit` states |
 | `color` (H, W), (H, W, 3 or 4) | uint8, or floats in 0..1, sRGB |
 | `mask` (H, W), `confidence` (H, W) | above 0.01: use the depth; any real |
 | `intrinsics` or `K` (3, 3), or `fx` `fy` `cx` `cy` | pixels, the centre of the first one at 0, 0 |
@@ -92,18 +92,18 @@ def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
 def unit_of_arrays(arrays: _Arrays, held: int) -> str | None:
     """The name of the unit of length of the view of a file of `held` bytes, or None. Raises InputError.
 
-    The heights of a terrain are read where they tell whether its ground is in degrees.
+    This reads the heights of a terrain to find out whether its ground is in degrees.
     """
     if "unit" in arrays or _source(arrays) != "elevation":
-        return _told_unit(arrays)
+        return _stated_unit(arrays)
     return view_of_arrays(arrays, held).unit
 
 
 def _unit(arrays: _Arrays) -> str | None:
-    return usable_unit(_told_unit(arrays))
+    return usable_unit(_stated_unit(arrays))
 
 
-def _told_unit(arrays: _Arrays) -> str | None:
+def _stated_unit(arrays: _Arrays) -> str | None:
     return _word(arrays, "unit", "") if "unit" in arrays else None
 
 
@@ -121,7 +121,7 @@ def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
         mask=np.ones(depth.shape, bool) if stored.dtype.kind == "f" else stored != 0,
         **_calibration(arrays, depth.shape[0], depth.shape[1], kind),
         distortion=tuple(_vector(arrays, "distortion").tolist()) if "distortion" in arrays else (),
-        world_to_camera=UPRIGHT if (told := _world_to_camera(arrays)) is None else told,
+        world_to_camera=UPRIGHT if (stated := _world_to_camera(arrays)) is None else stated,
         name="camera",
         unit=_unit(arrays) or UNKNOWN_UNIT,
     )
@@ -131,11 +131,11 @@ def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
 def _of_grid(grid: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     if grid.dtype.kind != "f":
         raise InputError(f"array 'xyz' is of type {grid.dtype}, expected floats")
-    unit, told = _unit(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
-    view = view_of_camera(grid, UPRIGHT if told is None else told, "camera", unit)
+    unit, stated = _unit(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
+    view = view_of_camera(grid, UPRIGHT if stated is None else stated, "camera", unit)
     if view is not None:
         return view, _AS_THEY_ARE
-    to_grid = np.eye(4) if told is None else IMAGE_AXES @ told
+    to_grid = np.eye(4) if stated is None else IMAGE_AXES @ stated
     view = view_of_grid(grid, to_grid, "scanner", unit)
     if is_seen_from_behind(view, to_grid):
         return view_of_grid(grid[_UPSIDE_DOWN], to_grid, "scanner", unit), _UPSIDE_DOWN
@@ -160,9 +160,9 @@ def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
 
 
 def _calibration(arrays: _Arrays, height: int, width: int, kind: str) -> dict[str, Any]:
-    """The pinhole; one that is assumed where nothing tells it."""
-    if told := next((name for name in _MATRICES if name in arrays), None):
-        matrix = _vector(arrays, told, 9).reshape(3, 3)
+    """The pinhole; an assumed one if no array states it."""
+    if stated := next((name for name in _MATRICES if name in arrays), None):
+        matrix = _vector(arrays, stated, 9).reshape(3, 3)
         fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     elif missing := [name for name in _PINHOLE if name not in arrays]:
         if len(missing) < len(_PINHOLE) or kind == "height":

@@ -50,8 +50,8 @@ def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
     """
     columns: dict[str, NDArray] = {}
     seen: dict[str, int] = {}
-    for place, (name, column) in enumerate(pairs, 1):
-        name = name or f"column_{place}"
+    for index, (name, column) in enumerate(pairs, 1):
+        name = name or f"column_{index}"
         key = name.lower() if name.lower() in _GEOMETRY else name
         seen[key] = seen.get(key, 0) + 1
         if seen[key] > 1:

@@ -59,30 +59,34 @@ def _memory(
     at_hand: bool,
 ) -> int:
     """Bytes that are held at most at a time, step by step as `PointCloud.from_arrays` goes."""
-    rows, keep = len(points), finite_rows(points)
-    kept = rows if keep is None else int(np.count_nonzero(keep))
+    rows, finite = len(points), finite_rows(points)
+    retained = rows if finite is None else int(np.count_nonzero(finite))
     moved = points.dtype != np.float32 or (
-        keep is not None or bool(choose_origin(points).any()) if origin is None else bool(origin.any())
+        finite is not None or bool(choose_origin(points).any()) if origin is None else bool(origin.any())
     )
 
     def taken(array: Deferred) -> tuple[int, int]:
         made, freed = rows * array.size, rows * array.size if at_hand else 0
-        return (made, made - freed) if keep is None else (made + kept * array.size, kept * array.size - freed)
+        return (
+            (made, made - freed)
+            if finite is None
+            else (made + retained * array.size, retained * array.size - freed)
+        )
 
     steps = [taken(array) for array in attributes.values()]  # bytes meanwhile, and then
-    if keep is not None:
-        steps.append((kept * points.itemsize * 3, (kept - rows) * points.itemsize * 3))
+    if finite is not None:
+        steps.append((retained * points.itemsize * 3, (retained - rows) * points.itemsize * 3))
     if "axes" in attributes:
-        steps.append((kept * _SPLAT, kept * _SPLAT))
+        steps.append((retained * _SPLAT, retained * _SPLAT))
     beyond = points.dtype != np.float32  # what float32 offsets do not hold
-    steps.append((kept * 12 * (moved + beyond),) * 2)
+    steps.append((retained * 12 * (moved + beyond),) * 2)
     for name, size in _FINAL.items():
         if name in attributes and (name == "colors" or attributes[name].dtype != np.float32):
-            steps.append((kept * size,) * 2)
+            steps.append((retained * size,) * 2)
     steps += [taken(array) for array in scalars.values()]
-    if keep is not None:
-        steps.append((kept * _IDS, kept * _ID))
-    held = points.nbytes + (0 if keep is None else rows)
+    if finite is not None:
+        steps.append((retained * _IDS, retained * _ID))
+    held = points.nbytes + (0 if finite is None else rows)
     if at_hand:
         held += rows * sum(array.size for array in [*attributes.values(), *scalars.values()])
     peak = held

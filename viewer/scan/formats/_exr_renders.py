@@ -1,7 +1,7 @@
 """Pictures with depth that other programs have written as EXR: which channels are one eye's, and its camera.
 
 A picture has a channel `Z`, by itself or at the end of a layer's name, and perhaps `R G B` and `A` in the
-same layer or another. Two eyes are told by the attribute `multiView` and names of layers, or a part's `view`.
+same layer or another. The attribute `multiView` and names of layers, or a part's `view`, mark two eyes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class RenderedEye:
 
 
 def rendered_eyes(headers: Sequence[dict[str, Any]]) -> list[RenderedEye]:
-    """The eyes whose camera the headers tell; where they tell none, the first. Raises InputError."""
+    """The eyes whose camera the headers state; without a camera, the first. Raises InputError."""
     eyes: dict[str, dict[tuple[str, ...], _Layer]] = {}
     for part, header in enumerate(headers):
         names = header.get("multiView", [])
@@ -61,7 +61,7 @@ def _eye(
 ) -> RenderedEye | None:
     """The picture in an eye's layers; the one with the shortest name where several have a depth."""
     outer = [layers[key] for key in sorted(layers, key=len)]
-    # Beside an X, Z is of a direction or a place.
+    # Beside an X, Z is of a direction or a position.
     source = next((layer for layer in outer if "Z" in layer and "X" not in layer), None)
     if source is None:
         return None

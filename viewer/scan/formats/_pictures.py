@@ -73,10 +73,10 @@ def numbers_of_picture(image: Image) -> NDArray:
     if image.mode not in _OF_NUMBERS and not image.mode.startswith("I;16"):
         raise InputError(f"is a picture of type {image.mode}; a picture with one number a pixel is needed")
     tiles = getattr(image, "tile", [])  # that are still to be decoded
-    for place, tile in enumerate(tiles):
+    for index, tile in enumerate(tiles):
         # Pillow takes what was decoded for numbers in the file's order of bytes.
         if tile[0] == _COMPRESSED and tile[3][0] in _IN_NATIVE_ORDER:
-            tiles[place] = tile._replace(args=(_IN_NATIVE_ORDER[tile[3][0]], *tile[3][1:]))
+            tiles[index] = tile._replace(args=(_IN_NATIVE_ORDER[tile[3][0]], *tile[3][1:]))
     values = np.array(image)
     return values.astype(values.dtype.newbyteorder("="), copy=False)
 

@@ -1,4 +1,4 @@
-"""What the faces of a file tell: which of its points are those of another file."""
+"""The topology that faces define: which points of a file are those of another file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..points import PointCloud
 def with_topology(cloud: PointCloud, faces: Iterable[Faces]) -> PointCloud:
     """The cloud with the topology that its faces, in pieces, give it; itself where there are none.
 
-    Damaged faces tell nothing, and cost no point.
+    Damaged faces define none, and cost no point.
     """
     try:
         name = topology(len(cloud) + cloud.dropped, faces)

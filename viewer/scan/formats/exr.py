@@ -12,7 +12,7 @@ y in the pod's camera space), and the attributes
   space is left-handed and looks down +z; NDC runs from 0, 0 in the upper left corner to 1, 1;
 - `worldToCamera64` (m44d): worldToCamera in double precision, since float32 cannot place a pod at UTM
   coordinates; it counts where it is there;
-- `unit` (string): the name of the unit of length; `assumed` (string): what of all this nobody told.
+- `unit` (string): the name of the unit of length; `assumed` (string): what of all this was assumed.
 
 Pictures with depth that other programs have written open as well; see `_exr_renders`.
 """
@@ -187,7 +187,7 @@ def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int], eyes: int
 
 
 def _pixel_bytes(stream: BinaryIO, parts: int) -> list[int]:
-    """Bytes of a pixel of each part, as the headers say; OpenEXR tells when it has decoded them."""
+    """Bytes of a pixel of each part, as the headers say; OpenEXR says it only after decoding."""
     stream.seek(_MAGIC_BYTES)
     found = [0] * parts
     for part in range(parts):

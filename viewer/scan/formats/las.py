@@ -41,7 +41,7 @@ _WHOLE = {"X", "Y", "Z"}  # coordinates before scale and offset
 _COPIES, _OTHERS = 2, 36  # of a point's bytes; bytes of its coordinates and of what becomes of them
 _FIRST = struct.Struct("<96xIIB")  # where points begin, number of records before, format of points
 _SMALLEST_RECORD = 54  # bytes
-_PACKED = 0x80  # the bit of the format that tells LAZ
+_PACKED = 0x80  # the bit of the format that marks LAZ
 _LOOK = 0.1  # seconds between looks at whether reading is cancelled
 _SAID = 200  # letters of what the unpacker says
 
@@ -50,7 +50,7 @@ def read(path: Path, frame: int = 0) -> PointCloud:
     """All finite points of a LAS or LAZ file. Raises InputError."""
     import laspy
 
-    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # what is wrong is told by what is raised
+    logging.getLogger("laspy").setLevel(logging.CRITICAL)  # the exception says what is wrong
     with opened(path) as stream:
         held = size_of(stream)
         if not _checked_format(stream.read(_FIRST.size), held) & _PACKED:

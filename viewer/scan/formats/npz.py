@@ -83,7 +83,7 @@ def read_times(path: Path) -> NDArray[np.float64] | None:
 
 
 def read(path: Path, frame: int = 0) -> Scanned:
-    """One frame; arrays that are not needed and other frames are not kept. Raises InputError."""
+    """One frame; it reads no array that is not needed, and no other frame. Raises InputError."""
     with opened(path) as stream, _arrays(stream) as arrays:
         if _is_range_scan(arrays):
             return (view_of_arrays(arrays, size_of(stream)),)
@@ -253,11 +253,11 @@ def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
     return arrays["positions"]
 
 
-def _faces(arrays: dict[str, StoredArray], held: int, kept: int = 0) -> Iterator[Faces]:
-    """The triangles of a file of `held` bytes, beside so many bytes that are kept."""
+def _faces(arrays: dict[str, StoredArray], held: int, held_before: int = 0) -> Iterator[Faces]:
+    """The triangles of a file of `held` bytes, beside `held_before` bytes in memory."""
     faces = arrays.get("faces")
     if faces and len(faces.shape) == 2 and faces.shape[1] == 3 and faces.dtype.kind in "iu":
-        admit(held, kept + faces.memory())
+        admit(held, held_before + faces.memory())
         corners = faces.read()
         for start in range(0, len(corners), _FACES_AT_ONCE):
             yield Faces.of(corners[start : start + _FACES_AT_ONCE])

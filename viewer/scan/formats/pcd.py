@@ -59,7 +59,7 @@ _HERE = ["0", "0", "0", "1", "0", "0", "0"]  # the viewpoint that nobody tells
 _OF_VIEWS = {"x", "y", "z", "red", "green", "blue", "alpha"}  # columns that range views have
 _VIEW_BYTES, _WORK = 64, 20 << 20  # bytes of a point as it becomes a view, and beside all
 # Open3D 0.20 and PCL's point types do; CloudCompare (2.12) and PDAL read them. Offsets in float32 would need
-# a place for the origin that others know, and programs differ in what VIEWPOINT means.
+# a field for the origin that others know, and programs differ in what VIEWPOINT means.
 _SLACK = 1e-6  # scan units: what is less is no reason for coordinates that few programs read
 _IN_FLOAT64 = "coordinates are float64, since float32 would round them; Open3D and PCL read such as zeros"
 _LONGEST_WORD = 40  # of a file, in a message
@@ -128,8 +128,10 @@ def _sensor(viewpoint: list[str]) -> NDArray[np.float64] | None:
         numbers = np.array(viewpoint or _HERE, np.float64)
     except ValueError:
         return None
-    told = numbers.shape == (7,) and np.isfinite(numbers).all() and (numbers != np.array(_HERE, float)).any()
-    return numbers[:3].copy() if told else None
+    is_stated = (
+        numbers.shape == (7,) and np.isfinite(numbers).all() and (numbers != np.array(_HERE, float)).any()
+    )
+    return numbers[:3].copy() if is_stated else None
 
 
 def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""PLY: the Stanford polygon file format; its vertices are the points, its faces tell the topology.
+"""PLY: the Stanford polygon file format; its vertices are the points, its faces define the topology.
 
 Vertices of plain numbers that come first in the file, as nearly always, are read straight into numpy. Rows
 with lists are walked, since only the lengths in them tell where the next one begins; the lists are left out.
@@ -55,7 +55,7 @@ SUFFIXES = (".ply",)
 
 _ROWS_AT_ONCE = 1 << 12  # of text
 _NORMALS = {"nx", "ny", "nz"}
-_GRID, _PLACE_BYTES = "range_grid", 64  # bytes of memory for a place of it
+_GRID, _CELL_BYTES = "range_grid", 64  # bytes of memory for a cell of it
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
@@ -104,18 +104,18 @@ def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
 def read_range_grid(path: Path) -> NDArray[np.float64]:
     """The points of a range grid, (rows, columns, 3), NaN where the grid has none. Raises InputError.
 
-    So Stanford's scans are stored: the element `range_grid` has a list for each place in the grid, with one
+    So Stanford's scans are stored: the element `range_grid` has a list for each cell of the grid, with one
     vertex or none, and remarks of the header tell how many rows and columns there are.
     """
     with opened(path) as stream:
         head = stream.read(LONGEST_HEADER)
         header = parse_header(head)
         sizes = [int(size) for name in (b"rows", b"cols") for size in _grid_sizes(head[: header.size], name)]
-        places = sum(element.count for element in header.elements if element.name == _GRID)
-        if len(sizes) != 2 or not places or math.prod(sizes) != places:
+        cells = sum(element.count for element in header.elements if element.name == _GRID)
+        if len(sizes) != 2 or not cells or math.prod(sizes) != cells:
             found = " x ".join(map(str, sizes)) or "no size"
-            raise InputError(f"has no range grid: {places} places for {found}")
-        admit(size_of(stream), places * _PLACE_BYTES)
+            raise InputError(f"has no range grid: {cells} cells for {found}")
+        admit(size_of(stream), cells * _CELL_BYTES)
         stream.seek(header.size)
         lists = Faces.joined(_faces(stream, header, of=_GRID))
     cloud = read(path)
@@ -123,7 +123,7 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
     points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
     if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():
         raise InputError("its range grid has several vertices in one cell, or a missing vertex")
-    grid = np.full((places, 3), np.nan)
+    grid = np.full((cells, 3), np.nan)
     grid[lists.sizes == 1] = points[lists.corners]
     return grid.reshape(*sizes, 3)
 

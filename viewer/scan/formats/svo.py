@@ -1,8 +1,8 @@
 """SVO: octrees of all poses in one file, one after another; docs/reference/octree-files.md has the layout.
 
 Each pose is its leaves: a point in the middle of each, with its colour and normal; and the few points far
-outside, as they are. Written are geometry, colours, normals, times and unit. A pose may be told by the one
-before it: then that is read too.
+outside, as they are. Written are geometry, colours, normals, times and unit. A pose may refer to the one
+before it: then Scan4D reads that, too.
 """
 
 from __future__ import annotations
@@ -56,12 +56,12 @@ _FEW = 1 / 1024  # of a pose's points: what may be outside a cube that fits
 
 def frame_count(path: Path) -> int:
     """How many octrees there are; reads their headers."""
-    return len(_places(path))
+    return len(_extents(path))
 
 
 def read_times(path: Path) -> NDArray[np.float64]:
     """(T,) seconds."""
-    return np.array([place.header.time for place in _places(path)])
+    return np.array([extent.header.time for extent in _extents(path)])
 
 
 def read_unit(path: Path) -> str:
@@ -72,19 +72,19 @@ def read_unit(path: Path) -> str:
 
 def check(path: Path) -> None:
     """Raise InputError where a pose is too large to be read again, by the headers alone."""
-    for place in _places(path):
-        leaves = place.header.levels[-1].nodes
-        needed = max(place.memory, leaves * (_LEAF_BYTES + place.header.width))
+    for extent in _extents(path):
+        leaves = extent.header.levels[-1].nodes
+        needed = max(extent.memory, leaves * (_LEAF_BYTES + extent.header.width))
         admit(path.stat().st_size, needed, _MOST_RATIO)
 
 
 def read(path: Path, frame: int = 0) -> PointCloud:
-    """The leaves of one pose. Raises InputError where it, or a pose that it is told by, is damaged."""
+    """The leaves of one pose. Raises InputError where it, or a pose that it refers to, is damaged."""
     return Frames(path).read(frame)
 
 
 class Frames:
-    """The poses of one file. The octree read last is kept, so that reading them in turn reads each once.
+    """The poses of one file. It holds the octree that it read last, so reading them in turn reads each once.
 
     Any thread may read.
     """
@@ -92,22 +92,22 @@ class Frames:
     def __init__(self, path: Path) -> None:
         """Reads the headers. Raises InputError where the file holds something else."""
         self._path = path
-        self._places = _places(path)
+        self._extents = _extents(path)
         self._last: tuple[int, Octree] | None = None
         self._reading = Lock()
 
     def read(self, frame: int) -> PointCloud:
         """The leaves of one pose. Raises InputError as `read` does."""
         with self._reading, opened(self._path) as file:
-            start = frame - self._places[frame].header.before
+            start = frame - self._extents[frame].header.before
             previous = None
             if self._last is not None and start <= self._last[0] < frame:
                 start, previous = self._last[0] + 1, self._last[1]
             for index in range(start, frame + 1):
                 checkpoint()
-                file.seek(self._places[index].offset)
-                admit(size_of(file), self._places[index].memory, _MOST_RATIO)
-                data = read_exactly(file, self._places[index].size)
+                file.seek(self._extents[index].offset)
+                admit(size_of(file), self._extents[index].memory, _MOST_RATIO)
+                data = read_exactly(file, self._extents[index].size)
                 previous = from_bytes(data, previous)
             assert previous is not None, "there is the one asked for"
             admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES, _MOST_RATIO)
@@ -158,8 +158,8 @@ def write_poses(
         for pose in poses:
             cube = _cube_for(pose.cloud, cube, is_of_all=around is not None)
             octree = build(pose.cloud, stop, cube)
-            told_by, strays = previous if chain < _LONGEST else None, Strays.of(octree, pose.cloud)
-            data = to_bytes(octree, told_by, chain=chain, time=pose.time, unit=unit, strays=strays)
+            reference, strays = previous if chain < _LONGEST else None, Strays.of(octree, pose.cloud)
+            data = to_bytes(octree, reference, chain=chain, time=pose.time, unit=unit, strays=strays)
             file.write(data)
             previous, chain = octree, read_header(data)[0].before + 1
 
@@ -180,7 +180,7 @@ def _with_margin(cube: Cube) -> Cube:
     return Cube.around(cube.low - margin, cube.low + cube.edge + margin)
 
 
-class _Place(NamedTuple):
+class _Extent(NamedTuple):
     """Place of an octree in the file. size: with its header, as far as the file reaches."""
 
     offset: int
@@ -197,23 +197,23 @@ class _Place(NamedTuple):
         return max(nodes) * (_NODE_BYTES + 4 * self.header.width) + held + outside
 
 
-def _places(path: Path) -> list[_Place]:
+def _extents(path: Path) -> list[_Extent]:
     """All octrees of a file. Raises InputError where there is something else, or a chain has no beginning."""
     status = path.stat()
     return _found(path, status.st_size, status.st_mtime_ns)
 
 
-def _cut(places: list[_Place], offset: int, end: int) -> _Place:
-    """The place of an octree of which a file cut short has the beginning, at the time that it should have."""
-    last = places[-1].header
-    step = last.time - places[-2].header.time if len(places) > 1 else 1.0
-    return _Place(offset, end - offset, replace(last, before=0, time=last.time + step))
+def _cut(extents: list[_Extent], offset: int, end: int) -> _Extent:
+    """The extent of an octree whose end is missing in a file that was cut short, with the expected time."""
+    last = extents[-1].header
+    step = last.time - extents[-2].header.time if len(extents) > 1 else 1.0
+    return _Extent(offset, end - offset, replace(last, before=0, time=last.time + step))
 
 
 @lru_cache(maxsize=2)  # opening a scan asks for them several times
-def _found(path: Path, size: int, changed: int) -> list[_Place]:
-    """`_places` of a file of this size that was last changed then."""
-    places: list[_Place] = []
+def _found(path: Path, size: int, changed: int) -> list[_Extent]:
+    """`_extents` of a file of this size and time of change."""
+    extents: list[_Extent] = []
     with opened(path) as file:
         offset, end = 0, size_of(file)
         while offset < end:
@@ -221,22 +221,22 @@ def _found(path: Path, size: int, changed: int) -> list[_Place]:
             try:
                 header, taken = read_header(file.read(LARGEST_HEADER))
             except CutShort as error:
-                if not places:
+                if not extents:
                     error.what = f"octree 0, at byte 0: {error.what}"
                     raise
-                places.append(_cut(places, offset, end))  # told when it is read
+                extents.append(_cut(extents, offset, end))  # reading it raises the error
                 break
             except InputError as error:
-                error.what = f"octree {len(places)}, at byte {offset}: {error.what}"
+                error.what = f"octree {len(extents)}, at byte {offset}: {error.what}"
                 raise
             taken += header.stored
-            check_count(len(places) + 1, _MOST_POSES, "octrees")
-            if places and header.unit != places[0].header.unit:
-                raise InputError(f"octree {len(places)} has another unit of length than the first")
-            places.append(_Place(offset, min(taken, end - offset), header))
+            check_count(len(extents) + 1, _MOST_POSES, "octrees")
+            if extents and header.unit != extents[0].header.unit:
+                raise InputError(f"octree {len(extents)} has another unit of length than the first")
+            extents.append(_Extent(offset, min(taken, end - offset), header))
             offset += taken
-    counts = [0, *(place.header.before for place in places)]
+    counts = [0, *(extent.header.before for extent in extents)]
     for index, (above, here) in enumerate(pairwise(counts)):
         if here not in (0, above + 1) or here > index:
             raise InputError(f"octree {index} depends on {here} before it, which are missing")
-    return places
+    return extents

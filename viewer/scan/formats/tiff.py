@@ -90,20 +90,20 @@ def _ground(tags: dict[int, Any]) -> Ground:
         scale, tie = _floats(tags, _SCALE, 2), _floats(tags, _TIE, 6)
         right, down = scale[0], -scale[1]
         left, first = tie[3] - tie[0] * right, tie[4] - tie[1] * down
-    if keys.get(_RASTER_TYPE) == _POINT:  # the places are those of the middles of cells
+    if keys.get(_RASTER_TYPE) == _POINT:  # the positions are the middles of cells
         left, first = left - right / 2, first - down / 2
     degrees = keys.get(_MODEL_TYPE) == _GEOGRAPHIC
     of_ground, of_heights = _units(tags)
     unit = of_heights or (METRE if degrees else UNKNOWN_UNIT)
     longer = 1.0 if degrees or of_ground is None else conversion(of_ground, unit) or 1.0
-    place = (float(value * longer) for value in (left, first, right, down))
+    edges = (float(value * longer) for value in (left, first, right, down))
     return Ground(
-        **dict(zip(("left", "first", "right", "down"), place, strict=True)), degrees=degrees, unit=unit
+        **dict(zip(("left", "first", "right", "down"), edges, strict=True)), degrees=degrees, unit=unit
     )
 
 
 def _units(tags: dict[int, Any]) -> tuple[str | None, str | None]:
-    """The units of the ground and of the heights; heights are in the ground's where nothing else is told."""
+    """The units of the ground and of the heights; heights are in the ground's if no other unit is stated."""
     keys = _geo_keys(tags)
     of_ground = _UNITS.get(keys.get(_GROUND_UNIT, 0))
     if keys.get(_MODEL_TYPE) == _GEOGRAPHIC:

@@ -6,9 +6,9 @@ A module declares
 - `find(folder, names) -> RangeFrames | None`: its frames, where the folder is of this kind. names: those of
   all that is in the folder, in no order. No frame is read, small text files may be. It raises where the
   folder is of this kind and something is wrong with all of it;
-- where parts that are missing can be told: `lacks(names) -> str`, what is missing in a folder that has other
-  parts of this kind, and "" where it has none of them;
-- `GENERAL = True` where it takes what more special kinds do not.
+- optional: `lacks(names) -> str`, what is missing in a folder that has other parts of this kind; "" for a
+  folder that has none of them;
+- optional: `GENERAL = True` if the other kinds are to be tried first.
 
 Modules whose name starts with an underscore are helpers.
 """

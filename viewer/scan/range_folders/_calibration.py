@@ -1,4 +1,4 @@
-"""The calibration of a depth camera, as a small file beside its pictures tells it."""
+"""The calibration of a depth camera, from a small file beside its pictures."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FORM = "It should have fx, fy, cx and cy in pixels, and for depth pictures dept
 class Calibration:
     """A pinhole, its lens, and what the numbers of its depth pictures mean.
 
-    fx, fy, cx, cy, distortion, kind: as `RangeView` has them. unit: as the file tells it, perhaps any text.
+    fx, fy, cx, cy, distortion, kind: as `RangeView` has them. unit: as the file states it, perhaps any text.
     depth_scale: how many of the numbers are one unit, for example 1000 for millimetres where the unit is m.
     width, height: of the pictures that it is for, None: of any.
     """
@@ -43,9 +43,9 @@ class Calibration:
 
     def check_size(self, size: Sequence[int], where: Path) -> None:
         """Raise InputError where a picture of this size, width and height, is not what it is for."""
-        told = (self.width, self.height)
-        if None not in told and tuple(size) != told:
-            what = "has {} x {} pixels, its calibration is for {} x {}".format(*size, *told)
+        stated = (self.width, self.height)
+        if None not in stated and tuple(size) != stated:
+            what = "has {} x {} pixels, its calibration is for {} x {}".format(*size, *stated)
             raise InputError(what, where)
 
 
@@ -69,7 +69,7 @@ def calibration_beside(folder: Path, names: Sequence[str], default: Calibration)
 
 
 def read_calibration(path: Path, default: Calibration | None = None) -> Calibration:
-    """The calibration in a file; what it does not tell is as in the default. Raises InputError.
+    """The calibration in a file; the default gives what the file does not state. Raises InputError.
 
     JSON has the numbers by name, or Open3D's `intrinsic_matrix`; text has a 3 x 3 or a 4 x 4 matrix, or one
     line: fx fy cx cy and perhaps the coefficients of the distortion.
@@ -84,19 +84,19 @@ def read_calibration(path: Path, default: Calibration | None = None) -> Calibrat
 
 
 def calibration_of(stored: dict[str, Any], default: Calibration | None = None) -> Calibration:
-    """The calibration in a JSON object; what it does not tell is as in the default. Raises InputError."""
+    """The calibration in a JSON object; the default gives what it does not state. Raises InputError."""
     return _checked(_from_json(stored), default)
 
 
 def _from_json(stored: dict[str, Any]) -> dict[str, Any]:
-    """The fields that a file tells, others left aside."""
-    told = {field.name: stored[field.name] for field in fields(Calibration) if field.name in stored}
+    """The known fields of a file."""
+    stated = {field.name: stored[field.name] for field in fields(Calibration) if field.name in stored}
     if _MATRIX in stored:
         matrix = np.array(stored[_MATRIX], np.float64)
         if matrix.shape != (9,):
             raise InputError(f"{_MATRIX} has shape {matrix.shape}, expected 9 numbers, by columns")
-        told |= dict(zip(("fx", "fy", "cx", "cy"), matrix[[0, 4, 6, 7]].tolist(), strict=True))
-    return told
+        stated |= dict(zip(("fx", "fy", "cx", "cy"), matrix[[0, 4, 6, 7]].tolist(), strict=True))
+    return stated
 
 
 def _from_text(rows: Sequence[tuple[int, Sequence[str]]]) -> dict[str, Any]:
@@ -109,11 +109,11 @@ def _from_text(rows: Sequence[tuple[int, Sequence[str]]]) -> dict[str, Any]:
     return dict(zip(("fx", "fy", "cx", "cy"), numbers, strict=False)) | {"distortion": numbers[4:]}
 
 
-def _checked(told: dict[str, Any], default: Calibration | None) -> Calibration:
-    """The calibration of what a file tells. Raises InputError where it is none, and says why."""
-    if missing := [name for name in ("fx", "fy", "cx", "cy") if name not in told]:
+def _checked(stated: dict[str, Any], default: Calibration | None) -> Calibration:
+    """The calibration with these fields. Raises InputError that says what is wrong."""
+    if missing := [name for name in ("fx", "fy", "cx", "cy") if name not in stated]:
         raise InputError(f"is no calibration: it lacks {', '.join(missing)}", hint=_FORM)
-    given = {**told, "distortion": tuple(_number("distortion", each) for each in _listed(told))}
+    given = {**stated, "distortion": tuple(_number("distortion", each) for each in _listed(stated))}
     for name in ("fx", "fy", "cx", "cy", "depth_scale"):
         if name in given:
             given[name] = _number(name, given[name])
@@ -132,8 +132,8 @@ def _checked(told: dict[str, Any], default: Calibration | None) -> Calibration:
     return Calibration(**given) if default is None else replace(default, **given)
 
 
-def _listed(told: dict[str, Any]) -> Sequence[Any]:
-    values = told.get("distortion", ())
+def _listed(stated: dict[str, Any]) -> Sequence[Any]:
+    values = stated.get("distortion", ())
     if not isinstance(values, list | tuple):
         raise InputError("its distortion is no list of numbers")
     return values

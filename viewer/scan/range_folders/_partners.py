@@ -68,7 +68,7 @@ def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
     """The depth pictures of a folder with their partners, in natural order.
 
     They are in its folder `depth`, with partners of the same name in folders `color` (or `rgb`, `image`) and
-    `pose`; or in the folder itself, where partners have `color` and `pose` in the place of `depth`, or the
+    `pose`; or in the folder itself, where partners have `color` and `pose` in place of `depth`, or the
     same name and another suffix.
     """
     if DEPTH_FOLDER in names:
@@ -87,12 +87,12 @@ def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
 def depth_names(folder: Path, names: Sequence[str]) -> list[str]:
     """The names of depth pictures in natural order: PNG that say so, or all if the first is 16-bit grey."""
     pictures = sorted((name for name in names if name.lower().endswith(DEPTH_SUFFIX)), key=natural_key)
-    told = [name for name in pictures if _DEPTH in name.lower()]
-    return told or (pictures if pictures and is_depth(folder / pictures[0]) else [])
+    named = [name for name in pictures if _DEPTH in name.lower()]
+    return named or (pictures if pictures and is_depth(folder / pictures[0]) else [])
 
 
 def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
-    """The world_to_camera that the picture's pose file tells, a 4 x 4 matrix from the camera to the world.
+    """The world_to_camera of the picture's pose file, a 4 x 4 matrix from the camera to the world.
 
     Raises InputError.
     """
@@ -142,7 +142,7 @@ def _pose_names(depth: str) -> Iterator[str]:
 
 
 def _replaced(stem: str, word: str) -> str:
-    """The name with a word in the place of `depth`."""
+    """The name with a word in place of `depth`."""
     at = stem.lower().rindex(_DEPTH)
     return stem[:at] + word + stem[at + len(_DEPTH) :]
 

@@ -81,8 +81,8 @@ def depth_view(
     def of_same_pixels(path: Path, what: str, read: Callable[[Path], NDArray]) -> NDArray:
         image = read(path)
         if image.shape[:2] != stored.shape:
-            told = f"has {_size(image)} pixels, its depth {_size(stored)}"
-            raise InputError(told, path, f"{what} must be of the same pixels")
+            sizes = f"has {_size(image)} pixels, its depth {_size(stored)}"
+            raise InputError(sizes, path, f"{what} must be of the same pixels")
         return image
 
     if mask is not None:

@@ -25,7 +25,7 @@ class RangeFrames:
 
     name: the scan's. labels: a file's name for each frame, at least one. read: the views of a frame one after
     the other, which may raise anything. files: all that is read, images first, as scans of one camera share
-    calibration and poses, and the first file tells them apart. unit: of all views, as the files tell it.
+    calibration and poses, and the first file tells them apart. unit: of all views, as the files state it.
     recorded: the times that were stored with the frames, (T,) seconds, or None. package: that
     reads them; "" for Scan4D itself.
     """
@@ -55,9 +55,9 @@ class RangeFrames:
         with one_message(self.label(index), "cannot be read"), shared() as budget:
             for view in self.read(index):
                 views.append(view)
-                budget.kept += view.nbytes
+                budget.retained += view.nbytes
                 check_count(len(views), MOST_VIEWS, "range views")
-            budget.kept = 0  # the views are among what merging takes
+            budget.retained = 0  # the views are among what merging takes
             admit(budget.held, memory_of_merging(views), _MERGING_RATIO)
         return tuple(views)
 

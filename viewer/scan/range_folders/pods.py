@@ -103,16 +103,16 @@ def _rig(stored: dict[str, Any]) -> tuple[str, list[_Pod]]:
 def _pod(stored: Any, name: str, unit: str) -> _Pod:
     if not isinstance(stored, dict):
         raise InputError(f"{name} is no JSON object")
-    told = stored.get("name", name)
-    if not isinstance(told, str) or not told:
-        raise InputError(f"the name of {name} is {shortened(told)}")
+    stated = stored.get("name", name)
+    if not isinstance(stated, str) or not stated:
+        raise InputError(f"the name of {name} is {shortened(stated)}")
     try:
         default = Calibration(fx=1, fy=1, cx=0, cy=0, depth_scale=1, unit=unit)
         there = [image for image in _IMAGES if image in stored or image == _RANGE]
         patterns = {image: _pattern(stored, image) for image in there}
-        return _Pod(told, calibration_of(stored, default), _pose(stored), patterns)
+        return _Pod(stated, calibration_of(stored, default), _pose(stored), patterns)
     except InputError as error:
-        raise InputError(f"pod '{shortened(told)}' {error.what}", hint=error.hint) from error
+        raise InputError(f"pod '{shortened(stated)}' {error.what}", hint=error.hint) from error
 
 
 def _pose(stored: dict[str, Any]) -> NDArray[np.float64]:
@@ -129,11 +129,11 @@ def _pose(stored: dict[str, Any]) -> NDArray[np.float64]:
 
 def _pattern(stored: dict[str, Any], image: str) -> str:
     """A file's name within the folder, with one star at most."""
-    told = stored.get(image)
-    if not isinstance(told, str) or told.count(_ANY) > 1 or _ANY in os.path.dirname(told):
-        raise InputError(f"has the {image} {shortened(told)}, expected a file name with one {_ANY} at most")
-    named_inside(Path(), told, None)
-    return told
+    stated = stored.get(image)
+    if not isinstance(stated, str) or stated.count(_ANY) > 1 or _ANY in os.path.dirname(stated):
+        raise InputError(f"has the {image} {shortened(stated)}, expected a file name with one {_ANY} at most")
+    named_inside(Path(), stated, None)
+    return stated
 
 
 def _matches(folder: Path, patterns: Collection[str]) -> dict[str, set[str]]:
@@ -141,13 +141,13 @@ def _matches(folder: Path, patterns: Collection[str]) -> dict[str, set[str]]:
 
     Raises InputError where patterns name the same files so often that it would take too much memory.
     """
-    names = {place: _listed(place) for place in {(folder / pattern).parent for pattern in patterns}}
+    names = {parent: _listed(parent) for parent in {(folder / pattern).parent for pattern in patterns}}
     held = _NAME_BYTES * sum(map(len, names.values()))
     found: dict[str, set[str]] = {}
     for pattern in patterns:
-        place = folder / pattern
-        start, star, end = map(os.path.normcase, place.name.partition(_ANY))
-        there = names[place.parent] if star else []
+        file = folder / pattern
+        start, star, end = map(os.path.normcase, file.name.partition(_ANY))
+        there = names[file.parent] if star else []
         found[pattern] = {
             name[len(start) : len(name) - len(end)]
             for name in there
@@ -155,7 +155,7 @@ def _matches(folder: Path, patterns: Collection[str]) -> dict[str, set[str]]:
             and (compared := os.path.normcase(name)).startswith(start)
             and compared.endswith(end)
         }
-        if not star and place.is_file():
+        if not star and file.is_file():
             found[pattern].add("")
         admit(held, _NAME_BYTES * sum(map(len, found.values())))
     return found
