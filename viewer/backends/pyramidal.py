@@ -1,8 +1,8 @@
 """Draws range images and points, and fills the holes between their samples.
 
 The method is pyramidal projection (Farooq 2013, chapters 4 to 6). The renderer draws the samples into the
-picture, and computes targets from it: copies of half the size, a quarter, and so on. It fills each hole from
-the finest target whose samples surround the hole.
+picture, and computes targets from it: copies of half the size, a quarter, and so on. The renderer fills each
+hole from the finest target whose samples surround the hole.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Draws a smooth surface from points without normals, by fitting splats to the visible points.
 
-The method is that of Preiner 2012. For each picture, the renderer finds the visible points. Each of them
-finds its nearest neighbours in space, fits a plane to them, and gets a splat as large as the distance between
-them. The search is exact (`neighborhoods.py`), so neighbourhoods do not change with the view. Hidden points
-of the same surface also count as neighbours, so that neighbourhoods at outlines are complete.
+The method is that of Preiner 2012. For each picture, the renderer finds the visible points. Each visible
+point finds its nearest neighbours in space, fits a plane to them, and gets a splat as large as the distance
+between them. The search is exact (`neighborhoods.py`), so neighbourhoods do not change with the view. Hidden
+points of the same surface also count as neighbours, so that neighbourhoods at outlines are complete.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 The method is that of Maršík 2010. The encoder turns each disc into code words. A word stores the shape of its
 disc as an index into a table of sizes and normals. An engine then draws the words, line by line of the
-picture. In the paper it uses a window that slides down the picture. Here, each GPU work group draws one band
-of the picture. The package `viewer/codewords/` has the words, tables and lighting.
+picture. In the paper, the engine uses a window that slides down the picture. Here, each GPU work group draws
+one band of the picture. The package `viewer/codewords/` has the words, tables and lighting.
 """
 
 from __future__ import annotations

@@ -5,10 +5,10 @@ around the eye; a point is visible if its flipped position lies on the convex hu
 directions into sectors, and each sector stores the point whose flipped position reaches farthest along its
 direction (sections 3 to 5). The radius, the number of sectors and the number of steps follow section 6.
 
-Scan4D differs from the paper in two ways. It divides angles evenly, so that sectors have about the same size
-up to 45 degrees from the middle; around an eye near the scan it uses six such grids, like the faces of a
-cube. It also compares each point with the candidates in the sectors around it. Points that share a sector can
-then all be visible, and fewer sectors are enough.
+Scan4D differs from the paper in two ways. Scan4D divides angles evenly, so that sectors have about the same
+size up to 45 degrees from the middle; around an eye near the scan it uses six such grids, like the faces of a
+cube. Scan4D also compares each point with the candidates in the sectors around it. Points that share a sector
+can then all be visible, and fewer sectors are enough.
 """
 
 from __future__ import annotations
