@@ -176,7 +176,7 @@ def test_no_camera_file_is_an_internal_error(tmp_path: Path) -> None:
 def test_pipes_and_devices_are_no_camera(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path / "pipe", "/dev/zero"):
-        with pytest.raises(InputError, match="no plain file"):
+        with pytest.raises(InputError, match="not a regular file"):
             Camera.load(path)
 
 

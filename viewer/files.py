@@ -71,7 +71,7 @@ def open_plain(path: Path | str) -> Iterator[BufferedReader]:
     waiting = getattr(os, "O_NONBLOCK", 0)  # without it, opening a pipe waits for a writer
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | waiting)) as stream:
         if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-            raise OSError(errno.EINVAL, "is no plain file", str(path))
+            raise OSError(errno.EINVAL, "is not a regular file", str(path))
         yield stream
 
 
@@ -112,8 +112,8 @@ def named_inside(folder: Path, name: str, where: object) -> Path:
     path = Path(name)
     leads_out = path.is_absolute() or path.drive or path.root or ".." in re.split(r"[\\/]", name)
     if leads_out or not path.name or not name.isprintable() or not 0 < len(name) <= _LONGEST_NAME:
-        hint = "Put that file into the folder, and name it from there"
-        raise InputError(f"names '{shortened(name)}', which is no file in its folder", where, hint)
+        hint = "Put that file into this folder, and give its name without a path"
+        raise InputError(f"names '{shortened(name)}', which is not a file in its folder", where, hint)
     return folder / path
 
 

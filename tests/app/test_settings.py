@@ -218,7 +218,7 @@ def test_a_pipe_is_put_aside_rather_than_waited_for(file: Path) -> None:
     os.mkfifo(file)
     loaded, (message,) = load(file)
     assert loaded == Settings()
-    assert "no plain file" in message
+    assert "not a regular file" in message
     assert load(file) == (Settings(), []), "the next start begins anew"
 
 

@@ -194,5 +194,5 @@ def test_settings_and_keys_that_are_bombs_do_not_keep_the_window_from_opening(
     with running_app(screen, tmp_path, spheres(tmp_path / "scan", 1)) as app:
         told = "\n".join(app.notes)
         assert "keys.toml: cannot be read" in told
-        assert "settings.json: is no plain file" in told
+        assert "settings.json: is not a regular file" in told
         close(app)

@@ -229,7 +229,7 @@ def test_rows_of_a_run_that_was_stopped_before_its_report_make_one_later(
         done = run("bench", "--suite", "numerics", "--backend", "points", "-o", tmp_path)
     assert done.code == 1
     kept, stopped = done.err.splitlines()
-    assert "the rows are stored. With --report" in kept
+    assert "holds the rows" in kept
     assert stopped == "scan4d: stopped"
     assert not (tmp_path / "report.html").exists()
 
@@ -238,7 +238,7 @@ def test_rows_of_a_run_that_was_stopped_before_its_report_make_one_later(
     assert done == (0, f"{tmp_path / 'report.html'}\n", "")
     assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
     assert (tmp_path / "numerics.jsonl").read_bytes() == rows
-    assert "report.html: is there already" in refused("bench", "-o", tmp_path, "--report")
+    assert "report.html: exists already" in refused("bench", "-o", tmp_path, "--report")
     assert "--report" in refused("bench", "-o", tmp_path, "--report", "--scene", "sphere")
     assert "no results" in refused("bench", "-o", tmp_path / "nowhere", "--report")
 

@@ -241,18 +241,18 @@ def test_the_only_measure_goes_against_nothing(run: Run) -> None:
     [
         (("--against", "weg", "--plot", "a.svg"), "unknown measure 'weg'. Known: still, way"),
         (("--plot", "plot.pdf"), "plot.pdf: cannot write '.pdf' files. Known: .csv, .png, .svg"),
-        (("--plot", "seq/../out.csv"), "is the file of another table. Write --plot to another file"),
+        (("--plot", "seq/../out.csv"), "is already the file of another table. Write --plot to another file"),
         (("--numbers", "numbers.txt"), "numbers.txt: cannot write '.txt' files. Known: .csv, .json"),
         (("--numbers", "no/numbers.csv"), "there is no folder 'no'"),
-        (("--numbers", "seq/../out.csv"), "is the file of another table"),
-        (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is the file of another table"),
+        (("--numbers", "seq/../out.csv"), "is already the file of another table"),
+        (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is already the file of another table"),
         (("--repeats", "a.csv", "--aligned", "weg"), "unknown measure 'weg'. Known: still, way"),
-        (("--repeats", "a.csv", "--least", "1.5"), "'1.5' is no share above 0, up to 1"),
-        (("--aligned", "way"), "--aligned: needs repeats, and there are none. Add --repeats FILE"),
-        (("--numbers", "measures.json"), "is read by this command, and is not replaced"),
+        (("--repeats", "a.csv", "--least", "1.5"), "'1.5' is not a share above 0, up to 1"),
+        (("--aligned", "way"), "--aligned: needs repeats, but there are none. Add --repeats FILE"),
+        (("--numbers", "measures.json"), "is an input of this command: Scan4D does not replace it"),
         (("--order", "jerk"), "jerk"),
-        (("--smoothing", "0", "--order", "speed"), "'0' is no time above 0, in seconds"),
-        (("--smoothing", "nan", "--order", "speed"), "'nan' is no time above 0, in seconds"),
+        (("--smoothing", "0", "--order", "speed"), "'0' is not a time above 0, in seconds"),
+        (("--smoothing", "nan", "--order", "speed"), "'nan' is not a time above 0, in seconds"),
     ],
 )
 def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str, ...], told: str) -> None:
@@ -270,7 +270,7 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
     assert done.code == 2
-    assert f"{words[0]}: needs measures, and there are none. Name them with --measures" in done.err
+    assert f"{words[0]}: needs measures, but there are none. Name them with --measures" in done.err
     assert not Path("out.csv").exists()
 
 

@@ -99,7 +99,7 @@ def test_points_are_those_that_are_kept(run: Run) -> None:
         (("points.ply", "-o", "out.exr"), "points.ply: has points, but no range views to merge"),
         (("alone.exr", "-o", "out.exr"), "alone.exr: has only one range view to merge"),
         (("pods.exr", "-o", "pods.exr"), "pods.exr: is read by this command"),
-        (("pods.exr", "-o", "points.ply"), "points.ply: is there already"),
+        (("pods.exr", "-o", "points.ply"), "points.ply: exists already"),
         (("pods.exr", "-o", "nowhere/out.exr"), "there is no folder 'nowhere'"),
         (("pods.exr", "-o", "out.jpg"), "out.jpg: "),
         (("pods.exr", "-o", "out.exr", "--report", "out.txt"), "out.txt: "),

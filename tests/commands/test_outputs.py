@@ -80,7 +80,7 @@ def test_an_input_is_never_replaced(
 ) -> None:
     formats.write("copy.ply", cloud())
     before = contents(folder)
-    assert "is read by this command" in refused(*command, *force)
+    assert "is an input of this command" in refused(*command, *force)
     assert contents(folder) == before
 
 
@@ -91,8 +91,8 @@ def test_an_input_under_another_name_is_one(
 ) -> None:
     link(folder / "a.ply", folder / "b.ply")
     before = contents(folder)
-    assert "is read by this command" in refused("convert", "a.ply", "b.ply", "--force")
-    assert "is read by this command" in refused("convert", "b.ply", "a.ply", "--force")
+    assert "is an input of this command" in refused("convert", "a.ply", "b.ply", "--force")
+    assert "is an input of this command" in refused("convert", "b.ply", "a.ply", "--force")
     assert contents(folder) == before
 
 
@@ -100,13 +100,13 @@ def test_a_recording_and_its_scan_are_never_replaced(run: Run, refused: Refused,
     assert run("render", "a.ply", "-o", "a.png", *SMALL).code == 0
     text = export.read_description(Path("a.png"))
     Path("a.json").write_text(text)
-    assert "is read by" in refused("render", "--replay", "a.png", "-o", "a.png", "--force")
-    assert "is read by" in refused(
+    assert "is an input of" in refused("render", "--replay", "a.png", "-o", "a.png", "--force")
+    assert "is an input of" in refused(
         "render", "--replay", "a.json", "-o", "b.png", "--stats", "a.json", "--force"
     )
     assert run("simulate", "mesh.obj", "-o", "view.exr", *SMALL).code == 0
     assert run("render", "view.exr", "-o", "v.png", *SMALL).code == 0
-    assert "is read by" in refused("render", "--replay", "v.png", "-o", "view.exr", "--force")
+    assert "is an input of" in refused("render", "--replay", "v.png", "-o", "view.exr", "--force")
     assert formats.read(Path("view.exr"))
 
 
@@ -114,7 +114,7 @@ def test_results_that_are_compared_with_are_never_replaced(refused: Refused, fol
     Path("old").mkdir()
     Path("old/results.jsonl").write_text("")
     arguments = ("bench", "--scene", "sphere", "--suite", "scenes", "--quick", "--force")
-    assert "is read by" in refused(*arguments, "-o", "old", "--compare", "old")
+    assert "is an input of" in refused(*arguments, "-o", "old", "--compare", "old")
 
 
 # --- what is there ----------------------------------------------------------------------------
@@ -147,7 +147,7 @@ def test_what_is_there_is_replaced_by_force_alone(
     done = run(*command)
     assert done.code == 2
     (message,) = done.err.splitlines()
-    assert f"{there[0]}: is there already" in message
+    assert f"{there[0]}: exists already" in message
     assert "--force replaces" in message
     assert ("more" in message) == bool(more)
     assert f"and {more} more" in message or not more
@@ -202,7 +202,7 @@ def test_frames_are_written_again_and_beside_files_that_need_no_times(run: Run, 
 
 def test_a_link_that_leads_nowhere_is_there(refused: Refused, folder: Path) -> None:
     os.symlink("nowhere", folder / "b.ply")
-    assert "is there already" in refused("convert", "a.ply", "b.ply")
+    assert "exists already" in refused("convert", "a.ply", "b.ply")
 
 
 @pytest.mark.parametrize(
@@ -225,7 +225,7 @@ def test_a_benchmark_replaces_nothing_that_is_not_told(
     scenes = ("--scene", "sphere", "--backend", "points") if suite == "scenes" else ()
     done = run("bench", "--suite", suite, *scenes, "--quick", "--data", "data", "-o", "results")
     assert done.code == 2
-    assert f"{there}: is there already" in done.err
+    assert f"{there}: exists already" in done.err
     assert [file.read_text() for file in folder.glob("results/**/*") if file.is_file()] == ["mine"]
 
 
@@ -260,7 +260,7 @@ def test_in_a_terminal_it_is_asked_for_once(answer: str, code: int, folder: Path
         os.write(keyboard, f"{answer}\n".encode())
         assert process.wait() == code
     os.close(keyboard)
-    assert b"b0.pcd: is there already, and 1 more. Replace? [y/N] " in shown
+    assert b"b0.pcd: exists already, and 1 more. Replace? [y/N] " in shown
     assert (Path("b2.pcd").read_bytes() == b"former") == bool(code)
 
 

@@ -313,7 +313,7 @@ def test_a_scan_that_has_changed_is_reported(run: Run) -> None:
 @pytest.mark.parametrize(
     ("shown", "words"),
     [
-        (entry(scan="gone.ply"), ["a.json", "'gone.ply'", "not there", "working directory"]),
+        (entry(scan="gone.ply"), ["a.json", "'gone.ply'", "missing", "working directory"]),
         (entry(scan="/nowhere/gone.ply"), ["/nowhere/gone.ply", "no such file"]),
         (entry(pose=9), ["no pose 9", "0 to 2"]),
         (entry(size=(0, 64)), ["0x64"]),
@@ -394,8 +394,8 @@ def test_a_recording_opens_what_is_in_one_folder(name: str, run: Run) -> None:
 @pytest.mark.parametrize("name", ["pipe.json", "pipe.png", "pipe.exr"])
 def test_pipes_and_devices_are_no_recordings(name: str, refused: Callable[..., str]) -> None:
     os.mkfifo(name)
-    assert "no plain file" in refused("render", "--replay", name, "-o", "a.png")
-    assert "no plain file" in refused("render", "--replay", "/dev/zero", "-o", "a.png")
+    assert "not a regular file" in refused("render", "--replay", name, "-o", "a.png")
+    assert "not a regular file" in refused("render", "--replay", "/dev/zero", "-o", "a.png")
 
 
 @pytest.mark.slow

@@ -60,7 +60,7 @@ def test_normals_that_cannot_be_estimated(
     np.save(tmp_path / "bare.npy", formats.read(scans / "ball.npz").world())
     arguments = ("render", tmp_path / "bare.npy", "-o", tmp_path / "a.png", *SMALL, "--no-gl")
     done = finish(process(*arguments, **without_opengl))
-    told = "no normals and radii can be estimated here: discs face the eye and they are of one size"
+    told = "no normals and radii can be estimated here: the discs face the viewer and all have the same size"
     assert (done.code, done.err) == (0, f"scan4d: {told}\n")
     assert len(np.unique(picture(tmp_path / "a.png").reshape(-1, 4), axis=0)) > 10  # by depth
 
@@ -127,7 +127,10 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
     assert run("render", scan, "-o", words, *SMALL).code == 0
     for arguments, told in (
         ((scan, "-o", "a.png", "--no-gl", "--backend", "surfels"), "'surfels' needs OpenGL"),
-        ((scan, "-o", "a.png", "--no-gl", "--marks", "stamp"), "--marks: is for pictures that OpenGL draws"),
+        (
+            (scan, "-o", "a.png", "--no-gl", "--marks", "stamp"),
+            "--marks: applies only to pictures that OpenGL draws",
+        ),
         ((scan, "-o", "a.png", "--no-gl", "--quality", "fine"), "--quality: is for"),
         ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
         ((scan, "-o", "a.png", "--no-gl", "--set", "normals=60"), "60 normals have none in the middle"),

@@ -195,7 +195,10 @@ with export.pictures(export.Path({str(tmp_path / ("a" + suffix))!r}), (640, 480)
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[2]
     )
     assert done.stderr.splitlines()[-1].startswith("viewer.errors.InputError: "), done.stderr
-    assert f"a{suffix}: cannot be written: larger than a file may be here" in done.stderr.splitlines()[-1]
+    assert (
+        f"a{suffix}: cannot be written: the file would be larger than this disk allows"
+        in done.stderr.splitlines()[-1]
+    )
     assert list(tmp_path.iterdir()) == []
 
 

@@ -345,7 +345,7 @@ MIRROR = np.diag([1.0, 1, -1, 1])
         ({"xy": np.zeros((2, 2), np.float32)}, r"xy is \(2, 2\) float32, expected \(2, 2, 2\) float32"),
         ({"kind": "depth"}, "unknown kind of depth 'depth'. Known: height, range, z"),
         ({"kind": "range", "xy": np.zeros((2, 2, 2), np.float32)}, "measured x and y beside a range"),
-        ({"kind": "height", "distortion": LENSES["barrel"]}, "heights has no lens, but its distortion"),
+        ({"kind": "height", "distortion": LENSES["barrel"]}, "heights has no lens, but it has a distortion"),
         ({"distortion": (0.1, 0.2)}, r"distortion is \(0.1, 0.2\), expected the numbers k1 k2 p1 p2"),
         ({"distortion": (0.1, np.nan, 0, 0)}, r"distortion is \(0.1, nan, 0, 0\)"),
         ({"distortion": (-2.0, 0, 0, 0)}, "folds the picture over before its corners"),
@@ -357,10 +357,10 @@ MIRROR = np.diag([1.0, 1, -1, 1])
         ({"fx": 0.0}, "calibration is unusable: fx 0"),
         ({"cy": np.nan}, "cy nan"),
         ({"world_to_camera": np.eye(3)}, r"world_to_camera is \(3, 3\)"),
-        ({"world_to_camera": 1.01 * np.eye(4)}, "not a rotation and a translation"),
-        ({"world_to_camera": MIRROR}, "not a rotation and a translation"),
-        ({"world_to_camera": np.full((4, 4), np.nan)}, "not a rotation and a translation"),
-        ({"world_to_camera": np.full((4, 4), 1e300)}, "not a rotation and a translation"),
+        ({"world_to_camera": 1.01 * np.eye(4)}, "must be a rotation and a translation"),
+        ({"world_to_camera": MIRROR}, "must be a rotation and a translation"),
+        ({"world_to_camera": np.full((4, 4), np.nan)}, "must be a rotation and a translation"),
+        ({"world_to_camera": np.full((4, 4), 1e300)}, "must be a rotation and a translation"),
     ],
 )
 def test_what_is_no_range_view(fields: dict[str, object], reason: str) -> None:

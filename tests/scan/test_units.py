@@ -62,14 +62,14 @@ def test_names_that_can_be_shown(name: str) -> None:
     ],
 )
 def test_names_that_cannot_be_shown(name: str) -> None:
-    with pytest.raises(InputError, match=r"is no unit of length\. Use a short name such as mm") as caught:
+    with pytest.raises(InputError, match=r"is not a unit of length\. Use a short name such as mm") as caught:
         checked_unit(name)
     assert len(str(caught.value)) < 200
     assert usable_unit(name) is None
 
 
 def test_a_user_gives_a_unit_that_can_be_shown() -> None:
-    with pytest.raises(InputError, match="is no unit of length"), open_scan("demo", unit="x" * 5000):
+    with pytest.raises(InputError, match="is not a unit of length"), open_scan("demo", unit="x" * 5000):
         pass
 
 
@@ -118,7 +118,9 @@ def test_units_that_are_no_lengths_are_told_and_taken_as_they_are(tmp_path: Path
     with open_scan(tmp_path) as scan:
         radii = np.linalg.norm(scan.pose(1).cloud.world(), axis=1)
         np.testing.assert_allclose(radii, 1, rtol=0, atol=1e-3)
-        assert scan.messages[0].text == "f1.exr is in ells, the scan in mm: other units are taken as they are"
+        assert scan.messages[0].text == (
+            "f1.exr is in ells, the scan in mm: other units are used without conversion"
+        )
 
 
 def test_lengths_are_told_in_another_unit_where_both_are_known() -> None:

@@ -147,7 +147,7 @@ class PlainOutput:
             if isinstance(error, BrokenPipeError):
                 raise ReaderGone from error
             is_closed = error.errno == errno.EBADF
-            what, hint = ("it is closed", None) if is_closed else explained(error)
+            what, hint = ("the stream is closed", None) if is_closed else explained(error)
             raise Scan4DError(f"cannot be written: {what}", "standard output", hint) from error
 
     def __getattr__(self, name: str) -> Any:

@@ -92,7 +92,7 @@ def _message(error: BaseException) -> str:
     elif _was_interrupted(error):
         text = "stopped"
     elif isinstance(error, MemoryError):
-        text = "not enough memory. Close other programs, or ask for less at once"
+        text = "not enough memory. Close other programs, or ask for fewer frames or a smaller picture"
     else:
         text = f"internal error ({type(error).__name__}: {error}). Run it again with --debug"
     if len(text) > _MOST_SHOWN:

@@ -25,11 +25,13 @@ def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
     force is set or a person at the terminal agrees. inputs: they need not be there.
     """
     for path in found_among(outputs, inputs):
-        raise InputError("is read by this command, and is not replaced", path, "Write to another file")
+        raise InputError(
+            "is an input of this command: Scan4D does not replace it", path, "Write to another file"
+        )
     there = [path for path in outputs if _is_there(path)]
     if there and not force and not _agreed(there):
         hint = "--force replaces it" if len(there) == 1 else "--force replaces them"
-        raise InputError(f"is there already{_and_more(there)}", there[0], hint)
+        raise InputError(f"exists already{_and_more(there)}", there[0], hint)
 
 
 def _is_there(path: Path) -> bool:
@@ -50,7 +52,7 @@ def _agreed(there: Sequence[Path]) -> bool:
     """Whether a person says that these are replaced; without a terminal nobody does."""
     if not (sys.stdin and sys.stdin.isatty() and sys.stderr and sys.stderr.isatty()):
         return False
-    question = f"{escaped(str(there[0]))}: is there already{_and_more(there)}. Replace? [y/N] "
+    question = f"{escaped(str(there[0]))}: exists already{_and_more(there)}. Replace? [y/N] "
     print(question, end="", file=sys.stderr, flush=True)
     return sys.stdin.readline().strip().lower() in ("y", "yes")
 

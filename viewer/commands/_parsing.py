@@ -77,7 +77,7 @@ class _Parser(ArgumentParser):
                 raise InputError(f"unknown option '{shortened(name)}'", hint=hint + self.see)
         for before, word in zip([self.prog, *words], words, strict=False):
             if not word or (word[-1] == "=" and word[:-1] in options):
-                hint = f"Perhaps a variable of the shell is not set. {self.see}"
+                hint = f"A variable of the shell may be unset. {self.see}"
                 raise InputError(f"the name after '{word or shortened(before)}' is empty", hint=hint)
 
     def said_singly(self, words: Sequence[str]) -> list[str]:
@@ -155,9 +155,7 @@ def _common_arguments() -> _Parser:
     group.add_argument(
         "--unit", type=_unit, metavar="U", help="name of the scan's unit of length, for example mm"
     )
-    group.add_argument(
-        "--fps", type=float, metavar="F", help="poses a second; also pictures a second of a film"
-    )
+    group.add_argument("--fps", type=float, metavar="F", help="frames per second of the scan; also of a film")
     group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: guessed")
     group.add_argument(
         "-q",
@@ -211,8 +209,8 @@ def _too_many(words: Sequence[str], parser: _Parser) -> InputError:
     """The error for words that the command does not take."""
     more = ", ".join(f"'{shortened(word)}'" for word in words[:_MOST_NAMED])
     rest = ", ..." if len(words) > _MOST_NAMED else ""
-    what = f"{more}{rest}: too much, as '{parser.prog}' takes {parser.takes or 'options alone'}"
+    what = f"{more}{rest}: unexpected, because '{parser.prog}' takes {parser.takes or 'only options'}"
     if not parser.takes:
         return InputError(what, hint=parser.see)
-    hint = f"If the shell has expanded a pattern, quote it: 'frame*.ply'. {parser.see}"
+    hint = f"If the shell expanded a pattern, put it in quotes: 'frame*.ply'. {parser.see}"
     return InputError(what, hint=hint)

@@ -69,7 +69,7 @@ def _check_arguments(args: Namespace) -> None:
     if args.up is not None:
         given.append("--up")
     if given:
-        hint = "The recording says what to draw; leave it out"
+        hint = "The recording defines what to draw. Leave these options out"
         raise InputError(f"--replay takes no {', '.join(given)}", args.replay, hint)
 
 
@@ -81,7 +81,9 @@ def _film(recording: Recording, fps: float) -> Sequence[Entry]:
     """The entries at the film's pace, all of the size of the first."""
     low, high = FRAME_RATES
     if not low <= fps <= high:
-        raise InputError(f"{fps:g} pictures a second are not usable", "--fps", f"Use {low:g} to {high:g}")
+        raise InputError(
+            f"Scan4D cannot use {fps:g} pictures per second", "--fps", f"Use {low:g} to {high:g}"
+        )
     size = recording.entries[0].size
     resized = Recording(tuple(replace(e, size=size) for e in recording.entries), recording.seconds)
     return resized.paced(fps)
@@ -171,7 +173,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Time
     if args.scan is not None:
         found, timeline = args.scan, open_scan(args.scan)
     elif entry.scan is None:
-        hint = f"Name it: scan4d render SCAN --replay {args.replay} -o {args.out}"
+        hint = f"Name the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
         raise InputError("does not name its scan", args.replay, hint)
     else:
         found, timeline = _open(entry.scan, args.replay)
@@ -180,7 +182,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Time
         if args.scan is not None:
             timeline.close()
             what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
-            raise InputError(what, found, "Name that one, as it was")
+            raise InputError(what, found, "Name the scan as it was when you recorded")
         warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
     return found, timeline, hash if salt is None or entry.anonymous else fingerprint(timeline.files, salt)
 

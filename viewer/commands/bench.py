@@ -76,14 +76,14 @@ def add_arguments(parser: ArgumentParser) -> None:
         nargs="+",
         action="extend",
         metavar="NAME",
-        help="only these renderers; gl-points and mesh are always included",
+        help="measure only these renderers; gl-points and mesh are always included",
     )
     parser.add_argument(
         "--scene",
         nargs="+",
         action="extend",
         metavar="NAME|FILE",
-        help="only these scenes, by name, or meshes (PLY, OBJ, NPZ)",
+        help="measure only these scenes: names, or meshes (PLY, OBJ, NPZ)",
     )
     parser.add_argument("--suite", choices=_SUITES, help="one suite; default: scenes and numerics")
     parser.add_argument(
@@ -120,16 +120,16 @@ def run(args: Namespace) -> int:
     if args.report:
         if args.compare or args.backend or args.scene:
             hint = "Leave out --compare, --backend and --scene"
-            raise InputError("measures nothing, and reports all rows in DIR", "--report", hint)
+            raise InputError("measures nothing: it reports all rows in DIR", "--report", hint)
         claim(_report_files(args), [], args.force)
         _report(args)
         return 0
     if args.compare and args.suite == "numerics":
-        raise InputError("--compare is for the scenes", "--suite numerics")
+        raise InputError("--compare applies only to scenes", "--suite numerics")
     suite = PAGE_SUITES.get(args.suite)
     if suite is not None and (args.backend or (args.scene and suite.scenes is None)):
         own, hint = ("scenes and renderer", "--scene and ") if suite.scenes is None else ("renderers", "")
-        raise InputError(f"has its own {own}", f"--suite {args.suite}", f"Leave out {hint}--backend")
+        raise InputError(f"defines its own {own}", f"--suite {args.suite}", f"Leave out {hint}--backend")
     old = read_rows(args.compare) if args.compare else None
     names = list(dict.fromkeys(args.backend or backends()))
     for name in names:
@@ -162,7 +162,7 @@ def run(args: Namespace) -> int:
         _report(args)
     except KeyboardInterrupt:
         if any(measured):
-            warn(f"{args.out}: the rows are stored. With --report, 'scan4d bench' makes the page from them")
+            warn(f"{args.out} holds the rows. 'scan4d bench --report' makes the page from them")
         raise
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
@@ -174,7 +174,7 @@ def _calibrate(args: Namespace) -> int:
     keep the model of them. 1 where Ctrl-C stopped it: nothing is kept then."""
     if args.suite or args.backend or args.compare:
         hint = "Leave out --suite, --backend and --compare"
-        raise InputError("has its own pictures and renderers", "--calibrate", hint)
+        raise InputError("defines its own pictures and renderers", "--calibrate", hint)
     usual = replace(_CALIBRATION, views=2) if args.quick else _CALIBRATION
     settings = _settings(args, usual)
     renderer = drawing.renderer(args.device)
@@ -187,7 +187,7 @@ def _calibrate(args: Namespace) -> int:
             _write(args.out / WAYS, bench, 0, bench.until_stopped(measure_ways(bench, scenes)))
         _write_notes(args.out, bench.notes)
         if bench.stopped:
-            warn(f"{args.out}: the rows are stored. With --report, --calibrate uses them")
+            warn(f"{args.out} holds the rows. 'scan4d bench --calibrate --report' uses them")
             return 1
     tell(keep_model(renderer.gpu, laws_of(read_rows(args.out / WAYS))))
     return 0
@@ -303,7 +303,9 @@ def _settings(args: Namespace, calibration: BenchSettings | None = None) -> Benc
     if args.size and min(args.size) < _LEAST:
         small = "x".join(map(str, args.size))
         raise InputError(
-            f"pictures of {small} are too small", "--size", f"From {_LEAST}x{_LEAST} on, such as 1920x1280"
+            f"pictures of {small} are too small",
+            "--size",
+            f"Use at least {_LEAST}x{_LEAST}, such as 1920x1280",
         )
     told = {"size": args.size, "views": args.views, "seed": args.seed, "data": data and Path(data)}
     usual = PAGE_SUITES[args.suite].usual if args.suite in PAGE_SUITES else BenchSettings()

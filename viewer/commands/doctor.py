@@ -39,7 +39,7 @@ _OPTIONAL_EXTENSIONS = (
     "GL_NV_shader_atomic_int64",
 )
 _MOST_DEVICES = 16
-_WITHOUT_GL = "Pictures need none of it with 'scan4d render SCAN --backend codeword --no-gl -o picture.png'."
+_WITHOUT_GL = "Pictures need no OpenGL with 'scan4d render SCAN --backend codeword --no-gl -o picture.png'."
 
 
 def add_arguments(parser: ArgumentParser) -> None:

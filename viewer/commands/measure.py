@@ -85,7 +85,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--measures",
         type=Path,
         metavar="FILE",
-        help="the measures, JSON or TOML, or a template; default: none",
+        help="file of measures (JSON or TOML), or a template; default: no measures",
     )
     parser.add_argument(
         "-o", "--output", dest="out", metavar="OUT", type=Path, required=True, help=" or ".join(_SUFFIXES)
@@ -101,7 +101,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--plot", type=Path, metavar="FILE",
-        help=f"plot of the measures over time, {', '.join(PLOT_SUFFIXES)}",
+        help=f"picture of the measures over time, {', '.join(PLOT_SUFFIXES)}",
     )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
@@ -112,18 +112,20 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     how.add_argument(
         "--order", choices=ORDERS, default=ORDERS[0],
-        help="content of the rows of measures; speed and acceleration add rows of trajectories; "
-        f"default {ORDERS[0]}",
+        help=(
+            "what the rows of measures contain; speed and acceleration also add rows of the landmarks' "
+            f"paths; default {ORDERS[0]}"
+        ),
     )  # fmt: skip
     how.add_argument(
         "--traced",
         type=_names,
         metavar="NAME,...",
-        help="landmarks with rows of speed or acceleration; default: all",
+        help="landmarks whose speed or acceleration is written; default: all",
     )
     how.add_argument(
         "--anchors", type=_names, metavar="NAME,...",
-        help="rigid references, at least three landmarks, whose motion is removed",
+        help="rigid references: at least three landmarks, whose common motion Scan4D removes",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=_time, metavar="SECONDS",
@@ -135,18 +137,23 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     how.add_argument(
         "--least", type=_share, metavar="SHARE",
-        help=f"least height of a peak that counts as a repeat, as a share of the range; default {_LEAST}",
+        help=(
+            "smallest height of a peak that counts as a repeat, as a share of the curve's range; "
+            f"default {_LEAST}"
+        ),
     )  # fmt: skip
     how.add_argument(
         "--against", metavar="MEASURE",
-        help="plot the others over this measure, and correlate them with it",
+        help="plot the other measures over this one, and correlate them with it",
     )  # fmt: skip
     how.add_argument(
         "--placed-in", type=int, metavar="I",
-        help="pose of the landmarks if FILE has no frame; default: the first measured pose",
+        help="frame of the landmarks if FILE does not name one; default: the first measured frame",
     )  # fmt: skip
-    how.add_argument("--no-snap", action="store_true", help="leave landmarks where FILE has them")
-    how.add_argument("--axes", choices=AXES, default=AXES[0], help="axes of the scan; default LPS")
+    how.add_argument("--no-snap", action="store_true", help="do not move landmarks onto the surface")
+    how.add_argument(
+        "--axes", choices=AXES, default=AXES[0], help="axes of the scan's coordinates; default LPS"
+    )
 
 
 def run(args: Namespace) -> int:
@@ -204,21 +211,21 @@ def run(args: Namespace) -> int:
 def _length(text: str) -> float:
     length = _number(text)
     if not 0 <= length <= _LONGEST:
-        raise ArgumentTypeError(f"'{text}' is no length of 0 or more, up to {_LONGEST:g}")
+        raise ArgumentTypeError(f"'{text}' is not a length from 0 to {_LONGEST:g}")
     return length
 
 
 def _share(text: str) -> float:
     share = _number(text)
     if not 0 < share <= 1:
-        raise ArgumentTypeError(f"'{text}' is no share above 0, up to 1")
+        raise ArgumentTypeError(f"'{text}' is not a share above 0, up to 1")
     return share
 
 
 def _time(text: str) -> float:
     seconds = _number(text)
     if not 0 < seconds < math.inf:
-        raise ArgumentTypeError(f"'{text}' is no time above 0, in seconds")
+        raise ArgumentTypeError(f"'{text}' is not a time above 0, in seconds")
     return seconds
 
 
@@ -245,18 +252,18 @@ def _outputs(args: Namespace) -> list[Path]:
     taken = {os.path.realpath(absolute(args.out))}
     for flag, path in asked.items():
         if (place := os.path.realpath(absolute(path))) in taken:
-            raise InputError("is the file of another table", path, f"Write {flag} to another file")
+            raise InputError("is already the file of another table", path, f"Write {flag} to another file")
         taken.add(place)
     if args.plot:
         check_plot(args.plot)
     is_of_speeds = args.order != ORDERS[0]
     lacking = [flag for flag in asked if flag != "--plot" or not is_of_speeds]
     if lacking and args.measures is None:
-        raise InputError("needs measures, and there are none", lacking[0], "Name them with --measures")
+        raise InputError("needs measures, but there are none", lacking[0], "Name them with --measures")
     if args.traced is not None and not is_of_speeds:
-        raise InputError("needs speeds, and there are none", "--traced", "Add --order speed")
+        raise InputError("needs speeds, but there are none", "--traced", "Add --order speed")
     if args.against is not None and args.measures is None:
-        raise InputError("needs measures, and there are none", "--against", "Name them with --measures")
+        raise InputError("needs measures, but there are none", "--against", "Name them with --measures")
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
         hint = "Name landmarks that move as one rigid body, separated by commas"
         raise InputError("removing head motion needs three landmarks", "--anchors", hint)
@@ -265,7 +272,7 @@ def _outputs(args: Namespace) -> list[Path]:
         raise InputError("has nothing to smooth", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
         flag = "--least" if args.aligned is None else "--aligned"
-        raise InputError("needs repeats, and there are none", flag, "Add --repeats FILE")
+        raise InputError("needs repeats, but there are none", flag, "Add --repeats FILE")
     return outputs
 
 
@@ -281,10 +288,10 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
         else:
             kept.append(measure)
     for name, landmark in lacking.items():
-        warn(f"'{name}' is left out: {args.landmarks} has no landmark '{landmark}'")
+        warn(f"Scan4D leaves out '{name}': {args.landmarks} has no landmark '{landmark}'")
     if not kept:
         hint = f"It has {', '.join(found.names[:_NAMED])}{', ...' if len(found.names) > _NAMED else ''}"
-        raise InputError(f"has the landmarks of no measure in {args.measures}", args.landmarks, hint)
+        raise InputError(f"lacks landmarks for every measure in {args.measures}", args.landmarks, hint)
     names = [measure.name for measure in kept]
     for name in (args.aligned, args.against):
         if name is not None and name not in names:
@@ -342,7 +349,9 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
     least = _LEAST if args.least is None else args.least
     aligned = repeats_by_peaks(aligned_by, least)
     if aligned is None:
-        warn(f"'{aligned_by.name}' has no peak that stands out by {100 * least:g} % of its range: no repeats")
+        warn(
+            f"'{aligned_by.name}' has no peak as high as {100 * least:g} % of its range, so there are no repeats"
+        )
         return []
     tell(f"{len(aligned.events)} repeats, aligned by the peaks of '{aligned_by.name}'")
     return repeat_rows(curves, aligned, order)
@@ -373,7 +382,10 @@ def _save_plot(
     plot.save(path)
     for line in plot.lines:
         if line not in plot.drawn and path.suffix.lower() != ".csv":
-            warn(f"'{line.label}' is not in {path}: its axes are in {', '.join(plot.units)}, not {line.unit}")
+            warn(
+                f"'{line.label}' is not plotted in {path}: its axes are in {', '.join(plot.units)}, not "
+                f"{line.unit}"
+            )
 
 
 def _landmark_rows(
@@ -435,7 +447,7 @@ def _tell_gaps(
     for name, states in known.items():
         gaps = int((states < Known.TRACKED).sum())
         if gaps:
-            warn(f"{name} is not known in {gaps} of {len(indices)} frames")
+            warn(f"{name} has no value in {gaps} of {len(indices)} frames")
     for each in series if not order else ():
         if each.warning:
             warn(f"'{each.name}': {each.warning}")

@@ -50,14 +50,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_force_argument(parser)
     add_pose_arguments(parser)
     how = parser.add_argument_group("merging")
-    how.add_argument("--refine", action="store_true", help="first correct the alignment of the views")
+    how.add_argument(
+        "--refine", action="store_true", help="correct the alignment of the views before merging"
+    )
     how.add_argument(
         "--ties", type=float, default=Rules.ties, metavar="T",
-        help="keep a pixel whose weight is less than the best by at most T; default 0",
+        help="keep pixels whose weight is at most T below the best; default 0",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=int, default=Rules.smoothing, metavar="PIXELS",
-        help=f"radius of the average of weights; default {Rules.smoothing}",
+        help=f"smooth the weights over this radius, in pixels; default {Rules.smoothing}",
     )  # fmt: skip
     how.add_argument(
         "--tolerance", type=float, metavar="LENGTH",
@@ -108,8 +110,8 @@ def _warn_of_drift(merged: MergedViews, pose: str, unit: str) -> None:
     more = f", and {len(merged.drifted) - 1} more" if len(merged.drifted) > 1 else ""
     hint = "--refine corrects it" if merged.refinement is None else "--refine could not correct it"
     warn(
-        f"{pose}: the calibration of {names}{more} is off by {worst.rotation:.2g}° and"
-        f" {worst.translation:.2g} {unit}, more than noise explains; {hint}"
+        f"{pose}: the calibration of {names}{more} is wrong by {worst.rotation:.2g}° and"
+        f" {worst.translation:.2g} {unit}, more than noise can explain; {hint}"
     )
 
 
@@ -147,7 +149,7 @@ def _rows(pose: dict[str, Any]) -> list[tuple[str, ...]]:
 
 def _of_drift(drift: dict[str, Any] | None) -> tuple[str, ...]:
     if drift is None:
-        return "", "", "", "too little overlap to tell"
+        return "", "", "", "too little overlap to measure"
     return (
         f"{drift['depth_rmse']:.3g}",
         f"{drift['rotation']:.3f} ± {drift['rotation_error']:.3f}°",

@@ -71,7 +71,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--anonymous", action="store_true",
-        help="leave out which scan the output shows, where it was and when",
+        help="anonymise: store no name, folder or time of the scan",
     )  # fmt: skip
     parser.add_argument("--progress", action="store_true", help="print a line of JSON for each picture")
     add_force_argument(parser)
@@ -81,12 +81,12 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--size", type=arguments.size, metavar="WxH", help="size in pixels; default 1920x1280"
     )
     picture.add_argument(
-        "--backend", metavar="NAME", help="the renderer; default auto: the one that suits the scan"
+        "--backend", metavar="NAME", help="renderer; default auto: the renderer that suits the scan"
     )
     add_goal_arguments(picture)
     picture.add_argument("--no-gl", action="store_true", help="draw without OpenGL, with --backend codeword")
     picture.add_argument(
-        "--behind", type=Path, metavar="FILE", help="picture of the same size, over which --no-gl draws"
+        "--behind", type=Path, metavar="FILE", help="background picture of the same size, for --no-gl"
     )
     picture.add_argument(
         "--set", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
@@ -115,17 +115,20 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--turntable",
         type=arguments.count,
         metavar="N",
-        help="N pictures all around; several poses play meanwhile",
+        help="N pictures all around the scan; a sequence plays meanwhile",
     )
     measuring = parser.add_argument_group("statistics")
     measuring.add_argument(
-        "--stats", type=Path, metavar="FILE.json", help="write times and counts of the pictures"
+        "--stats",
+        type=Path,
+        metavar="FILE.json",
+        help="write drawing times and numbers of points of each picture",
     )
     measuring.add_argument(
         "--repeat",
         type=arguments.count,
         metavar="N",
-        help="in --stats, medians of N draws after two warm-ups",
+        help="draw each picture N times after two warm-ups; --stats has the medians",
     )
 
 
@@ -136,11 +139,11 @@ def run(args: Namespace) -> int:
     if args.behind:
         raise InputError("is for pictures without OpenGL", "--behind", "Add --no-gl")
     if args.repeat and not args.stats:
-        raise InputError("--repeat is for --stats", hint="Add --stats FILE.json")
+        raise InputError("--repeat needs --stats", hint="Add --stats FILE.json")
     if args.stats:
         check_output(args.stats, (".json",), several=False)
     if args.marks and args.out.suffix.lower() in UNMARKED_SUFFIXES:
-        hint = "They hold the surface behind the picture; use .png or .mp4"
+        hint = "Such files hold the surface, not a picture: use .png or .mp4"
         raise InputError(f"are not drawn on '{args.out.suffix}' files", "--marks", hint)
     with (replay.planned if args.replay else _planned)(args) as plan:
         _draw(plan, args)
@@ -246,7 +249,7 @@ def _requests(
         own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
         if own is not look:
             title = frame_title(timeline, pose.index)
-            warn(f"{timeline.name}: {title} has no '{look.color_by}', and is drawn in other colours")
+            warn(f"{timeline.name}: {title} has no '{look.color_by}', so Scan4D uses other colours")
         for shot in shots:
             if shot.pose == pose.index:
                 yield shot, Request(pose, camera_of(shot), *chosen, own), choice
@@ -265,5 +268,5 @@ def _orbit(text: str) -> tuple[float, ...]:
     except ValueError:
         numbers = ()
     if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
-        raise ArgumentTypeError(f"'{text}' is no AZIMUTH,ELEVATION[,DISTANCE] such as 30,15")
+        raise ArgumentTypeError(f"'{text}' is not AZIMUTH,ELEVATION[,DISTANCE] such as 30,15")
     return numbers

@@ -38,7 +38,7 @@ from ._scans import (
     read_poses,
 )
 
-_HINT = "Name the mesh that has them with --faces"
+_HINT = "Name a mesh that has the faces with --faces"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -52,7 +52,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--faces", type=Path, metavar="FILE",
-        help=f"mesh with the faces of every frame; default: its own, or {FACES_FILE} beside the frames",
+        help=(
+            f"mesh with the faces of every frame; default: each frame's own, or {FACES_FILE} beside the "
+            "frames"
+        ),
     )  # fmt: skip
     add_force_argument(parser)
     add_pose_arguments(parser)
@@ -87,7 +90,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="standard deviation of depth, scan units; for all pods or for each",
     )  # fmt: skip
     faults.add_argument(
-        "--disparity", type=float, default=0.0, metavar="STEP", help="step of the disparity, pixels"
+        "--disparity", type=float, default=0.0, metavar="STEP", help="step between disparities, pixels"
     )
     faults.add_argument(
         "--dropouts", type=float, default=0.0, metavar="FRACTION", help="share of the pixels without depth"
@@ -97,10 +100,14 @@ def add_arguments(parser: ArgumentParser) -> None:
         type=float,
         default=0.0,
         metavar="FRACTION",
-        help="share of the pixels with a depth far off",
+        help="share of the pixels with a grossly wrong depth",
     )
     faults.add_argument(
-        "--grazing", type=float, default=90.0, metavar="DEGREES", help="no depth beyond this incidence"
+        "--grazing",
+        type=float,
+        default=90.0,
+        metavar="DEGREES",
+        help="largest angle of incidence with a depth, degrees",
     )
     faults.add_argument(
         "--gain", type=_factors, nargs="+", action="extend", metavar="G|R,G,B",
@@ -156,7 +163,7 @@ def _faults(args: Namespace, pods: int) -> list[Faults]:
 def _for_each(flag: str, values: Sequence[Any], pods: int) -> Sequence[Any]:
     """A value for each pod, of one for all or one for each."""
     if len(values) not in (1, pods):
-        raise InputError(f"{len(values)} values for {pods} pods", flag, "Give one for all, or one a pod")
+        raise InputError(f"{len(values)} values for {pods} pods", flag, "Give one for all, or one per pod")
     return values if len(values) == pods else [values[0]] * pods
 
 
@@ -175,7 +182,7 @@ def _mesh_maker(timeline: Timeline, shared: Path | None, first: int) -> Callable
     def faces_of(index: int) -> Faces:
         faces = timeline.faces(index) if of_all is None else of_all
         if not len(faces):
-            raise InputError("is no mesh: it has no faces", shared or timeline.label(index), _HINT)
+            raise InputError("is not a mesh: it has no faces", shared or timeline.label(index), _HINT)
         return faces
 
     faces_of(first)
@@ -193,7 +200,7 @@ def _numbers(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise ArgumentTypeError(f"'{text}' is no number, nor several with commas such as 0.5,1.0") from None
+        raise ArgumentTypeError(f"'{text}' is not a number, or several with commas such as 0.5,1.0") from None
 
 
 def _factors(text: str) -> tuple[float, ...]:

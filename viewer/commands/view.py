@@ -40,7 +40,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d view`."""
     parser.add_argument("scans", metavar="SCAN", nargs="*", help=SCAN_HELP)
     parser.add_argument(
-        "--fallback", type=Path, metavar="DIR", help="if no window can open, play into this folder"
+        "--fallback",
+        type=Path,
+        metavar="DIR",
+        help="if no window can open, write pictures of the scan into this folder",
     )
     add_force_argument(parser)
 
@@ -97,7 +100,9 @@ def _named(names: list[str]) -> _Named:
     if len(names) == 1 and is_recording(path):
         scan = Recording.load(path).entries[0].scan
         if scan is None:
-            raise InputError("does not name its scan", path, "Open the scan, and drop this onto the window")
+            raise InputError(
+                "does not name its scan", path, "Open the scan, then drop this file onto the window"
+            )
         return _Named([place_of(scan, path)], replay=path)
     return _Named(names)
 
@@ -106,7 +111,7 @@ def _scan_of_session(session: SavedSession, path: Path) -> str:
     scan = place_of(session.scan, path)
     if not is_there(scan):
         hint = f"Say where it is now: scan4d view SCAN {path}"
-        raise InputError(f"its scan '{printable(session.scan)}' is not there", path, hint)
+        raise InputError(f"its scan '{printable(session.scan)}' is missing", path, hint)
     return scan
 
 

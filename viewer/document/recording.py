@@ -468,7 +468,7 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
     for number, change in enumerate(changes):
         where = f"{path}, entry {number}"
         if not isinstance(change, dict):
-            raise InputError("is no JSON object", where, DAMAGED)
+            raise InputError("is not a JSON object", where, DAMAGED)
         complete |= change
         entries.append(Entry.from_json(complete, where))
         if number and entries[-1].at < entries[-2].at:

@@ -131,12 +131,12 @@ def _axes(
     """
     pixels = np.stack([column, -row], axis=1).astype(np.float64)
     if len(points) < 3:
-        raise InputError(f"has {len(points)} points, too few for a surface")
+        raise InputError(f"has only {len(points)} points, too few for a surface")
     slopes = np.linalg.lstsq(points - points.mean(axis=0), pixels - pixels.mean(axis=0))[0].T
     lengths = np.linalg.norm(slopes, axis=1, keepdims=True)
     left, sizes, right = np.linalg.svd(slopes / np.where(lengths > 0, lengths, 1), full_matrices=False)
     if sizes[1] < _FLATTEST:
-        raise InputError("its points lie along a line, which is no surface")
+        raise InputError("its points lie along a line, so they form no surface")
     x, y = left @ right
     return np.stack([x, y, np.cross(x, y)])
 

@@ -42,7 +42,7 @@ def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix (3, 3) of a quaternion x y z w of any length but 0. Raises InputError for others."""
     length = float(np.linalg.norm(quaternion))
     if not (np.isfinite(length) and length > 0):
-        raise InputError(f"the quaternion {quaternion.tolist()} is no rotation")
+        raise InputError(f"the quaternion {quaternion.tolist()} is not a rotation")
     x, y, z, w = quaternion / length
     return np.array(
         [

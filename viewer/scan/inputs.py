@@ -30,7 +30,7 @@ def found_among(paths: Iterable[Path], inputs: Iterable[Path]) -> list[Path]:
 def refuse_input(path: Path, timeline: Timeline) -> None:
     """Raise InputError where a path leads to one of the files that a scan may be read from."""
     if found_among([path], scan_inputs(timeline)):
-        raise InputError("is a file of the scan, and is not replaced", path, "Use another name")
+        raise InputError("is a file of the scan: Scan4D does not replace it", path, "Use another name")
 
 
 def _identity(path: Path) -> tuple[int, int] | None:

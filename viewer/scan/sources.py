@@ -90,7 +90,9 @@ class FileSequence:
         path = self.files[index]
         if (count := formats.frame_count(path)) > 1:
             raise InputError(
-                f"holds {count} frames, where each file of a sequence holds one", path, "Open this file alone"
+                f"holds {count} frames, but each file of a sequence must hold one",
+                path,
+                "Open this file alone",
             )
         scanned = formats.read(path)
         if not isinstance(scanned, PointCloud) or scanned.topology is not None:

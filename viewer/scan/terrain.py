@@ -72,10 +72,12 @@ def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, nam
         raise InputError(f"its cells measure {right:g} x {down:g} from {ground.left:g}, {ground.first:g}")
     if ground.degrees:
         if abs(y) >= 90:
-            raise InputError(f"its middle is at {y:g} degrees of latitude")
+            raise InputError(f"its centre is at {y:g} degrees of latitude")
         metre = conversion(METRE, ground.unit)
         if metre is None:
-            raise InputError(f"its heights are in '{ground.unit}', over degrees", hint="Give them in metres")
+            raise InputError(
+                f"its heights are in '{ground.unit}', over degrees", hint="Convert the heights into metres"
+            )
         east, north = metres_of_a_degree(y)
         x, y, right, down = 0.0, 0.0, right * east * metre, down * north * metre
     to_camera = np.eye(4)

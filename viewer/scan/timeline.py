@@ -287,7 +287,7 @@ class Timeline:
         """Note why a frame cannot be read, once; returns the error to raise. Runs locked."""
         if index not in self._broken:
             self._broken[index] = _at_rest(error, len(self._broken) < _TRACEBACKS)
-            what = f"{frame_in_words(index)} is left out: {error}"
+            what = f"Scan4D leaves out {frame_in_words(index)}: {error}"
             self.messages.append(ScanMessage("broken", what, index))
         return copy.copy(self._broken[index])
 
@@ -382,10 +382,10 @@ class Timeline:
             del self._loading[index]
             pose = self._timed(pose)  # where times have changed meanwhile
             if pose.dropped and index not in self._sizes:
-                what = f"{pose.label}: {pose.dropped} points without finite coordinates are left out"
+                what = f"{pose.label}: Scan4D leaves out {pose.dropped} points without finite coordinates"
                 self.messages.append(ScanMessage("dropped", what, index))
             if (shortened := pose.overview.shortened) and index not in self._sizes:
-                what = f"{pose.label}: {shortened} splats far larger than the scan are shortened"
+                what = f"{pose.label}: Scan4D shrinks {shortened} splats that are far larger than the scan"
                 self.messages.append(ScanMessage("shortened", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
             self._topologies[index] = pose.overview.topology
@@ -428,7 +428,7 @@ class Timeline:
         converted = in_one_unit(views, unit)
         others = [before.unit for before in views if before.unit != unit]
         if others:
-            done = "converted" if all(view.unit == unit for view in converted) else "taken as they are"
+            done = "converted" if all(view.unit == unit for view in converted) else "used without conversion"
             what = f"{self.source.label(index)} is in {others[0]}, the scan in {unit}: other units are {done}"
             self._tell_once("unit", what, index)
         return converted

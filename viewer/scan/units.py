@@ -21,7 +21,7 @@ _METRES = {
 def checked_unit(name: str, where: object = None) -> str:
     """The name of a unit as a user gives it. Raises InputError where it is no short word."""
     if usable_unit(name) is None:
-        raise InputError(f"'{shortened(name)}' is no unit of length", where, "Use a short name such as mm")
+        raise InputError(f"'{shortened(name)}' is not a unit of length", where, "Use a short name such as mm")
     return name
 
 

@@ -50,7 +50,7 @@ def test_nan_and_infinity_survive_a_file_of_strict_json(tmp_path: Path) -> None:
     path = written(tmp_path / "results.jsonl", a_row(errors))
 
     def refuse(name: str) -> None:
-        raise AssertionError(f"{name} is no JSON")
+        raise AssertionError(f"{name} is not JSON")
 
     line = json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
     assert line["errors"] == {
@@ -88,7 +88,7 @@ def test_what_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "what"),
     [
-        ("{", "is no row"),
+        ("{", "is not a row of data"),
         ("[1, 2]", "not a JSON object"),
         ('{"backend": "points"}', "without a usable scene, scene_hash"),
         (json.dumps({**a_row(), "errors": 3}), "without a usable errors"),

@@ -1,4 +1,4 @@
-"""What a file may take to be read: memory in peak, plain files alone, all of it there to the end."""
+"""What a file may take to be read: memory in peak, regular files alone, all of it there to the end."""
 
 from __future__ import annotations
 
@@ -194,7 +194,7 @@ def test_the_memory_that_may_be_taken(monkeypatch: pytest.MonkeyPatch) -> None:
         admit(1, 1)
 
 
-# --- what is no plain file ----------------------------------------------------------------
+# --- what is not a regular file ----------------------------------------------------------------
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with names")
@@ -206,7 +206,7 @@ def test_a_pipe_is_refused_and_not_waited_for(tmp_path: Path) -> None:
             formats.read(pipe)
         with pytest.raises(InputError, match="is neither a file nor a folder"):
             find_source(pipe)
-        with pytest.raises(OSError, match="plain file"), opened(pipe):
+        with pytest.raises(OSError, match="regular file"), opened(pipe):
             pass
     with pytest.raises(InputError, match="holds no scan files"):
         find_source(tmp_path)
@@ -279,7 +279,10 @@ def test_faces_that_end_while_they_are_read_are_none(tmp_path: Path) -> None:
     path.write_bytes(bytes(100))
     with opened(path) as stream, pytest.raises(InputError, match="ends early: 100 bytes where 101 should be"):
         read_exactly(stream, 101)
-    with pytest.raises(InputError, match="was cut short while it was read"), opened(path) as stream:
+    with (
+        pytest.raises(InputError, match="another program shortened this file while Scan4D read it"),
+        opened(path) as stream,
+    ):
         os.truncate(path, 50)
 
 

@@ -157,7 +157,7 @@ def test_a_cropped_picture_keeps_its_rays(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("drop", "changes", "reason"),
     [
-        (("Z",), {}, "'part 0' is no range view, it lacks: channel Z. A range scan has"),
+        (("Z",), {}, "'part 0' is not a range view. It lacks: channel Z. A range scan has"),
         (("fx", "cy"), {}, "lacks: attribute fx, attribute cy"),
         (("worldToCamera", "worldToCamera64"), {}, "lacks: attribute worldToCamera"),
         ((), {"fx": np.array([-1.0])}, "calibration is unusable: fx -1"),
@@ -290,7 +290,10 @@ def test_eyes_count_where_their_cameras_are_known(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("camera", "reason"),
     [
-        ({"worldToCamera": np.eye(4, dtype=np.float32)}, "its worldToNDC is not that of an upright camera"),
+        (
+            {"worldToCamera": np.eye(4, dtype=np.float32)},
+            "its worldToNDC does not describe an upright camera",
+        ),
         ({"worldToCamera": np.zeros((4, 4), np.float32)}, "Singular matrix"),
         (
             {"worldToCamera": np.full((4, 4), np.nan, np.float32)},
@@ -328,7 +331,7 @@ def test_what_is_no_exr_is_told_in_our_words(content: bytes, tmp_path: Path) -> 
     path = save(tmp_path / "f.exr", pods())
     path.write_bytes(path.read_bytes()[: 0 if content else 60] + content)
     for call in (formats.read, formats.read_unit):
-        with pytest.raises(InputError, match=r"f\.exr: is no EXR file, or damaged\. Check"):
+        with pytest.raises(InputError, match=r"f\.exr: is not an EXR file, or is damaged\. Check"):
             call(path)
 
 
@@ -372,7 +375,7 @@ def test_writing_needs_views_with_names_that_differ(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"EXR holds range views.* written as \.npz, \.pcd, \.ply"):
         formats.write(tmp_path / "f.exr", PointCloud.from_arrays(np.eye(3)))
     for views in ((left, left), (replace(left, name=""),)):
-        with pytest.raises(InputError, match="need names that differ"):
+        with pytest.raises(InputError, match="the names of the pods must differ"):
             save(tmp_path / "f.exr", views)
     assert list(tmp_path.iterdir()) == []
     assert ".exr" in formats.writable_suffixes(views=True)
@@ -400,10 +403,10 @@ def test_a_sequence_opens_with_its_unit(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("odd/exr/AllHalfValues.exr", "is no range view: it has no channel Z. Depth of other programs"),
+        ("odd/exr/AllHalfValues.exr", "is not a range view: it has no channel Z. Depth of other programs"),
         ("odd/exr/WideFloatRange.exr", "it has no channel Z"),
         ("odd/exr/damaged_asan_561_c28c.exr", "it has no channel Z"),
-        ("odd/exr/damaged_fuzz_5936.exr", "is no EXR file, or damaged"),
+        ("odd/exr/damaged_fuzz_5936.exr", "is not an EXR file, or is damaged"),
         ("range/openexr_deep/LowResLeftView_Balls.exr", "'rgba.left' is a deep image"),
     ],
 )

@@ -188,7 +188,11 @@ def test_vertices_of_an_obj_that_are_counted_from_the_end_as_far_as_the_file_is_
 
 @pytest.mark.parametrize(
     ("kind", "corner", "message"),
-    [("ply ascii uchar int", -1, "no vertex"), ("obj", -1, "no vertex"), ("npz <i8", 2**32, "no vertex")],
+    [
+        ("ply ascii uchar int", -1, "not a vertex"),
+        ("obj", -1, "not a vertex"),
+        ("npz <i8", 2**32, "not a vertex"),
+    ],
 )
 def test_damaged_faces_tell_nothing_and_cost_no_point(
     kind: str, corner: int, message: str, tmp_path: Path

@@ -133,7 +133,7 @@ def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
     [
         ({"FIELDS": None}, "no FIELDS line"),
         ({"POINTS": None, "WIDTH": None}, "no WIDTH line"),
-        ({"SIZE": "4 4 4"}, "differ in length"),
+        ({"SIZE": "4 4 4"}, "have different numbers of entries"),
         ({"SIZE": "4 4 3 4 8 2"}, "unknown PCD type and size 'F3'"),
         ({"COUNT": f"1 1 1 1 {10**12} 1"}, "has 1,000,000,000,005 values a point, more than the 4,096"),
         ({"COUNT": "1 1 1 1 0 1"}, "promises 3 points"),
@@ -223,7 +223,7 @@ def test_its_viewpoint_is_the_pose_of_the_camera(path: Path) -> None:
     assert view.positions() == pytest.approx(grid[seen] * (-1, -1, 1) + (1, 2, 3), abs=1e-6)
     for words in ("1 2 3 0 0 0 0", "1 2 3 nan 0 0 0", "1 2 3", "a b c d e f g"):
         organised(path, VIEWPOINT=words)
-        with pytest.raises(InputError, match=r"its VIEWPOINT is no pose|is no rotation"):
+        with pytest.raises(InputError, match=r"its VIEWPOINT is not a pose|is not a rotation"):
             read(path)
 
 

@@ -286,7 +286,7 @@ def test_convert_with_a_delta(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["a%d.svo"], "one file holds all poses"),
+        (["a%d.svo"], "one file holds all frames"),
         (["a.ply", "--depth", "5"], "--depth is for octrees"),
         (["a.ply", "--delta", "0.1"], "--delta is for octrees"),
         (["a.svo", "--depth", "22"], "depth: 22 is outside 0 to 21"),

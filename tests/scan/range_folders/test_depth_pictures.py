@@ -128,7 +128,7 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
     ("stored", "told"),
     [
         ("{", "no JSON"),
-        ("[1, 2]", "no JSON object"),
+        ("[1, 2]", "not a JSON object"),
         ('{"fx": 5}', "lacks fy, cx, cy"),
         (json.dumps(CAMERA | {"fx": "wide"}), "fx is wide"),
         (json.dumps(CAMERA | {"fy": float("nan")}), "fy is nan"),
@@ -174,7 +174,7 @@ def test_pictures_beside_a_scan_are_left_alone(tmp_path: Path) -> None:
 def test_text_tables_beside_pictures_are_no_scan(tmp_path: Path) -> None:
     write_color(tmp_path / "photo.png", colors())
     (tmp_path / "poses.txt").write_text("0 0 1\n0 1 0\n")
-    assert "text tables, which are no scan" in refusal(tmp_path)
+    assert "text tables, but no scan" in refusal(tmp_path)
     assert len(find_source(tmp_path / "*.txt")) == 1
 
 
@@ -268,4 +268,4 @@ def test_a_color_may_be_grey(tmp_path: Path) -> None:
     view = only_view(tmp_path)
     np.testing.assert_array_equal(view.color, np.repeat(colors()[..., :1], 3, axis=2))
     write_depth(tmp_path / "color.png", depth_numbers())
-    assert "colours are needed" in refusal(tmp_path)
+    assert "where Scan4D needs colours" in refusal(tmp_path)

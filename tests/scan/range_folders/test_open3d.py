@@ -74,7 +74,7 @@ def test_pairs_are_those_that_are_listed(tmp_path: Path) -> None:
     np.testing.assert_array_equal(only_view(tmp_path).color, colors(0))
     np.testing.assert_array_equal(only_view(tmp_path).world_to_camera, np.eye(4))  # no log: upright
     (tmp_path / "rgbd.match").write_text("depth/00002.png\n")
-    with pytest.raises(InputError, match="no pair of names"):
+    with pytest.raises(InputError, match="not a pair of names"):
         find_source(tmp_path)
 
 

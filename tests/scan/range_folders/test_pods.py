@@ -123,15 +123,15 @@ def test_a_pod_may_miss_a_frame_but_not_its_texture(tmp_path: Path) -> None:
     [
         ({"range": None}, "pod 'left' has the range None, expected a file name"),
         ({"range": "a_*_*.tif"}, "with one . at most"),
-        ({"range": "../x.tif"}, r"pod 'left' names '../x.tif', which is no file in its folder"),
-        ({"range": "/etc/passwd"}, "which is no file in its folder"),
+        ({"range": "../x.tif"}, r"pod 'left' names '../x.tif', which is not a file in its folder"),
+        ({"range": "/etc/passwd"}, "which is not a file in its folder"),
         ({"range": "*/x.tif"}, "with one . at most"),
         ({"range": "none.tif"}, r"there is no range image none\.tif"),
         ({"mask": 3}, "has the mask 3, expected a file name"),
-        ({"fx": None}, "pod 'left' is no calibration: fx is None"),
+        ({"fx": None}, "pod 'left' is not a calibration: fx is None"),
         ({"fx": 0}, "fx is 0"),
         ({"kind": "far"}, "unknown kind of depth 'far'"),
-        ({"pose": [1, 2]}, "has a pose that is no 4 x 4 matrix"),
+        ({"pose": [1, 2]}, "has a pose that is not a 4 x 4 matrix"),
         ({"pose": np.zeros((4, 4)).tolist()}, "its pose is not a rotation and a translation"),
         ({"name": ""}, "the name of pod0 is"),
     ],
@@ -147,12 +147,12 @@ def test_pods_that_cannot_be_used(changes: dict[str, object], reason: str, tmp_p
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("", "is no JSON"),
-        ("{", "is no JSON"),
-        ("[]", "is no JSON object"),
+        ("", "is not JSON"),
+        ("{", "is not JSON"),
+        ("[]", "is not a JSON object"),
         ("{}", "names no pods"),
         ('{"pods": []}', "names 0 pods"),
-        ('{"pods": [3]}', "pod0 is no JSON object"),
+        ('{"pods": [3]}', "pod0 is not a JSON object"),
     ],
 )
 def test_files_that_tell_no_pods(text: str, reason: str, tmp_path: Path) -> None:
@@ -163,7 +163,7 @@ def test_files_that_tell_no_pods(text: str, reason: str, tmp_path: Path) -> None
 
 def test_pods_of_one_name_are_refused(tmp_path: Path) -> None:
     one = pod(VIEWS["left"], range="a.tif")
-    with pytest.raises(InputError, match="gives several pods one name"):
+    with pytest.raises(InputError, match="gives several pods the same name"):
         open_scan(write(tmp_path, one, one))
 
 

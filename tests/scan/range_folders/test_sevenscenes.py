@@ -59,7 +59,7 @@ def test_without_poses_frames_are_in_their_cameras_space(tmp_path: Path) -> None
     assert isinstance(view, RangeView)
     np.testing.assert_array_equal(view.world_to_camera, UPRIGHT)
     put(tmp_path, 1)
-    with pytest.raises(InputError, match="has no pose"):
+    with pytest.raises(InputError, match="has no camera pose"):
         find_source(tmp_path).load(0)
 
 

@@ -82,11 +82,11 @@ def test_the_camera_looks_along_slanted_columns(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("conf", "told"),
     [
-        ("bmesh a.ply 0 0 zero 0 0 0 1\n", "places no scan"),
-        ("bmesh a.ply 0 0 0 1\n", "places no scan"),
-        ("bmesh a.ply 0 0 nan 0 0 0 1\n", "places no scan"),
-        ("bmesh\n", "places no scan"),
-        ("bmesh a.ply 0 0 0 0 0 0 0\n", "no rotation"),
+        ("bmesh a.ply 0 0 zero 0 0 0 1\n", "does not describe a scan"),
+        ("bmesh a.ply 0 0 0 1\n", "does not describe a scan"),
+        ("bmesh a.ply 0 0 nan 0 0 0 1\n", "does not describe a scan"),
+        ("bmesh\n", "does not describe a scan"),
+        ("bmesh a.ply 0 0 0 0 0 0 0\n", "not a rotation"),
         ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh c.ply 0 0 0 0 0 0 1\n", "no c.ply"),
     ],
 )

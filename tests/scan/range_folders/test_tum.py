@@ -92,11 +92,11 @@ def test_a_camera_beside_them_counts(tmp_path: Path) -> None:
     ("name", "text", "told"),
     [
         ("depth.txt", "# nothing\n", "lists no depth"),
-        ("depth.txt", "soon depth/1.png\n", r"depth\.txt, line 1: 'soon depth/1\.png' is no row"),
-        ("depth.txt", "1.0\n", "is no row"),
+        ("depth.txt", "soon depth/1.png\n", r"depth\.txt, line 1: 'soon depth/1\.png' is not a row of data"),
+        ("depth.txt", "1.0\n", "is not a row of data"),
         ("rgb.txt", "# a\nnan rgb/1.png\n", r"rgb\.txt, line 2"),
-        ("groundtruth.txt", "1.0 0 0 0\n", "'0 0 0' is no pose"),
-        ("groundtruth.txt", "1.0 0 0 0 0 0 0 0\n", "no rotation"),
+        ("groundtruth.txt", "1.0 0 0 0\n", "'0 0 0' is not a pose"),
+        ("groundtruth.txt", "1.0 0 0 0 0 0 0 0\n", "not a rotation"),
         ("groundtruth.txt", "1.0 0 0 inf 0 0 0 1\n", "not a rotation and a translation"),
     ],
 )

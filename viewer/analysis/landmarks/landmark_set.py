@@ -73,7 +73,7 @@ class LandmarkSet:
         usable, remarks = _usable_names(names)
         if unit and usable_unit(unit) is None:
             named = f"'{shortened(unit)}', which is no short word such as mm"
-            remarks = [*remarks, f"Lengths are in {named}: they are taken as they are"]
+            remarks = [*remarks, f"Lengths are in {named}: they are used without conversion"]
         there = np.isfinite(positions).all(axis=2)
         if known is None:
             known = np.where(there, Known.PLACED, Known.PENDING)
@@ -158,7 +158,10 @@ class LandmarkSet:
             return self if unit is None else replace(self, unit=unit)
         factor = conversion(self.unit, unit)
         if factor is None:
-            told = f"Lengths are in '{self.unit}', those of the scan in '{unit}': they are taken as they are"
+            told = (
+                f"Lengths are in '{self.unit}', those of the scan in '{unit}': they are used without "
+                "conversion"
+            )
             return replace(self, unit=unit, told=(*self.told, told))
         with np.errstate(over="ignore"):
             return replace(self, unit=unit, positions=self.positions * factor, sigmas=self.sigmas * factor)

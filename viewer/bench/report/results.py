@@ -209,7 +209,9 @@ def read_rows(path: Path) -> list[Row]:
             except ValueError as error:
                 if number < len(lines):
                     hint = "Remove the line, or run the benchmark again"
-                    raise InputError(f"is no row: {error}", f"{path}, line {number}", hint) from error
+                    raise InputError(
+                        f"is not a row of data: {error}", f"{path}, line {number}", hint
+                    ) from error
     return rows
 
 

@@ -41,12 +41,12 @@ from ._admission import admit
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
 _CONVERT = {  # what is not read, and what turns it into what is
-    ".e57": "E57 is not read: 'pdal translate FILE.e57 FILE.ply' converts it, or CloudCompare",
-    ".bpf": "BPF is not read: 'pdal translate FILE.bpf FILE.ply' converts it",
-    ".ptx": "PTX is not read: 'pdal translate FILE.ptx FILE.ply' converts it, or CloudCompare",
-    ".off": "OFF is not read: MeshLab or CloudCompare convert it into PLY",
-    ".vtk": "VTK is not read: ParaView or CloudCompare convert it into PLY",
-    ".stl": "STL is not read: MeshLab or CloudCompare convert it into PLY",
+    ".e57": "Scan4D does not read E57. Convert it with 'pdal translate FILE.e57 FILE.ply' or CloudCompare",
+    ".bpf": "Scan4D does not read BPF. Convert it with 'pdal translate FILE.bpf FILE.ply'",
+    ".ptx": "Scan4D does not read PTX. Convert it with 'pdal translate FILE.ptx FILE.ply' or CloudCompare",
+    ".off": "Scan4D does not read OFF. Convert it into PLY with MeshLab or CloudCompare",
+    ".vtk": "Scan4D does not read VTK. Convert it into PLY with ParaView or CloudCompare",
+    ".stl": "Scan4D does not read STL. Convert it into PLY with MeshLab or CloudCompare",
 }
 _LONGEST_MESSAGE = 400  # characters
 
@@ -245,7 +245,7 @@ def _formats() -> dict[str, ModuleType]:
         if not isinstance(module.SUFFIXES, tuple):
             raise InputError(f"SUFFIXES is a {type(module.SUFFIXES).__name__}, expected a tuple of suffixes")
         if taken := [suffix for suffix in module.SUFFIXES if suffix in found]:
-            raise InputError(f"{found[taken[0]].TITLE} reads '{taken[0]}' already", hint="Use other suffixes")
+            raise InputError(f"{found[taken[0]].TITLE} already reads '{taken[0]}'", hint="Use other suffixes")
         found.update(dict.fromkeys(module.SUFFIXES, module))
 
     load_modules("readers", __name__, __path__, add)

@@ -78,7 +78,7 @@ def shared() -> Iterator[ReadBudget]:
 
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """A file, open to be read. Raises OSError, also where it is no plain file.
+    """A file, open to be read. Raises OSError, also where it is not a regular file.
 
     Raises InputError where the file has become shorter when all is read: then nobody knows what was.
     """
@@ -89,7 +89,10 @@ def opened(path: Path) -> Iterator[BinaryIO]:
             budget.sizes[found.st_dev, found.st_ino] = held
         yield stream
         if size_of(stream) < held:
-            raise InputError("was cut short while it was read", hint="Open it again when it is whole")
+            raise InputError(
+                "another program shortened this file while Scan4D read it",
+                hint="Open it again when it is complete",
+            )
 
 
 def size_of(stream: BinaryIO) -> int:
@@ -119,7 +122,7 @@ def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
         held, needed = max(held, budget.held), needed + budget.retained
     if needed > most_memory(held, ratio):
         what = f"reading its {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
-        hint = f"Where you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"
+        hint = f"If you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"
         raise InputError(what, hint=hint)
 
 
@@ -132,7 +135,7 @@ def check_count(number: int, most: int, what: str) -> None:
 def whole_number(word: str, what: str) -> int:
     """A number of a file's text; what: for example "the length of 'faces'". Raises InputError."""
     if not re.fullmatch(rf"[+-]?[0-9]{{1,{_MOST_DIGITS}}}", word):
-        raise InputError(f"{what} is {shortened(word)!r}, which is no whole number that can be used")
+        raise InputError(f"{what} is {shortened(word)!r}, which is not a usable whole number")
     return int(word)
 
 

@@ -110,7 +110,9 @@ def _stated_unit(arrays: _Arrays) -> str | None:
 def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     scale = _number(arrays, "depth_scale", 1.0)
     if not (np.isfinite(scale) and scale > 0):
-        raise InputError(f"its depth_scale is {scale:g}", hint="It is the number of depth steps in one unit")
+        raise InputError(
+            f"its depth_scale is {scale:g}", hint="depth_scale is the number of depth steps in one unit"
+        )
     depth = stored.astype(np.float32)
     if scale != 1:
         depth /= np.float32(scale)

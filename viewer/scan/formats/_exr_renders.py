@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..range_view import RangeView, assumed_pinhole, mask_of
 
-HINT = "Depth of other programs is a channel Z, as Blender, Nuke and renderers write it"
+HINT = "Depth of other programs must be a channel Z, as Blender, Nuke and renderers write it"
 
 _FARTHEST = 1e10  # what programs write where nothing is, and more
 _UNSKEWED = 1e-3  # what else there may be in a projection, as a part of its focal length
@@ -51,7 +51,7 @@ def rendered_eyes(headers: Sequence[dict[str, Any]]) -> list[RenderedEye]:
             eyes.setdefault(eye, {}).setdefault(layer, {}).setdefault(word, (part, channel.name))
     found = [eye for name, layers in eyes.items() if (eye := _eye(headers, name, layers)) is not None]
     if not found:
-        raise InputError("is no range view: it has no channel Z", hint=HINT)
+        raise InputError("is not a range view: it has no channel Z", hint=HINT)
     known = [eye for eye in found if "worldToCamera" in headers[eye.depth[0]]]
     return known or found[:1]
 
@@ -131,7 +131,7 @@ def _projection(to_ndc: NDArray[np.float64], width: int, height: int) -> dict[st
     expected[[0, 1, 2], [0, 1, axis]] = pixels[0, 0], pixels[1, 1], 1
     expected[:2, axis] = pixels[:2, axis]
     if not np.allclose(pixels, expected, rtol=0, atol=_UNSKEWED * abs(pixels[0, 0])):
-        raise InputError("its worldToNDC is not that of an upright camera with a straight axis")
+        raise InputError("its worldToNDC does not describe an upright camera with a straight axis")
     fx, fy, cx, cy = pixels[0, 0], pixels[1, 1], pixels[0, axis], -pixels[1, axis]
     return {"kind": "height" if parallel else "z", "fx": fx, "fy": fy, "cx": cx, "cy": cy}
 

@@ -33,7 +33,7 @@ _MOST_RATIO = 40  # of memory to the file: flat and masked pictures pack well
 _OF_NUMBERS = ("L", "I", "F", "1")  # modes of Pillow's, and those that begin with I;16
 _COMPRESSED = "libtiff"  # what decodes compressed TIFF, into the machine's order of bytes
 _IN_NATIVE_ORDER = {"F;32BF": "F;32NF", "I;32BS": "I;32NS", "I;32B": "I;32N", "I;16BS": "I;16NS"}
-_HINT = "Check that it is complete; 64-bit numbers cannot be read; save them with 32 bits"
+_HINT = "Check that the file is complete. Scan4D cannot read 64-bit numbers: save them with 32 bits"
 
 
 @contextmanager
@@ -71,7 +71,7 @@ def numbers_of_picture(image: Image) -> NDArray:
     Raises InputError for pictures in colour.
     """
     if image.mode not in _OF_NUMBERS and not image.mode.startswith("I;16"):
-        raise InputError(f"is a picture of type {image.mode}; a picture with one number a pixel is needed")
+        raise InputError(f"is a picture of type {image.mode}, where Scan4D needs one number per pixel")
     tiles = getattr(image, "tile", [])  # that are still to be decoded
     for index, tile in enumerate(tiles):
         # Pillow takes what was decoded for numbers in the file's order of bytes.
@@ -84,5 +84,5 @@ def numbers_of_picture(image: Image) -> NDArray:
 def srgb_of_picture(image: Image) -> NDArray[np.uint8]:
     """The colours of a picture, (H, W, 3), sRGB; grey ones too. Raises InputError beyond 8 bit."""
     if image.mode in ("I", "F") or image.mode.startswith("I;16"):
-        raise InputError(f"is a picture of type {image.mode}; colours are needed")
+        raise InputError(f"is a picture of type {image.mode}, where Scan4D needs colours")
     return np.array(image if image.mode == "RGB" else image.convert("RGB"))

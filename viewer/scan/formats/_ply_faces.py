@@ -29,7 +29,7 @@ def face_rows(stream: BinaryIO, element: Element, encoding: str) -> Iterator[Fac
     lists = {p.name: number for number, p in enumerate(element.properties) if p.length_type}
     corners = next((lists[name] for name in _LISTS if name in lists), None)
     if corners is None:
-        raise InputError("its faces name no vertices")
+        raise InputError("its faces refer to no vertices")
     left = element.count
     pieces = _from_text(stream, element, corners)
     if encoding != "ascii":
@@ -49,7 +49,7 @@ def _from_text(stream: BinaryIO, element: Element, corners: int) -> Iterator[Fac
             at += 1 + (int(row[at]) if p.length_type else 0)
         end = at + 1 + int(row[at])
         if not at < end <= len(row):
-            raise InputError("a face ends within its corners")
+            raise InputError("the data end in the middle of a face")
         return row[at + 1 : end]
 
     lines = islice(filter(str.strip, text_lines(stream)), min(element.count, sys.maxsize))

@@ -119,7 +119,7 @@ def write_views(path: Path, views: Sequence[RangeView]) -> None:
 
     names = [view.name for view in views]
     if len({*names}) < len(names) or not all(names):
-        raise InputError(f"the pods need names that differ, not {names}", hint="Rename them")
+        raise InputError(f"the names of the pods must differ, but they are {names}", hint="Rename them")
     height, width = np.max([view.depth.shape for view in views], axis=0).tolist()  # one for all parts
     parts = [OpenEXR.Part(_attributes(view, width, height), _channels(view), view.name) for view in views]
     with open(path, "wb") as stream:  # by a stream, failures come as OSError
@@ -141,7 +141,7 @@ def _file(stream: BinaryIO, **how: bool) -> Iterator[Any]:
         try:
             file = OpenEXR.File(stream, **how)
         except RuntimeError as error:  # whose words are of a buffer in Python
-            raise InputError("is no EXR file, or damaged") from error
+            raise InputError("is not an EXR file, or is damaged") from error
         with file:
             yield file
 
@@ -159,7 +159,7 @@ def _check_flat(header: dict[str, Any], name: str) -> None:
     import OpenEXR
 
     if header.get("type") in (OpenEXR.deepscanline, OpenEXR.deeptile):
-        raise InputError(f"'{name}' is a deep image, several depths a pixel, not a range view", hint=_FLAT)
+        raise InputError(f"'{name}' is a deep image (several depths per pixel), not a range view", hint=_FLAT)
 
 
 def _check_form(header: dict[str, Any], name: str) -> None:
@@ -170,7 +170,7 @@ def _check_form(header: dict[str, Any], name: str) -> None:
     if "Z" not in {channel.name for channel in header["channels"]}:
         missing.insert(0, "channel Z")
     if missing:
-        raise InputError(f"'{name}' is no range view, it lacks: {', '.join(missing)}", hint=_FORM)
+        raise InputError(f"'{name}' is not a range view. It lacks: {', '.join(missing)}", hint=_FORM)
 
 
 def _memory(headers: Sequence[dict[str, Any]], samples: Sequence[int], eyes: int) -> int:

@@ -116,10 +116,10 @@ def _checked_format(head: bytes, held: int) -> int:
     the points, and makes room for them. It does not read the records behind the points.
     """
     if not head.startswith(b"LASF") or len(head) < _FIRST.size:
-        raise InputError("is no LAS file")
+        raise InputError("is not a LAS file")
     begin, records, form = _FIRST.unpack(head)
     if _SMALLEST_RECORD * records > held:
-        raise InputError(f"promises {records:,} records before its points, more than it can hold")
+        raise InputError(f"promises {records:,} records before its points, more than the file can hold")
     if begin > held:
         raise InputError(f"states that its points begin at byte {begin:,}, and has {held:,} bytes")
     return form

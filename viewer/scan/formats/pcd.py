@@ -61,7 +61,7 @@ _VIEW_BYTES, _WORK = 64, 20 << 20  # bytes of a point as it becomes a view, and 
 # Open3D 0.20 and PCL's point types do; CloudCompare (2.12) and PDAL read them. Offsets in float32 would need
 # a field for the origin that others know, and programs differ in what VIEWPOINT means.
 _SLACK = 1e-6  # scan units: what is less is no reason for coordinates that few programs read
-_IN_FLOAT64 = "coordinates are float64, since float32 would round them; Open3D and PCL read such as zeros"
+_IN_FLOAT64 = "coordinates are float64, because float32 would round them. Open3D and PCL read them as zeros"
 _LONGEST_WORD = 40  # of a file, in a message
 _LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
 
@@ -141,7 +141,7 @@ def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
     except ValueError:
         numbers = np.empty(0)
     if numbers.shape != (7,) or not np.isfinite(numbers).all():
-        raise InputError(f"its VIEWPOINT is no pose: {shortened(' '.join(viewpoint))}")
+        raise InputError(f"its VIEWPOINT is not a pose: {shortened(' '.join(viewpoint))}")
     return from_camera_to_world(from_rotation(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
 
 
@@ -185,7 +185,7 @@ def _read_header(head: bytes) -> _Header:
     sizes, types = words.get("SIZE", []), words.get("TYPE", [])
     counts = [whole_number(count, "a COUNT") for count in words.get("COUNT", ["1"] * len(names))]
     if not len(names) == len(sizes) == len(types) == len(counts):
-        raise InputError("FIELDS, SIZE, TYPE and COUNT of the PCD header differ in length")
+        raise InputError("FIELDS, SIZE, TYPE and COUNT of the PCD header have different numbers of entries")
     for code in (type_ + size for type_, size in zip(types, sizes, strict=True)):
         if code not in _TYPES:
             raise unknown_name("PCD type and size", code[:_LONGEST_WORD], list(_TYPES))

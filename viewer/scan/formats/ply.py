@@ -70,9 +70,7 @@ def read(path: Path, frame: int = 0) -> PointCloud:
             raise InputError("holds no vertices")
         if not {"x", "y", "z"} <= {p.name.lower() for p in vertex.numbers}:
             odd, found = header.odd_lines, listed(p.name for p in vertex.numbers)
-            reason = (
-                f": the header line '{odd[0]}' says nothing in PLY" if odd else f" among the columns: {found}"
-            )
+            reason = f": PLY has no header line '{odd[0]}'" if odd else f" among the columns: {found}"
             raise InputError(f"no x, y and z{reason}")
         if len(names) == 1 and header.encoding != "ascii":
             vertex = _as_stored(vertex, size_of(stream) - header.size)

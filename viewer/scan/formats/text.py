@@ -26,7 +26,7 @@ SUFFIXES = (".xyz", ".csv", ".txt", ".pts")
 
 _ENCODING = "utf-8-sig"
 _MOST_ABOVE = 1 << 16  # lines above the rows
-_NAMES_HELP = "Where they are points, put a line of names above them, such as: x y z"
+_NAMES_HELP = "If the numbers are points, put a line of names above them, such as: x y z"
 
 
 @dataclass(frozen=True)
@@ -134,7 +134,7 @@ def _are_names(words: list[str]) -> bool:
 def _not_names(number: int, line: str, words: Sequence[str]) -> str:
     twice = first_repeated(word.lower() for word in words)
     if {"x", "y", "z"} & {word.lower() for word in words} and twice:
-        return f"line {number} names '{twice}' twice, and not x, y and z"
+        return f"line {number} names '{twice}' twice, and lacks x, y or z"
     return f"line {number} is neither numbers nor names with x, y, z: {line[:60]!r}"
 
 

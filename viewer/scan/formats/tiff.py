@@ -84,7 +84,9 @@ def _ground(tags: dict[int, Any]) -> Ground:
     if _TRANSFORMATION in tags:
         matrix = _floats(tags, _TRANSFORMATION, 16).reshape(4, 4)
         if matrix[0, 1] or matrix[1, 0]:
-            raise InputError("its rows do not go from west to east", hint="Warp it to a grid along the axes")
+            raise InputError(
+                "its rows do not go from west to east", hint="Resample it to a grid along the axes"
+            )
         left, first, right, down = matrix[0, 3], matrix[1, 3], matrix[0, 0], matrix[1, 1]
     else:
         scale, tie = _floats(tags, _SCALE, 2), _floats(tags, _TIE, 6)

@@ -27,7 +27,8 @@ class Stop:
 
     rule: str = param(
         "delta",
-        "When division ends: few positions share a leaf, a level is reached, or an octant holds few points",
+        "When to stop dividing octants. delta: when few positions share a leaf; depth: at a level; "
+        "occupancy: when an octant holds few points",
         choices=STOPS,
         affects="derive",
     )
@@ -81,7 +82,7 @@ def shortfall(octree: Octree, stop: Stop) -> str | None:
     """Why a tree tells fewer positions apart than its rule asks for; None where it does not."""
     if stop.rule != "delta" or octree.loss <= stop.delta:
         return None
-    return f"subdivision ended at level {octree.depth}, the last there is, with a loss of {octree.loss:.2%}"
+    return f"the octree reached its deepest level, {octree.depth}, with a loss of {octree.loss:.2%}"
 
 
 def sort_points(positions: NDArray[np.float32], grid: Grid) -> Sorted:

@@ -197,7 +197,7 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     behind = data[size + header.strays.masks + header.strays.attributes :]
     whole = [level.nodes for level, _ in zip(header.levels, _whole_levels(header, behind), strict=False)]
     if _are_too_many(sum(whole), len(data)):
-        raise InputError(f"says that {len(data):,} bytes hold {sum(whole):,} octants, which is too many")
+        raise InputError(f"claims {sum(whole):,} octants in {len(data):,} bytes, which is too many")
     if header.before and (previous is None or not _can_tell(header, previous, attributes)):
         raise InputError("depends on the octree before it, which is missing")
     before = previous if header.before else None
@@ -248,7 +248,8 @@ def read_header(data: bytes) -> tuple[Header, int]:
     _, version, flags, before, depth, unit_size, _, *place = _FIXED.unpack_from(data)
     if version not in _VERSIONS:
         raise InputError(
-            f"holds octrees of version {version}", hint=f"This Scan4D reads versions up to {VERSION}"
+            f"holds octrees of version {version}",
+            hint=f"This version of Scan4D reads format versions up to {VERSION}",
         )
     told_attributes, *strays = _SECOND.unpack_from(data, _FIXED.size) if version > 1 else [0] * 5
     named = _FIXED.size + (_SECOND.size if version > 1 else 0)

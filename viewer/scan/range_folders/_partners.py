@@ -97,16 +97,16 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
     Raises InputError.
     """
     if picture.pose is None:
-        raise InputError("has no pose: there is no file with its pose", picture.depth)
+        raise InputError("has no camera pose: the file with the pose is missing", picture.depth)
     try:
         numbers = np.array([word for _, words in rows_of(picture.pose) for word in words], np.float64)
         if numbers.shape != (16,):
-            raise InputError(f"holds {numbers.size} numbers, where a pose is a 4 x 4 matrix")
+            raise InputError(f"holds {numbers.size} numbers, but a pose is a 4 x 4 matrix")
         return from_camera_to_world(numbers.reshape(4, 4))
     except InputError as error:
         raise InputError(error.what, picture.pose, error.hint) from error
     except ValueError as error:
-        raise InputError("is no pose: it holds more than numbers", picture.pose) from error
+        raise InputError("is not a pose: it contains other words than numbers", picture.pose) from error
 
 
 def _in_folders(folder: Path, names: Sequence[str]) -> Iterator[DepthPicture]:

@@ -26,7 +26,7 @@ def text_of(path: Path) -> str:
         what, hint = explained(error)
         raise InputError(f"cannot be read: {what}", path, hint) from error
     except UnicodeDecodeError as error:
-        raise InputError("is no text in UTF-8", path) from error
+        raise InputError("is not a UTF-8 text", path) from error
 
 
 def rows_of(path: Path, row_bytes: int = 0) -> list[tuple[int, list[str]]]:
@@ -49,7 +49,7 @@ def object_of(path: Path) -> dict[str, Any]:
     """The JSON object in a file. Raises InputError."""
     stored = json_of(path)
     if not isinstance(stored, dict):
-        raise InputError("is no JSON object", path)
+        raise InputError("is not a JSON object", path)
     return stored
 
 
@@ -61,4 +61,4 @@ def json_of(path: Path) -> Any:
     try:
         return parsed_json(text)
     except ValueError as error:
-        raise InputError(f"is no JSON: {shortened(str(error))}", path) from error
+        raise InputError(f"is not JSON: {shortened(str(error))}", path) from error

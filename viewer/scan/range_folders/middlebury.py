@@ -79,4 +79,4 @@ def _numbers(file: Path) -> list[float]:
     try:
         return [float(stored[name]) for name in _NUMBERS]
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"is no calibration: {shortened(str(error))}", file) from error
+        raise InputError(f"is not a calibration: {shortened(str(error))}", file) from error

@@ -63,12 +63,16 @@ def read_log(path: Path) -> NDArray[np.float64]:
         return np.array(words, np.float64).reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
     except ValueError as error:
         hint = "A record is three whole numbers and a 4 x 4 matrix"
-        raise InputError("is damaged, or no log of poses", path, hint) from error
+        raise InputError("is damaged, or is not a log of poses", path, hint) from error
 
 
 def _pairs(folder: Path) -> list[DepthPicture]:
     file = folder / _PAIRS
     pairs = [words for _, words in rows_of(file, PICTURE_BYTES)]
     if any(len(pair) != 2 for pair in pairs):
-        raise InputError("has a line that is no pair of names", file, "First depth, then colour")
+        raise InputError(
+            "has a line that is not a pair of names",
+            file,
+            "Each line names the depth picture, then the colour picture",
+        )
     return [DepthPicture(*(named_inside(folder, name, file) for name in pair)) for pair in pairs]

@@ -39,13 +39,13 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     if not found:
         return None
     if len(found) > 1:
-        raise InputError(f"has several files that place scans: {', '.join(found)}")
+        raise InputError(f"has several files with the positions of scans: {', '.join(found)}")
     (conf, lines) = found.popitem()
     check_count(len(lines), MOST_VIEWS, "scans to place")
     placed = [_placement(folder / conf, line) for line in lines]
     files = tuple(_file(named_inside(folder, name, folder / conf)) for name, _ in placed)
     if missing := [file.name for file in files if not file.is_file()]:
-        raise InputError(f"there is no {missing[0]}, which {conf} places", folder)
+        raise InputError(f"{missing[0]} is missing, which {conf} lists", folder)
     read = partial(_read, [(file, to_scan) for file, (_, to_scan) in zip(files, placed, strict=True)])
     return RangeFrames(folder.resolve().name, (conf,), read, (*files, folder / conf), _UNIT)
 
@@ -66,7 +66,7 @@ def _placement(conf: Path, line: str) -> tuple[str, NDArray[np.float64]]:
         numbers = np.empty(0)
     if numbers.shape != (7,) or not np.isfinite(numbers).all():
         hint = f"A line is {_SCAN}, a file, and 7 numbers: a translation and a quaternion x y z w"
-        raise InputError(f"'{shortened(line)}' places no scan", conf, hint)
+        raise InputError(f"'{shortened(line)}' does not describe a scan", conf, hint)
     rotation = rotation_of(numbers[3:])
     return name, from_rotation(rotation, -rotation @ numbers[:3])
 

@@ -112,7 +112,7 @@ def _intrinsics(file: Path) -> NDArray[np.float64]:
     try:
         camera = np.array(stored[_MATRIX], np.float64).reshape(9)[[0, 4, 6, 7]] / float(stored[_WIDTH])
     except (ValueError, KeyError, TypeError, ZeroDivisionError) as error:
-        raise InputError(f"is no calibration: {shortened(str(error))}", file) from error
+        raise InputError(f"is not a calibration: {shortened(str(error))}", file) from error
     if not (np.isfinite(camera).all() and (camera > 0).all()):
-        raise InputError("is no calibration: a number of its matrix is not above 0", file)
+        raise InputError("is not a calibration: a number of its matrix is not above 0", file)
     return camera

@@ -118,7 +118,9 @@ def _time(words: list[str], path: Path, line: int) -> float:
         time = np.nan
     if not np.isfinite(time) or len(words) < 2:
         where = f"{path}, line {line}"
-        raise InputError(f"'{shortened(' '.join(words))}' is no row", where, "A row is seconds, and a name")
+        raise InputError(
+            f"'{shortened(' '.join(words))}' is not a row of data", where, "A row is seconds, and a name"
+        )
     return time
 
 
@@ -133,5 +135,5 @@ def _pose(words: list[str], path: Path) -> NDArray[np.float64]:
         numbers = np.array(words, np.float64).reshape(7)
     except ValueError:
         hint = "A row is seconds, tx ty tz qx qy qz qw"
-        raise InputError(f"'{shortened(' '.join(words))}' is no pose", path, hint) from None
+        raise InputError(f"'{shortened(' '.join(words))}' is not a pose", path, hint) from None
     return from_camera_to_world(from_rotation(rotation_of(numbers[3:]), numbers[:3]))

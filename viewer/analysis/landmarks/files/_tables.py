@@ -68,7 +68,7 @@ def _rows(text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
             if any(cell.strip() for cell in row):
                 yield reader.line_num, row
     except csv.Error as error:
-        raise at_line(f"is no row of a table: {error}", reader.line_num) from error
+        raise at_line(f"is not a row of the table: {error}", reader.line_num) from error
 
 
 def _first(names: Sequence[str], wanted: Sequence[str]) -> int | None:

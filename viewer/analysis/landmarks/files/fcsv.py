@@ -43,7 +43,7 @@ def read(path: Path) -> LandmarkSet:
         try:
             (row,) = csv.reader(StringIO(text))
         except csv.Error as error:
-            raise at_line(f"is no row of a table: {error}", line) from error
+            raise at_line(f"is not a row of the table: {error}", line) from error
         values = dict(zip(columns, row, strict=False))
         if not {"x", "y", "z"} <= values.keys():
             raise at_line(f"has {len(row)} values, too few for a fiducial", line)
