@@ -157,11 +157,11 @@ def test_convert_keeps_what_an_eye_sees(run: Run, scans: Path, tmp_path: Path) -
         assert 0 < len(rows) < len(before)
         np.testing.assert_array_equal(after.world(), before.world(rows))
         kept, total = kept + len(rows), total + len(before)
-    assert done.out.startswith(f"{kept:,} of {total:,} points are seen, ")
+    assert done.out.startswith(f"{kept:,} of {total:,} points are visible, ")
     one = run("convert", scans / "ball.npz", tmp_path / "a.npz", "--visible-from=0,0,5")
     ball, seen = formats.read(scans / "ball.npz"), formats.read(tmp_path / "a.npz")
     rows = visible_points(ball.world(), (0, 0, 5))
-    assert one.out == f"{len(rows):,} of {len(ball):,} points are seen\n{tmp_path / 'a.npz'}\n"
+    assert one.out == f"{len(rows):,} of {len(ball):,} points are visible\n{tmp_path / 'a.npz'}\n"
     for name in ("normals", "colors", "radii"):
         np.testing.assert_array_equal(getattr(seen, name), getattr(ball, name)[rows])
     np.testing.assert_array_equal(seen.scalars["height"], ball.scalars["height"][rows])

@@ -113,8 +113,9 @@ def test_variants_are_opened_by_name() -> None:
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        ("demo:smiel", "Did you mean 'smile'"), ("demo:", "unknown variant"), ("demo:sway:-1", "no seed"),
-        ("demo:sway:²", "no seed"), ("demo:sway:1:2", "no seed"), ("demo:sway:" + "9" * 40, "no seed"),
+        ("demo:smiel", "Did you mean 'smile'"), ("demo:", "unknown variant"), ("demo:sway:-1", "not a seed"),
+        ("demo:sway:²", "not a seed"), ("demo:sway:1:2", "not a seed"),
+        ("demo:sway:" + "9" * 40, "not a seed"),
     ],
 )  # fmt: skip
 def test_other_variants_and_seeds_are_refused(name: str, told: str) -> None:

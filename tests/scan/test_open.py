@@ -136,7 +136,7 @@ def message_of_pose(path: Path) -> str:
 def test_a_missing_path_suggests_close_names(tmp_path: Path) -> None:
     put(tmp_path, "hands/1.npy")
     wrong = tmp_path / "hand" / "1.npy"
-    assert message(wrong) == f"{wrong}: no such file or folder. Close to it: hands"
+    assert message(wrong) == f"{wrong}: no such file or folder. Did you mean: hands"
     far = tmp_path / "hands" / "elsewhere.ply"
     assert message(far) == f"{far}: no such file or folder. There is no 'elsewhere.ply' in {far.parent}"
     assert "Not a directory" in message(tmp_path / "hands" / "1.npy" / "2.npy")
@@ -163,7 +163,7 @@ def test_glob_patterns(tmp_path: Path) -> None:
     assert labels(tmp_path / "**" / "f9.npy") == ["f9.npy"], "in the folder itself, too"
     assert labels(tmp_path / "f[0-9].npy") == ["f9.npy"]
     assert labels(tmp_path / "take[1].npy") == ["take[1].npy"]  # a name that exists is no pattern
-    assert "h*.npy: matches no file. Check its folder" in message(tmp_path / "h*.npy")
+    assert "h*.npy: matches no file. Check the folder" in message(tmp_path / "h*.npy")
     assert "f%03d.npy: matches no file" in message(tmp_path / "f%03d.npy")
     put(tmp_path, "a.jpg")
     assert "*.jpg: matches no scan file. Known files:" in message(tmp_path / "*.jpg")

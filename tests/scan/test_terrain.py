@@ -82,7 +82,7 @@ def test_degrees_are_told_from_lengths(numbers: tuple[float, ...], found: bool) 
         ({"right": 0.0}, "its cells measure 0 x -20 from 376000"),
         ({"down": np.nan}, "its cells measure 30 x nan"),
         ({"left": np.inf}, "from inf"),
-        ({"degrees": True}, "its middle is at .* degrees of latitude"),
+        ({"degrees": True}, "its centre is at .* degrees of latitude"),
         ({"degrees": True, "first": 40.0, "down": -0.1, "unit": "units"}, "its heights are in 'units', over"),
     ],
 )

@@ -469,7 +469,7 @@ def test_dropped_points_are_reported_once_a_frame(tmp_path: Path) -> None:
         assert [pose.cloud.dropped for pose in scan] == [0, 2, 4]
         assert [pose.cloud.dropped for pose in scan] == [0, 2, 4]
         assert [(notice.kind, notice.index) for notice in scan.messages] == [("dropped", 1), ("dropped", 2)]
-        assert scan.messages[0].text == "1.npy: 2 points without finite coordinates are left out"
+        assert scan.messages[0].text == "1.npy: Scan4D leaves out 2 points without finite coordinates"
 
 
 # --- several threads ---------------------------------------------------------------------
@@ -570,7 +570,7 @@ def test_shortened_splats_are_reported(tmp_path: Path) -> None:
     np.savez(tmp_path / "scan.npz", positions=points, radii=np.full(9, 1e15))
     with open_scan(tmp_path / "scan.npz") as scan:
         assert scan.pose(0).cloud.shortened == 9
-        assert scan.messages[0].text == "scan.npz: 9 splats far larger than the scan are shortened"
+        assert scan.messages[0].text == "scan.npz: Scan4D shrinks 9 splats that are far larger than the scan"
 
 
 def test_frames_get_other_times_and_their_points_stay() -> None:

@@ -393,7 +393,7 @@ def test_gain_and_calibration_error_may_differ_from_pod_to_pod(
         (("--fov", "180"), "fov_y"),
         (("--size", "0x5"), "no size"),
         (("--size", "100000x100000"), "too large"),
-        (("--seed=-1",), "no seed"),
+        (("--seed=-1",), "not a seed"),
         (("--faces", "missing.ply"), "missing.ply"),
         (("--pose", "3"), "no pose 3"),
     ],

@@ -350,7 +350,8 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
     aligned = repeats_by_peaks(aligned_by, least)
     if aligned is None:
         warn(
-            f"'{aligned_by.name}' has no peak as high as {100 * least:g} % of its range, so there are no repeats"
+            f"'{aligned_by.name}' has no peak as high as {100 * least:g} % of its range, "
+            "so there are no repeats"
         )
         return []
     tell(f"{len(aligned.events)} repeats, aligned by the peaks of '{aligned_by.name}'")

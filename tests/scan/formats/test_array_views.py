@@ -153,7 +153,7 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
         ({"depth": np.ones((2, 2, 3))}, r"array 'depth' has shape \(2, 2, 3\)"),
         ({"xyz": np.ones((2, 2))}, r"array 'xyz' has shape \(2, 2\), expected \(H, W, 3\)"),
         ({"xyz": np.ones((2, 2, 3), int)}, "'xyz' is of type int64, expected floats"),
-        ({"xyz": np.full((9, 9, 3), np.nan)}, "has 0 points, too few for a surface"),
+        ({"xyz": np.full((9, 9, 3), np.nan)}, "has only 0 points, too few for a surface"),
         ({"xyz": np.ones((9, 9, 3))}, "its points lie along a line"),
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 3))}, r"'mask' has shape \(2, 3\), 'depth' \(2, 2\)"),
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 2, 1))}, r"'mask' has shape \(2, 2, 1\)"),

@@ -297,7 +297,7 @@ def test_eyes_count_where_their_cameras_are_known(tmp_path: Path) -> None:
         ({"worldToCamera": np.zeros((4, 4), np.float32)}, "Singular matrix"),
         (
             {"worldToCamera": np.full((4, 4), np.nan, np.float32)},
-            "not a rotation|not that of an upright camera",
+            "not a rotation|does not describe an upright camera",
         ),
         ({"screenWindowWidth": 0.0}, "calibration is unusable: fx inf|division by zero"),
     ],

@@ -139,8 +139,8 @@ def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
         ({"COUNT": "1 1 1 1 0 1"}, "promises 3 points"),
         ({"POINTS": "0"}, "promises 0 points"),
         ({"POINTS": "-3"}, "promises -3 points"),
-        ({"POINTS": "9" * 5000}, "the number of points is .9+\\.\\.\\.., which is no whole number"),
-        ({"COUNT": "1 1 1 1 x 1"}, "a COUNT is .x., which is no whole number"),
+        ({"POINTS": "9" * 5000}, "the number of points is .9+\\.\\.\\.., which is not a usable whole number"),
+        ({"COUNT": "1 1 1 1 x 1"}, "a COUNT is .x., which is not a usable whole number"),
         ({"FIELDS": "x y w rgba moment label"}, "no x, y and z among the columns: x, y, w"),
     ],
 )

@@ -166,7 +166,7 @@ def test_a_list_of_a_negative_length_is_refused(length_type: str, encoding: str,
 @pytest.mark.parametrize("length", ["9" * 5000, "three", "1.5"])
 def test_lengths_that_are_no_number_are_told_in_our_words(length: str, path: Path) -> None:
     header = f"element vertex 1\n{XYZ}property list int int q\n"
-    told = "the length of q in row 0 of vertex is '.*', which is no whole number that can be used"
+    told = "the length of q in row 0 of vertex is '.*', which is not a usable whole number"
     with pytest.raises(InputError, match=told) as caught:
         read(save(path, header, f"1 2 3 {length}\n"))
     assert len(str(caught.value)) < 400
@@ -184,7 +184,10 @@ def test_faces_are_not_taken_for_missing_vertices(path: Path) -> None:
     ("header", "reason"),
     [
         ("element vertex 1\nproperty float x\nproperty float y\n", "no x, y and z among the columns: x, y"),
-        ("element vertex 1\nflat x\nfloat y\nfloat z\nproperty uchar red\n", "the header line 'flat x'"),
+        (
+            "element vertex 1\nflat x\nfloat y\nfloat z\nproperty uchar red\n",
+            "PLY has no header line 'flat x'",
+        ),
         ("element vertex 1\nproperty triple x\n", "unknown PLY property type 'triple'. Known: char, double"),
         ("element vertex -1\n" + XYZ, "promises '-1' rows of vertex"),
         ("element vertex 0\n" + XYZ, "holds no vertices"),

@@ -24,7 +24,7 @@ REFUSED = {
     "odd/ply/truedepth_raw_frame-045.ply": "has no vertex element, only: metadata, color, depth",
     "odd/pcd/missingheader.pcd": "has no DATA line",
     "odd/pcd/stereo_left.pcd": "no x, y and z among the columns: red, green, blue",
-    "odd/pts_ptx_txt/badheader.txt": "line 1 names 'x' twice, and not x, y and z",
+    "odd/pts_ptx_txt/badheader.txt": "line 1 names 'x' twice, and lacks x, y or z",
     "odd/pts_ptx_txt/text.txt": "line 1 is neither numbers nor names with x, y, z",
     "odd/other/no_vertex.obj": "holds no points",
 }

@@ -169,7 +169,7 @@ def test_a_file_cut_within_a_header_opens_the_poses_before(scan: Path, tmp_path:
             told = [message.text for message in timeline.messages]
             assert len(told) == 1
             assert told[0].startswith(
-                f"frame {kept + 1} is left out: {path}, frame {kept + 1}: ends within the header"
+                f"Scan4D leaves out frame {kept + 1}: {path}, frame {kept + 1}: ends within the header"
             )
     path.write_bytes(data[:20])
     with pytest.raises(InputError, match="octree 0, at byte 0: ends within the header"):
@@ -336,7 +336,7 @@ def test_octrees_in_two_units_are_refused(tmp_path: Path, full_cloud: PointCloud
         formats.write_poses(tmp_path / f"{unit}.svo", [Pose(0, 0.0, "", full_cloud)], unit)
         parts.append((tmp_path / f"{unit}.svo").read_bytes())
     (tmp_path / "both.svo").write_bytes(b"".join(parts))
-    with pytest.raises(InputError, match="octree 1 has another unit of length than the first"):
+    with pytest.raises(InputError, match="octree 1 has a different unit of length from the first"):
         formats.frame_count(tmp_path / "both.svo")
 
 

@@ -165,7 +165,7 @@ def test_a_line_without_an_end_is_refused(suffix: str, tmp_path: Path) -> None:
 
 
 def test_names_that_stand_twice_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="line 1 names 'x' twice, and not x, y and z"):
+    with pytest.raises(InputError, match="line 1 names 'x' twice, and lacks x, y or z"):
         read(save(tmp_path / "scan.txt", "X,Y,X\n1,2,3\n"))
     with pytest.raises(InputError, match="two columns are called 'x'"):
         read(save(tmp_path / "scan.csv", "X,Y,Z,x\n1,2,3,4\n"))
@@ -208,7 +208,7 @@ INTRINSICS = "585 0 320\n0 585 240\n0 0 1\n"
     ],
 )
 def test_camera_matrices_are_no_points(text: str, what: str, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=f"looks like {what}, not like points. Where they are points"):
+    with pytest.raises(InputError, match=f"looks like {what}, not like points. If the numbers are points"):
         read(save(tmp_path / "frame.pose.txt", text))
     named = "x y z a b c d e f g h i\n" if text.count("\n") == 1 else "x y z w\n"
     if len(text.split()) % 4 == 0:
@@ -244,5 +244,7 @@ def test_the_matrices_beside_real_range_scans(data_dir: Path) -> None:
 def test_a_count_of_very_many_digits_is_told_in_our_words(tmp_path: Path) -> None:
     path = tmp_path / "scan.pts"
     path.write_text("9" * 5000 + "\n1 2 3\n")
-    with pytest.raises(InputError, match=r"the count of its points is '9+\.{3}', which is no whole number"):
+    with pytest.raises(
+        InputError, match=r"the count of its points is '9+\.{3}', which is not a usable whole number"
+    ):
         read(path)

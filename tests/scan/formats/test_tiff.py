@@ -155,7 +155,7 @@ def big_endian(numbers: np.ndarray, packed: bool) -> bytes:
         (GROUND | {SCALE: (0.0, 20.0, 0.0)}, "its cells measure 0 x -20"),
         (GROUND | {TIE: (0.0, 0.0)}, "its tag 33922 is not 6 finite numbers"),
         ({TRANSFORMATION: (1.0, 0.5, *(0.0,) * 14)}, "its rows do not go from west to east"),
-        (GROUND | {KEYS: keys(model=2)}, "its middle is at 3.80797e.06 degrees of latitude"),
+        (GROUND | {KEYS: keys(model=2)}, "its centre is at 3.80797e.06 degrees of latitude"),
     ],
 )
 def test_grounds_that_cannot_be_used(tags: dict[int, Any], reason: str, path: Path) -> None:
@@ -171,9 +171,7 @@ def test_odd_keys_tell_nothing(path: Path) -> None:
 
 def test_pictures_that_are_no_depth(path: Path) -> None:
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(path)
-    with pytest.raises(
-        InputError, match="is a picture of type RGB; a picture with one number a pixel is needed"
-    ):
+    with pytest.raises(InputError, match="is a picture of type RGB, where Scan4D needs one number per pixel"):
         formats.read(path)
     path.write_bytes(b"II*\0" + bytes(100))
     with pytest.raises(InputError, match="is no TIFF, or damaged"):

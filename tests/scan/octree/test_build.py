@@ -189,7 +189,7 @@ def test_no_loss_ends_where_every_position_has_its_octant_or_at_the_last_level()
     near = np.array([[0, 0, 0], [1e-12, 0, 0], [1, 1, 1]], np.float32)
     split = build(PointCloud.from_arrays(near, origin=[0, 0, 0]), stop)
     assert (split.depth, split.distinct, split.counts[-1]) == (DEEPEST, 3, 2)
-    assert "level 21" in str(shortfall(split, stop))
+    assert "deepest level, 21" in str(shortfall(split, stop))
 
 
 def test_crowds_within_one_cell_are_counted() -> None:

@@ -127,7 +127,7 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
 @pytest.mark.parametrize(
     ("stored", "told"),
     [
-        ("{", "no JSON"),
+        ("{", "not JSON"),
         ("[1, 2]", "not a JSON object"),
         ('{"fx": 5}', "lacks fy, cx, cy"),
         (json.dumps(CAMERA | {"fx": "wide"}), "fx is wide"),
@@ -135,7 +135,7 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
         (json.dumps(CAMERA | {"fy": 10**400}), "calibration"),
         (json.dumps(CAMERA | {"fx": -5}), "fx is -5"),
         (json.dumps(CAMERA | {"distortion": [1, 2, 3]}), "3 coefficients"),
-        (json.dumps(CAMERA | {"distortion": 7}), "no list"),
+        (json.dumps(CAMERA | {"distortion": 7}), "not a list"),
         (json.dumps(CAMERA | {"depth_scale": 0.001}), "1000 for millimetres"),
         (json.dumps(CAMERA | {"depth_scale": None}), "depth_scale is None"),
         (json.dumps(CAMERA | {"kind": "disparity"}), "unknown kind of depth"),
@@ -243,7 +243,7 @@ def test_broken_frames_are_left_out(tmp_path: Path) -> None:
     assert "depth_2.png: is a picture of type RGB" in told[2]
     assert "color_3.jpg: is no PNG or JPEG" in told[3]
     assert "color_4.jpg: has 6 x 2 pixels, its depth 6 x 4" in told[4]
-    assert "depth_5.png: has no pose" in told[5]
+    assert "depth_5.png: has no camera pose" in told[5]
     assert "pose_6.txt: holds 9 numbers" in told[6]
     assert "pose_7.txt: its pose is not a rotation" in told[7]
 

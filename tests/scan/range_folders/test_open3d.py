@@ -100,7 +100,7 @@ def test_a_frame_without_a_pose_is_left_out(tmp_path: Path) -> None:
 def test_a_damaged_log_is_told(tmp_path: Path, text: str) -> None:
     put(tmp_path, 1)
     (tmp_path / "trajectory.log").write_bytes(text.encode("latin-1"))
-    with pytest.raises(InputError, match=r"trajectory\.log: is (damaged, or no log|no text)"):
+    with pytest.raises(InputError, match=r"trajectory\.log: is (damaged, or is not a log|not a UTF-8 text)"):
         find_source(tmp_path)
 
 

@@ -87,7 +87,7 @@ def test_the_camera_looks_along_slanted_columns(tmp_path: Path) -> None:
         ("bmesh a.ply 0 0 nan 0 0 0 1\n", "does not describe a scan"),
         ("bmesh\n", "does not describe a scan"),
         ("bmesh a.ply 0 0 0 0 0 0 0\n", "not a rotation"),
-        ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh c.ply 0 0 0 0 0 0 1\n", "no c.ply"),
+        ("bmesh a.ply 0 0 0 0 0 0 1\nbmesh c.ply 0 0 0 0 0 0 1\n", "c.ply is missing"),
     ],
 )
 def test_a_wrong_placement_is_told_at_opening(tmp_path: Path, conf: str, told: str) -> None:
