@@ -170,8 +170,8 @@ def test_a_cropped_picture_keeps_its_rays(tmp_path: Path) -> None:
         ),
         ((), {"cx": "middle"}, "could not convert string"),
         ((), {"worldToCamera64": np.eye(3)}, "cannot reshape"),
-        ((), {"worldToCamera64": np.full((4, 4), np.inf)}, "not a rotation and a translation"),
-        ((), {"worldToCamera64": np.eye(4)}, "not a rotation and a translation"),  # it looks down -z
+        ((), {"worldToCamera64": np.full((4, 4), np.inf)}, "must be a rotation and a translation"),
+        ((), {"worldToCamera64": np.eye(4)}, "must be a rotation and a translation"),  # it looks down -z
         ((), {"Z": np.full((40, 48), np.nan, np.float32)}, "no pixel inside the masks has a depth"),
     ],
 )
