@@ -63,7 +63,7 @@ def test_other_renderers_show_other_colours_and_say_so(app: RunningApp) -> None:
     above = slice(0, app.view()[3] // 2)  # the messages
     before = shown(app)[above].copy()
     app.choose(PANEL, "##backend", "###points")
-    app.told("'gap' is not found by Points, but by Finding: other colours are shown")
+    app.told("Points does not compute 'gap', but Finding can. The view shows other colours.")
     assert app.settle().backend == "points"
     assert app.state.document["look"]["color_by"] == "gap", "for when it is back"
     assert (shown(app)[above] != before).mean() > 0.1

@@ -75,13 +75,16 @@ from viewer.errors import NoOpenGLError
         (["--look", "colour_by=depth"], ["Did you mean 'color_by' or 'color_map'?"]),
         (["--look", "color_by=hight"], ["Did you mean 'height'?"]),
         (["--marks", "stmp"], ["--marks 'stmp'. Did you mean 'stamp'?"]),
-        (["b.npz", "c.npz"], ["'b.npz', 'c.npz'", "takes SCAN", "quote it", "'scan4d render --help'"]),
+        (
+            ["b.npz", "c.npz"],
+            ["'b.npz', 'c.npz'", "takes SCAN", "put it in quotes", "'scan4d render --help'"],
+        ),
         (["--marks", "stamp", "colr_bar"], ["--marks 'colr_bar'. Did you mean 'color_bar'"]),
         (["--camera", ""], ["after '--camera' is empty"]),
         (["--output="], ["after '--output=' is empty"]),
         (["-y"], ["unknown option '-y'"]),
-        (["--unit", "m" * 5000], ["--unit", "no unit"]),
-        (["--unit", "\x1b[31m"], [r"'\x1b[31m' is no unit"]),
+        (["--unit", "m" * 5000], ["--unit", "not a unit"]),
+        (["--unit", "\x1b[31m"], [r"'\x1b[31m' is not a unit"]),
         (["--backend", "\x1b]0;p\x07\n\u202e"], [r"'\x1b]0;p\x07\n\u202e'"]),
     ],
 )
@@ -110,9 +113,9 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     assert "a command is missing before '--set'" in refused("--set", "a=1", "nowhere.ply")
     for command in ("doctor", "backends"):
         message = refused(command, "extra")
-        assert f"'extra': too much, as 'scan4d {command}' takes options alone" in message
+        assert f"'extra': unexpected, because 'scan4d {command}' takes only options" in message
         assert "quote" not in message
-    assert "'c': too much, as 'scan4d convert' takes SCAN OUT" in refused("convert", "a", "b", "c")
+    assert "'c': unexpected, because 'scan4d convert' takes SCAN OUT" in refused("convert", "a", "b", "c")
     assert "the name after 'scan4d info' is empty" in refused("info", "")
     assert "SCAN" in refused("info")
     done = run()

@@ -140,7 +140,7 @@ def test_convert_refuses_estimates_that_a_format_does_not_hold(
     out: str, flag: str, refused: Callable[..., str], scans: Path, tmp_path: Path
 ) -> None:
     message = refused("convert", tmp_path / "not-even-there.ply", tmp_path / out, f"--{flag}")
-    assert f"'{out[1:]}' files hold no {flag}" in message
+    assert f"'{out[1:]}' files cannot store {flag}" in message
     assert f"or leave out --{flag}" in message
     assert not names(tmp_path)
 

@@ -61,8 +61,8 @@ def test_other_backends_name_the_one_that_finds_it(run: Run, refused: Callable[.
     look = ("--look", "color_by=gap")
     for which in ((), ("--backend", "points")):
         said = refused("render", "ball.npz", *which, *look, "-o", "a.png")
-        assert "'gap' is not found by the backend" in said
-        assert "but by finding. Use --backend finding" in said
+        assert "does not compute 'gap'" in said
+        assert "but finding can. Use --backend finding" in said
     assert "unknown colour source 'gop'" in refused(
         "render", "ball.npz", *FOUND, "--look", "color_by=gop", "-o", "a.png"
     )
@@ -70,7 +70,7 @@ def test_other_backends_name_the_one_that_finds_it(run: Run, refused: Callable[.
     points = (*SMALL, "--backend", "points")
     done = run("render", "two", "--all", *points, "--look", "color_by=slope", "-o", "%d.png")
     assert done.code == 0
-    assert "frame 1 (0.npz) has no 'slope', and is drawn in other colours" in done.err
+    assert "frame 1 (0.npz) has no 'slope', so Scan4D uses other colours" in done.err
 
 
 def test_backends_lists_them(run: Run) -> None:

@@ -96,14 +96,12 @@ def test_info_tries_few_of_many_broken_poses(kind: str, run: Run, tmp_path: Path
             (tmp_path / "rgbd.match").write_text("".join(f"depth/{n}.png {n}.png\n" for n in numbers))
     with open_scan(tmp_path) as timeline:
         assert len(timeline) == FRAMES
-        with pytest.raises(
-            InputError, match=f"^{tmp_path.name}: 100 of {FRAMES} frames were tried, and none"
-        ):
+        with pytest.raises(InputError, match=f"^{tmp_path.name}: Scan4D tried 100 of {FRAMES} frames"):
             first_readable(timeline, range(FRAMES))
         assert len(timeline.broken) == 100
     done = run("info", tmp_path)
     assert done.code == 2
-    assert f"100 of {FRAMES} frames were tried, and none can be read. The first: " in done.err
+    assert f"Scan4D tried 100 of {FRAMES} frames and cannot read any of them. The first: " in done.err
 
 
 @pytest.mark.parametrize(("readable", "broken"), [((0, 7), 0), ((7, 40), 7), ((49, 50), 49), ((999,), 99)])

@@ -139,7 +139,7 @@ def test_chosen_frames_are_a_curve_of_their_own_and_too_few_are_told(run: Run) -
     np.testing.assert_allclose(told("out.csv", "way", "value"), 8 * HEIGHT * (0.5 - TIMES[::3]), atol=1e-9)
     done = run(*WORDS, "--order", "speed", "--numbers", "numbers.csv", "--poses", "4:7", "--force")
     assert done.code == 0, done.err
-    assert "the speed of 'way' is not known in 3 of 3 frames" in done.err
+    assert "the speed of 'way' has no value in 3 of 3 frames" in done.err
     rows = [row for row in table("out.csv") if row["name"] == "way"]
     assert {(row["state"], row["value"]) for row in rows} == {("gap", "")}
     assert set(table("numbers.csv")[0].values()) == {"way", "mm", ""}
@@ -174,7 +174,7 @@ def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
     assert {row["measure"] for row in table("repeats.csv")} == {"way", "still"}
     still = run(*WORDS, "--repeats", "repeats.csv", "--aligned", "still", "--force")
     assert still.code == 0
-    assert "'still' has no peak that stands out by 50 % of its range: no repeats" in still.err
+    assert "'still' has no peak as high as 50 % of its range, so there are no repeats" in still.err
     assert table("repeats.csv") == []
 
 

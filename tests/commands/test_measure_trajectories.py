@@ -104,7 +104,7 @@ def test_places_that_are_held_still_are_landmarks_again(run: Run) -> None:
 def test_chosen_frames_are_the_trajectory_and_too_few_are_told(run: Run) -> None:
     done = run(*WORDS, *HELD, "--order", "speed", "--traced", "chin", "--poses", "4:7")
     assert done.code == 0, done.err
-    assert "the speed of the landmark 'chin' is not known in 3 of 3 frames" in done.err
+    assert "the speed of the landmark 'chin' has no value in 3 of 3 frames" in done.err
     speeds = rows_of("trajectory", "chin")
     assert [(row["frame"], row["state"], row["value"]) for row in speeds] == [
         (frame, "gap", "") for frame in "567"

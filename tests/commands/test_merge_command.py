@@ -43,7 +43,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, views: tuple[RangeVi
 def test_views_are_merged_and_a_wrong_calibration_is_told(run: Run, views: tuple[RangeView, ...]) -> None:
     done = run("merge", "pods.exr", "-o", "out.exr", "--report", "report.json")
     assert done.code == 0
-    assert "calibration of pod0 and pod1 is off by" in done.err
+    assert "calibration of pod0 and pod1 is wrong by" in done.err
     assert "--refine corrects it" in done.err
     assert "drifted" in done.out
     assert done.out.endswith("out.exr\n")
@@ -98,7 +98,7 @@ def test_points_are_those_that_are_kept(run: Run) -> None:
     [
         (("points.ply", "-o", "out.exr"), "points.ply: has points, but no range views to merge"),
         (("alone.exr", "-o", "out.exr"), "alone.exr: has only one range view to merge"),
-        (("pods.exr", "-o", "pods.exr"), "pods.exr: is read by this command"),
+        (("pods.exr", "-o", "pods.exr"), "pods.exr: is an input of this command"),
         (("pods.exr", "-o", "points.ply"), "points.ply: exists already"),
         (("pods.exr", "-o", "nowhere/out.exr"), "there is no folder 'nowhere'"),
         (("pods.exr", "-o", "out.jpg"), "out.jpg: "),

@@ -286,7 +286,7 @@ def test_a_frame_without_the_scalar_is_named_and_drawn(
     done = run("render", "uneven", "-o", "b%d.png", *choice, *BY_Q)
     assert done.code == 0
     assert [line for line in done.err.splitlines() if "'q'" in line] == [
-        f"scan4d: uneven: frame {n + 1} (f{n}.npz) has no 'q', and is drawn in other colours" for n in (0, 2)
+        f"scan4d: uneven: frame {n + 1} (f{n}.npz) has no 'q', so Scan4D uses other colours" for n in (0, 2)
     ]
     told = [Recording.load(Path(f"b{n}.png")).entries[0].look.color_by for n in range(3)]
     assert told == ["auto", "q", "auto"]

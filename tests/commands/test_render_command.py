@@ -243,7 +243,9 @@ def test_a_broken_frame_is_reported_and_the_rest_is_drawn(run: Run, scans: Path,
     done = run("render", scans / "broken", "-o", tmp_path / "p%d.png", *SMALL, "--all")
     assert done.code == 0
     assert names(tmp_path) == ["p0.png", "p1.png", "p3.png", "p4.png"]
-    assert re.fullmatch(r"scan4d: broken: frame 3 [^\n]*f02\.npz[^\n]*\n", done.err), done.err
+    assert re.fullmatch(r"scan4d: broken: Scan4D leaves out frame 3: [^\n]*f02\.npz[^\n]*\n", done.err), (
+        done.err
+    )
 
 
 def test_a_broken_frame_alone_is_an_error(refused: Callable[..., str], scans: Path, tmp_path: Path) -> None:

@@ -202,4 +202,4 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
     if is_demo(scan) or os.path.isabs(scan):
         raise missing
     hint = f"Looked in '{path.parent}' and in the working directory; put it there, or correct 'scan'"
-    raise InputError(f"its scan '{scan}' is not there", path, hint) from missing
+    raise InputError(f"its scan '{scan}' is missing", path, hint) from missing

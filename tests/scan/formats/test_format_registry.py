@@ -98,5 +98,5 @@ def test_what_can_be_converted_is_refused_with_what_converts_it(tmp_path: Path) 
     for suffix in (".e57", ".ptx"):
         path = tmp_path / f"scan{suffix}"
         path.write_text("none")
-        with pytest.raises(InputError, match=f"'pdal translate FILE{suffix} FILE.ply' converts it"):
+        with pytest.raises(InputError, match=f"Convert it with 'pdal translate FILE{suffix} FILE.ply'"):
             formats.read(path)

@@ -112,7 +112,9 @@ def test_a_frame_that_is_damaged_is_left_out(tmp_path: Path) -> None:
 def test_a_calibration_that_is_none_is_told(tmp_path: Path, text: str) -> None:
     put(tmp_path, 1)
     (tmp_path / "camera_intrinsics.json").write_text(text)
-    with pytest.raises(InputError, match=r"camera_intrinsics\.json: is not (a calibration|JSON|a JSON object)"):
+    with pytest.raises(
+        InputError, match=r"camera_intrinsics\.json: is not (a calibration|JSON|a JSON object)"
+    ):
         find_source(tmp_path)
 
 
