@@ -21,7 +21,9 @@ _OTHERS = {"set": "is for one renderer", "quality": "is more than one picture, w
 def add_goal_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
     """The arguments with the limits of an automatic choice."""
     parser.add_argument(
-        "--budget", metavar="TIME", help="choose the best renderer that takes at most this time, such as 50ms"
+        "--budget",
+        metavar="TIME",
+        help="choose the most accurate renderer that takes at most this time, such as 50ms",
     )
     parser.add_argument(
         "--error", metavar="LENGTH",
@@ -36,11 +38,13 @@ def goal_of(args: Namespace) -> Goal | None:
     if not given:
         return None
     if len(given) > 1:
-        raise InputError("are two limits, and only one can apply", "--budget, --error", "Leave out one")
+        raise InputError(
+            "are two limits, and Scan4D can apply only one", "--budget, --error", "Leave out one"
+        )
     (name,) = given
     if args.backend not in (None, AUTO):
         hint = f"Use --backend {AUTO}, or leave out --{name}"
-        raise InputError(f"the renderer is named already: {args.backend}", f"--{name}", hint)
+        raise InputError(f"the command already names the renderer: {args.backend}", f"--{name}", hint)
     for other, what in _OTHERS.items():
         if getattr(args, other):
             raise InputError(what, f"--{other}", f"Leave out --{other} or --{name}")
@@ -56,7 +60,9 @@ def choice_of(
     view = view_of(Request(pose, camera), size)
     choice = choose_way(pose, view, in_unit(goal, unit), model)
     if choice is None:
-        raise InputError("there is no renderer to choose from for this scan", hint="Name one with --backend")
+        raise InputError(
+            "no renderer can be chosen automatically for this scan", hint="Name one with --backend"
+        )
     if not choice.keeps:
         warn(f"no renderer is expected to meet {goal}; Scan4D draws with the nearest: {choice}")
     return choice

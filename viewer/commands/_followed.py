@@ -29,8 +29,8 @@ def check_on_scan(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
     last = int(found.frames[-1])
     if found.is_framed and last >= len(timeline):
         raise InputError(
-            f"has landmarks of {frame_in_words(last)}, and the scan has {len(timeline)}", path,
-            "They are of another scan",
+            f"has landmarks in {frame_in_words(last)}, but the scan has only {len(timeline)} frames", path,
+            "They belong to another scan",
         )  # fmt: skip
     apart = told_apart(found, framing(timeline, range(len(timeline))))
     if apart is not None:
@@ -57,10 +57,14 @@ def put_on_surface(found: LandmarkSet, timeline: Timeline, frame: int) -> Landma
     unit = timeline.unit
     if max(moves) > 0:
         mean = np.mean(moves[1:])
-        tell(f"landmarks are moved onto the surface by up to {max(moves):.3g} {unit}, {mean:.3g} on average")
+        tell(
+            f"Scan4D moves landmarks onto the surface, by up to {max(moves):.3g} {unit}, {mean:.3g} on "
+            "average"
+        )
     if astray:
         few = ", ".join(f"'{name}'" for name in list(dict.fromkeys(astray))[:_NAMED])
-        warn(f"{len(astray)} positions lie off the surface and stay there, such as {few}")
+        what = f"Scan4D finds no surface near {len(astray)} positions of landmarks, such as {few}"
+        warn(f"{what}, and does not move them")
     return replace(found, positions=positions)
 
 

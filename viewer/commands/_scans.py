@@ -35,9 +35,9 @@ SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'f
 def add_pose_arguments(parser: ArgumentParser) -> None:
     """The arguments that choose poses."""
     group = parser.add_argument_group("poses").add_mutually_exclusive_group()
-    group.add_argument("--pose", type=int, metavar="I", help="one pose, counted from 0")
-    group.add_argument("--time", type=float, metavar="S", help="the pose nearest to a time in seconds")
-    group.add_argument("--poses", metavar="A:B[:STEP]", help="poses from A up to but not including B")
+    group.add_argument("--pose", type=int, metavar="I", help="one frame, counted from 0")
+    group.add_argument("--time", type=float, metavar="S", help="the frame nearest to a time in seconds")
+    group.add_argument("--poses", metavar="A:B[:STEP]", help="frames from A up to, but not including, B")
     group.add_argument("--all", action="store_true", help="all poses")
 
 
@@ -56,7 +56,7 @@ def chosen_poses(args: Namespace, timeline: Timeline) -> list[int] | None:
         return [args.pose]
     if args.time is not None:
         if not math.isfinite(args.time):
-            raise InputError(f"{args.time} is no time", "--time", "Use seconds")
+            raise InputError(f"{args.time} is not a time", "--time", "Use seconds")
         return [timeline.nearest(args.time)]
     if args.poses is not None:
         return _poses_between(args.poses, timeline)
@@ -67,13 +67,13 @@ def _poses_between(text: str, timeline: Timeline) -> list[int]:
     match = re.fullmatch(r"(\d*):(\d*)(?::0*([1-9]\d*))?", text)
     if not match:
         raise InputError(
-            f"'{text}' is no range of poses", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
+            f"'{text}' is not a range of frames", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
         )
     start, stop, step = (int(part) if part else None for part in match.groups())
     indices = list(range(len(timeline)))[start:stop:step]
     if not indices:
         raise InputError(
-            f"there is no pose in {text}", timeline.name, f"It has the poses 0 to {len(timeline) - 1}"
+            f"there is no pose in {text}", timeline.name, f"The scan has the frames 0 to {len(timeline) - 1}"
         )
     return indices
 
@@ -147,7 +147,7 @@ def first_readable(timeline: Timeline, indices: Sequence[int]) -> Pose:
     error = timeline.broken[tried[0]]
     if len(indices) == 1:
         raise error
-    of_all = f"{len(tried)} of {len(indices)} frames were tried, and none can be read"
+    of_all = f"Scan4D tried {len(tried)} of {len(indices)} frames and cannot read any of them"
     raise InputError(of_all, timeline.name, f"The first: {error}")
 
 
@@ -200,7 +200,7 @@ def _check_times_file(path: Path, names: set[str]) -> None:
     except (OSError, UnicodeDecodeError, csv.Error):
         listed = {"?"}
     if listed - names - {"file"}:
-        raise InputError("holds the times of other files", path, "Write into a folder of its own")
+        raise InputError("already holds the times of other files", path, "Write into a folder of its own")
 
 
 def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:

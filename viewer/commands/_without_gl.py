@@ -52,9 +52,11 @@ def run(args: Namespace) -> int:
     if args.backend not in (None, BACKEND):
         hint = f"Use --backend {BACKEND}, or leave it out"
         raise InputError(f"'{args.backend}' needs OpenGL", "--no-gl", hint)
-    _refuse(args, _NEED_GL, "is for pictures that OpenGL draws")
+    _refuse(args, _NEED_GL, "applies only to pictures that OpenGL draws")
     if args.behind and args.out.suffix.lower() == SUFFIX:
-        raise InputError(f"is not stored in '{SUFFIX}' files", "--behind", "Give it when you draw them")
+        raise InputError(
+            f"is not stored in '{SUFFIX}' files", "--behind", "Use it when you draw the code words"
+        )
     if args.progress:
         say(device="CPU")
     if args.scan is not None and args.scan.lower().endswith(SUFFIX):
@@ -74,7 +76,7 @@ def _refuse(args: Namespace, names: tuple[str, ...], what: str) -> None:
 
 def _replay(args: Namespace, path: Path) -> None:
     """Draw a file of code words."""
-    _refuse(args, _SETTLED, f"cannot be chosen: the code words of {path.name} are of one picture")
+    _refuse(args, _SETTLED, f"has no effect: the code words in {path.name} hold a single picture")
     check_output(args.out, tuple(suffix for suffix in _SUFFIXES if suffix != SUFFIX), several=False)
     claim([numbered(args.out, 0)], [path, *_given(args.behind)], args.force)
     stream = read_stream(path)
@@ -124,8 +126,8 @@ def _background(path: Path | None, size: tuple[int, int]) -> NDArray[np.uint8] |
     colors = read_color(path)
     height, width = colors.shape[:2]
     if (width, height) != size:
-        what = f"has {width} x {height} pixels, where the picture has {size[0]} x {size[1]}"
-        raise InputError(what, path, "Scale it, or the picture with --size")
+        what = f"has {width} x {height} pixels, but the picture has {size[0]} x {size[1]}"
+        raise InputError(what, path, "Resize it, or change the size of the picture with --size")
     return np.dstack([colors, np.full((height, width), 255, np.uint8)])
 
 
@@ -142,7 +144,7 @@ def _own_look(look: Look, pose: Pose, title: str, several: bool) -> Look:
     if own is not look and not several:
         value_source(look, pose.overview.scalars)  # raises, and lists the known ones
     if own is not look:
-        warn(f"{title} has no '{look.color_by}', and is drawn in other colours")
+        warn(f"{title} has no '{look.color_by}', so Scan4D uses other colours")
     shapeless = pose.cloud.normals is None and pose.cloud.colors is None
     return replace(own, color_by="depth") if shapeless and own.color_by == "auto" else own
 
@@ -157,7 +159,7 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
         found: dict[str, Any] = estimate(pose, missing)
         return pose.with_cloud(replace(pose.cloud, **found))
     except ImportError:  # the library that finds neighbours is linked to EGL
-        effects = {"normals": "discs face the eye", "radii": "they are of one size"}
+        effects = {"normals": "the discs face the viewer", "radii": "all have the same size"}
         effect = " and ".join(effects[name] for name in missing)
         warn(f"no {' and '.join(missing)} can be estimated here: {effect}")
         return pose

@@ -57,16 +57,18 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--visible-from",
         type=_eye,
         metavar="X,Y,Z",
-        help="write only the points that an eye at this position sees, in scan units",
+        help="write only the points that are visible from this position, in scan units",
     )
     group = parser.add_argument_group("octrees (.svo)").add_mutually_exclusive_group()
     group.add_argument(
         "--delta",
         type=float,
         metavar="D",
-        help="share of the positions that may lack a leaf of their own; default 0.05",
+        help="share of the positions that may share their leaf with others; default 0.05",
     )
-    group.add_argument("--depth", type=int, metavar="H", help="level of the leaves instead, 0 to 21")
+    group.add_argument(
+        "--depth", type=int, metavar="H", help="fixed level of the leaves, 0 to 21, instead of a share"
+    )
 
 
 def run(args: Namespace) -> int:
@@ -94,7 +96,7 @@ def _check_holds(args: Namespace) -> None:
     for name in _wanted(args):
         if name == "radii" or suffix not in formats.scan_suffixes():
             hint = f"Write {', '.join(formats.writable_suffixes())}, or leave out --{name}"
-            raise InputError(f"'{suffix}' files hold no {name}", args.out, hint)
+            raise InputError(f"'{suffix}' files cannot store {name}", args.out, hint)
 
 
 def _wanted(args: Namespace) -> list[str]:
@@ -141,7 +143,7 @@ class _Poses:
 
     def counts(self) -> str:
         """How many points are seen, as a line."""
-        stated = f"{sum(self._seen):,} of {self._all:,} points are seen"
+        stated = f"{sum(self._seen):,} of {self._all:,} points are visible"
         each = f", {min(self._seen):,} to {max(self._seen):,} in each of {len(self._seen)} poses"
         return stated + (each if len(self._seen) > 1 else "")
 
@@ -164,7 +166,7 @@ def _write_scan(
     out = args.out
     check_output(out, formats.scan_suffixes(), several=False)
     if is_pattern(out):
-        raise InputError("has a number, but one file holds all poses", out, "Leave it out")
+        raise InputError("has a number in its name, but one file holds all frames", out, "Leave it out")
     claim([out], scan_inputs(timeline), args.force)
     with progress(len(indices)) as tick:
 

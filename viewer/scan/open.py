@@ -26,7 +26,7 @@ DEMO = "demo"
 _PICTURES = {  # beside which text tables are no points
     ".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".tif", ".tiff", ".bmp",
 }  # fmt: skip
-_NAME_TABLES = "Where tables are points, name them by a pattern such as '*.txt'"
+_NAME_TABLES = "If the text tables contain points, open them with a pattern such as '*.txt'"
 _PRINTF = re.compile("%(0?[0-9]{0,2})d")
 _NAMES_TO_COMPARE = 5000
 _TABLES = {".csv", ".txt"}  # which beside other files are notes as a rule
@@ -47,7 +47,7 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
     those 25 a second. Raises InputError where there is nothing to open, and says what is near.
     """
     if fps is not None and not (np.isfinite(fps) and fps > 0):
-        raise InputError(f"a frame rate of {fps} is not usable", hint="Give frames per second above 0")
+        raise InputError(f"Scan4D cannot use a frame rate of {fps}", hint="Give frames per second above 0")
     unit = unit and checked_unit(unit)
     source = find_source(path)
     recorded = source.times()
@@ -62,12 +62,13 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
         timeline.messages.append(ScanMessage("beside", f"{what}. Open such a file by its name to see it."))
     if stated and not usable_unit(stated):
         what = (
-            f"the scan names '{shortened(stated)}' as its unit of length, which is no short word such as mm"
+            f"the scan names '{shortened(stated)}' as its unit of length, which is not a short word "
+            "such as mm"
         )
-        timeline.messages.append(ScanMessage("unit", f"{what}: its unit is not set"))
+        timeline.messages.append(ScanMessage("unit", f"{what}: the unit stays unknown"))
     if measured and fps is not None:
         timeline.messages.append(
-            ScanMessage("times", f"{TIMES_FILE} tells the times; {fps:g} fps is not used")
+            ScanMessage("times", f"Scan4D takes the times from {TIMES_FILE}, and ignores {fps:g} fps")
         )
     return timeline
 
@@ -155,7 +156,7 @@ def folder_frames(folder: Path) -> list[Path]:
 def _open_pattern(pattern: str) -> FrameSource:
     files = matches(pattern)
     if not files:
-        raise InputError("matches no file", pattern, "Check its folder, and quote it against the shell")
+        raise InputError("matches no file", pattern, "Check the folder, and put the pattern in quotes")
     frames = _choose_frames(files, pattern)
     if not frames:
         raise InputError("matches no scan file", pattern, f"Known files: {_listed(formats.known_suffixes())}")
@@ -203,7 +204,7 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
                 f"{lacking}: Scan4D reads no points from text tables beside pictures", where, _NAME_TABLES
             )
         hint = f"Scan4D reads depth from 16-bit PNG with a camera.json. {_NAME_TABLES}"
-        raise InputError("holds pictures and text tables, which are no scan", where, hint)
+        raise InputError("holds pictures and text tables, but no scan", where, hint)
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
         most = max(by_kind, key=lambda kind: len(by_kind[kind]))
@@ -225,7 +226,7 @@ def _nothing_there(path: str) -> InputError:
         missing = missing.parent
     names = [entry.name for entry in entries(missing.parent)[:_NAMES_TO_COMPARE]]
     close = difflib.get_close_matches(missing.name, names, n=3)
-    hint = f"Close to it: {_listed(close)}" if close else f"There is no '{missing.name}' in {missing.parent}"
+    hint = f"Did you mean: {_listed(close)}" if close else f"There is no '{missing.name}' in {missing.parent}"
     return InputError("no such file or folder", path, hint)
 
 

@@ -101,7 +101,7 @@ class RangeView:
             raise InputError(f"a range view's calibration is unusable: {given}")
         self._check_distortion()
         if not is_rigid(self.world_to_camera, _RIGID):
-            raise InputError("a range view's world_to_camera is not a rotation and a translation")
+            raise InputError("a range view's world_to_camera must be a rotation and a translation")
 
     @property
     def eye(self) -> NDArray[np.float64]:
@@ -337,7 +337,9 @@ def _cloud(
     )
     if not len(cloud):
         what = "holds no points: no pixel inside the masks has a depth"
-        raise InputError(what, hint="Check its masks, and what its depths mean")
+        raise InputError(
+            what, hint=("Check the masks, and whether the depths are in the right unit and format")
+        )
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
 
 

@@ -80,7 +80,7 @@ def read_calibration(path: Path, default: Calibration | None = None) -> Calibrat
     except InputError as error:
         raise InputError(error.what, path, error.hint or _FORM) from error
     except ValueError as error:
-        raise InputError(f"is no calibration: {shortened(str(error))}", path, _FORM) from error
+        raise InputError(f"is not a calibration: {shortened(str(error))}", path, _FORM) from error
 
 
 def calibration_of(stored: dict[str, Any], default: Calibration | None = None) -> Calibration:
@@ -105,24 +105,27 @@ def _from_text(rows: Sequence[tuple[int, Sequence[str]]]) -> dict[str, Any]:
         matrix = np.array(numbers).reshape(len(rows), -1)
         numbers = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]]
     if len(numbers) < 4:
-        raise InputError(f"is no calibration: it has {len(numbers)} numbers", hint=_FORM)
+        raise InputError(f"is not a calibration: it has {len(numbers)} numbers", hint=_FORM)
     return dict(zip(("fx", "fy", "cx", "cy"), numbers, strict=False)) | {"distortion": numbers[4:]}
 
 
 def _checked(stated: dict[str, Any], default: Calibration | None) -> Calibration:
     """The calibration with these fields. Raises InputError that says what is wrong."""
     if missing := [name for name in ("fx", "fy", "cx", "cy") if name not in stated]:
-        raise InputError(f"is no calibration: it lacks {', '.join(missing)}", hint=_FORM)
+        raise InputError(f"is not a calibration: it lacks {', '.join(missing)}", hint=_FORM)
     given = {**stated, "distortion": tuple(_number("distortion", each) for each in _listed(stated))}
     for name in ("fx", "fy", "cx", "cy", "depth_scale"):
         if name in given:
             given[name] = _number(name, given[name])
     if min(given["fx"], given["fy"]) <= 0:
-        raise InputError(f"is no calibration: fx is {given['fx']:g} and fy {given['fy']:g}", hint=_FORM)
+        raise InputError(f"is not a calibration: fx is {given['fx']:g} and fy {given['fy']:g}", hint=_FORM)
     if len(given["distortion"]) not in (0, 4, 5, 8):
         raise InputError(f"has {len(given['distortion'])} coefficients of distortion, expected 4, 5 or 8")
     if given.get("depth_scale", 1) < 1:
-        hint = "It is the number of depth steps in one unit, such as 1000 for millimetres where the unit is m"
+        hint = (
+            "depth_scale is the number of depth steps in one unit, such as 1000 for millimetres where "
+            "the unit is m"
+        )
         raise InputError(f"its depth_scale is {given['depth_scale']:g}", hint=hint)
     if "kind" in given and given["kind"] not in (kinds := get_args(DepthKind)):
         raise unknown_name("kind of depth", shortened(given["kind"]), kinds)
@@ -135,12 +138,12 @@ def _checked(stated: dict[str, Any], default: Calibration | None) -> Calibration
 def _listed(stated: dict[str, Any]) -> Sequence[Any]:
     values = stated.get("distortion", ())
     if not isinstance(values, list | tuple):
-        raise InputError("its distortion is no list of numbers")
+        raise InputError("its distortion is not a list of numbers")
     return values
 
 
 def _number(name: str, value: Any) -> float:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     if not (is_number and math.isfinite(value)):
-        raise InputError(f"is no calibration: {name} is {shortened(value)}", hint=_FORM)
+        raise InputError(f"is not a calibration: {name} is {shortened(value)}", hint=_FORM)
     return float(value)

@@ -43,7 +43,7 @@ def read_depth(path: Path) -> NDArray:
     """The numbers of a 16-bit grey PNG, or of a TIFF, (H, W). Raises InputError."""
     with opened_picture(path, DEPTH_KINDS) as image:
         if image.format == "PNG" and not image.mode.startswith(_SIXTEEN_BITS):
-            raise InputError(f"is a picture of type {image.mode}; a depth picture is 16-bit grey")
+            raise InputError(f"is a picture of type {image.mode}, but a depth picture must be 16-bit grey")
         return numbers_of_picture(image)
 
 
@@ -82,7 +82,7 @@ def depth_view(
         image = read(path)
         if image.shape[:2] != stored.shape:
             sizes = f"has {_size(image)} pixels, its depth {_size(stored)}"
-            raise InputError(sizes, path, f"{what} must be of the same pixels")
+            raise InputError(sizes, path, f"{what} must have the same size")
         return image
 
     if mask is not None:

@@ -39,7 +39,7 @@ TITLE = "a scanner's range images"
 FILE = "pods.json"
 
 _MOST_PODS = 64
-_FORM = 'It holds {"unit": "mm", "pods": [{"name": "left", "range": "left_*.tif", "fx": ...}]}'
+_FORM = 'Expected: {"unit": "mm", "pods": [{"name": "left", "range": "left_*.tif", "fx": ...}]}'
 _RANGE, _TEXTURE, _MASK, _CONFIDENCE = _IMAGES = ("range", "texture", "mask", "confidence")
 _ANY = "*"
 _NAME_BYTES = 1000  # of memory for a file that a pattern names
@@ -96,13 +96,13 @@ def _rig(stored: dict[str, Any]) -> tuple[str, list[_Pod]]:
         raise InputError(f"names {len(stored['pods'])} pods, where 1 to {_MOST_PODS} can be read")
     pods = [_pod(pod, f"pod{number}", unit) for number, pod in enumerate(stored["pods"])]
     if len({pod.name for pod in pods}) < len(pods):
-        raise InputError("gives several pods one name")
+        raise InputError("gives several pods the same name")
     return unit, pods
 
 
 def _pod(stored: Any, name: str, unit: str) -> _Pod:
     if not isinstance(stored, dict):
-        raise InputError(f"{name} is no JSON object")
+        raise InputError(f"{name} is not a JSON object")
     stated = stored.get("name", name)
     if not isinstance(stated, str) or not stated:
         raise InputError(f"the name of {name} is {shortened(stated)}")
@@ -123,7 +123,7 @@ def _pose(stored: dict[str, Any]) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         pose = np.empty(0)
     if pose.shape != (4, 4):
-        raise InputError("has a pose that is no 4 x 4 matrix")
+        raise InputError("has a pose that is not a 4 x 4 matrix")
     return from_camera_to_world(pose)
 
 
