@@ -128,7 +128,7 @@ def test_landmarks_are_put_onto_the_surface_and_it_is_said(run: Run) -> None:
     write_landmarks(Path("off.csv"), {"on": [0, 0, 10.3], "high": [0, 0, 15.5]})
     done = run("measure", "seq", "--landmarks", "off.csv", "-o", "out.csv")
     assert done.code == 0, done.err
-    assert "moved onto the surface by up to 0.3" in done.out
+    assert "moves landmarks onto the surface, by up to 0.3" in done.out
     assert "1 positions lie off the surface and stay there, such as 'high'" in done.err
     assert float(table(Path("out.csv"))[0]["z"]) == pytest.approx(10, abs=0.05)
     done = run("measure", "seq", "--landmarks", "off.csv", "-o", "out.csv", "--no-snap", "--force")
@@ -182,7 +182,7 @@ def test_measures_are_read_as_toml_and_those_without_landmarks_are_left_out(run:
     )
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "--measures", "m.toml", "-o", "o.csv")
     assert done.code == 0, done.err
-    assert "'not' is left out: landmarks.csv has no landmark 'z'" in done.err
+    assert "Scan4D leaves out 'not': landmarks.csv has no landmark 'z'" in done.err
     assert {row["name"] for row in table(Path("o.csv")) if row["kind"] == "measure"} == {"there"}
 
 
@@ -229,7 +229,7 @@ def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
     words = ("measure", "seq", "--landmarks", "landmarks.csv", "--measures", "measures.json", "--unit", "mm")
     done = run(*words, "-o", "out.csv", "--plot", "plot.svg", "--pose", "0")
     assert done.code == 0, done.err
-    assert "'raum' is not in plot.svg: its axes are in mm, °, mm², not mm³" in done.err
+    assert "'raum' is not plotted in plot.svg: its axes are in mm, °, mm², not mm³" in done.err
     assert run(*words, "-o", "o.csv", "--plot", "plot.csv", "--pose", "0").err.count("plot.csv") == 0
     assert "raum [mm³]" in table(Path("plot.csv"))[0]
 

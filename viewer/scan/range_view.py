@@ -209,7 +209,7 @@ class RangeView:
             return
         shown = ", ".join(f"{value:g}" for value in self.distortion)
         if self.kind == "height":
-            raise InputError(f"a range view of heights has no lens, but its distortion ({shown})")
+            raise InputError(f"a range view of heights has no lens, but it has a distortion ({shown})")
         if len(self.distortion) not in COUNTS or not np.isfinite(self.distortion).all():
             counts = "k1 k2 p1 p2 [k3 [k4 k5 k6]]"
             raise InputError(f"a range view's distortion is ({shown}), expected the numbers {counts}")

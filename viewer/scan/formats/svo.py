@@ -232,7 +232,7 @@ def _found(path: Path, size: int, changed: int) -> list[_Extent]:
             taken += header.stored
             check_count(len(extents) + 1, _MOST_POSES, "octrees")
             if extents and header.unit != extents[0].header.unit:
-                raise InputError(f"octree {len(extents)} has another unit of length than the first")
+                raise InputError(f"octree {len(extents)} has a different unit of length from the first")
             extents.append(_Extent(offset, min(taken, end - offset), header))
             offset += taken
     counts = [0, *(extent.header.before for extent in extents)]
