@@ -7,7 +7,7 @@ import math
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,13 @@ _LARGEST, _SMALLEST = 1e24, 1e-24  # lengths whose squares, sums and ratios stay
 _SMALLEST_SUBJECT = 1e-18  # whose distances float32 can square
 _NARROWEST, _WIDEST = 1e-6, 170.0  # fields of view that a picture can be drawn with, degrees
 _MOST_BYTES = 2**20  # of a file; ours have some 300
+
+
+class Lens(TypedDict, total=False):
+    """Fields of a `Camera` that say how it projects."""
+
+    projection: str
+    fov_y: float
 
 
 @dataclass(frozen=True)
@@ -76,14 +83,13 @@ class Camera:
         *,
         aspect: float = 1.0,
         up: str = "+y",
-        fov_y: float = 30.0,
-        projection: str = "perspective",
+        **lens: Unpack[Lens],
     ) -> Camera:
         """A camera that circles the centre of `bounds`.
 
         azimuth: degrees; 0 looks from the front (+z for up +y), positive moves the eye towards +x. elevation:
         degrees, positive is above. distance: scan units; None: as near as possible with all bounds in view at
-        this aspect (width / height).
+        this aspect (width / height). lens: fov_y and projection, else those of any camera.
         """
         bounds = _with_extent(bounds)
         above = np.array(up_vector(up), float)
@@ -99,8 +105,7 @@ class Camera:
             eye=vector(bounds.center + direction * bounds.radius),
             target=vector(bounds.center),
             up=vector(screen_up if abs(math.cos(e)) < 1e-6 else above),
-            projection=projection,
-            fov_y=fov_y,
+            **lens,
         )
         camera = camera.fit(bounds, aspect)
         return camera if distance is None else camera.at_distance(distance)

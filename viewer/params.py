@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar
+from typing import Any, TypedDict, TypeVar, Unpack
 
 from .errors import InputError, shortened, unknown_name
 
@@ -95,53 +95,44 @@ class Parameter:
         }
 
 
-def param(
-    default: Any,
-    help: str,
-    *,
-    low: float | None = None,
-    high: float | None = None,
-    choices: tuple[str, ...] = (),
-    sweep: tuple[Any, ...] = (),
-    affects: str = "draw",
-    type: type | None = None,
-    unit: str = "",
-    group: str = "",
-    when: Mapping[str, tuple[Any, ...]] | None = None,
-    unless: Mapping[str, tuple[Any, ...]] | None = None,
-    key: str = "",
-    deprecated: tuple[str, ...] = (),
-    title: str = "",
-    words: Mapping[str, str] | None = None,
-    basic: bool = False,
-) -> Any:
-    """A dataclass field that is a parameter, as `Parameter` says.
+class Declared(TypedDict, total=False):
+    """Arguments of `param` beside the default and the help: the fields of `Parameter`, each with a default.
 
-    type: needed where the default is None. title: where that is not the name in words. when, unless: names of
-    other parameters -> the values of them with which this one matters, or does not.
+    type: needed if the default is None. title: if that is not the name in words. when, unless: names of other
+    parameters -> the values with which this parameter matters, or does not.
     """
-    assert affects in AFFECTS
-    return dataclasses.field(
-        default=default,
-        metadata={
-            "help": help,
-            "low": low,
-            "high": high,
-            "choices": choices,
-            "sweep": sweep,
-            "affects": affects,
-            "type": type or default.__class__,
-            "optional": default is None,
-            "unit": unit,
-            "group": group,
-            "when": (*_conditions(when, negated=False), *_conditions(unless, negated=True)),
-            "key": key,
-            "deprecated": deprecated,
-            "title": title,
-            "words": words or {},
-            "basic": basic,
-        },
-    )
+
+    low: float | None
+    high: float | None
+    choices: tuple[str, ...]
+    sweep: tuple[Any, ...]
+    affects: str
+    type: type
+    unit: str
+    group: str
+    when: Mapping[str, tuple[Any, ...]] | None
+    unless: Mapping[str, tuple[Any, ...]] | None
+    key: str
+    deprecated: tuple[str, ...]
+    title: str
+    words: Mapping[str, str]
+    basic: bool
+
+
+_DEFAULTS: dict[str, Any] = {
+    "low": None, "high": None, "choices": (), "sweep": (), "affects": "draw", "unit": "", "group": "",
+    "key": "", "deprecated": (), "title": "", "words": {}, "basic": False,
+}  # fmt: skip
+
+
+def param(default: Any, help: str, **declared: Unpack[Declared]) -> Any:
+    """A dataclass field that is a parameter, as `Parameter` says."""
+    facts: dict[str, Any] = {**_DEFAULTS, "type": default.__class__, **declared}
+    conditions = _conditions(facts.pop("when", None), negated=False)
+    conditions += _conditions(facts.pop("unless", None), negated=True)
+    assert facts["affects"] in AFFECTS
+    metadata = {"help": help, "optional": default is None, "when": tuple(conditions), **facts}
+    return dataclasses.field(default=default, metadata=metadata)
 
 
 def _conditions(values: Mapping[str, tuple[Any, ...]] | None, negated: bool) -> list[Condition]:

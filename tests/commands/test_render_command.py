@@ -68,18 +68,17 @@ def test_exr_output(run: Run, scans: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("argument", "azimuth", "elevation", "distance"),
-    [("30,15", 30, 15, None), ("-30,15", -30, 15, None), ("-.5,-20,7.5", -0.5, -20, 7.5)],
+    ("argument", "orbit"),
+    [("30,15", (30, 15)), ("-30,15", (-30, 15)), ("-.5,-20,7.5", (-0.5, -20, 7.5))],
 )
 @pytest.mark.parametrize("up", ["+y", "-z"])
 def test_orbit_and_up(
-    argument: str, azimuth: float, elevation: float, distance: float | None, up: str, run: Run, scans: Path,
-    tmp_path: Path,
-) -> None:  # fmt: skip
+    argument: str, orbit: tuple[float, ...], up: str, run: Run, scans: Path, tmp_path: Path
+) -> None:
     ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL)
     assert run(*ball, "--up", up, "--orbit", argument).code == 0
     cloud = formats.read(scans / "ball.npz")
-    camera = front(cloud, azimuth=azimuth, elevation=elevation, distance=distance, up=up)
+    camera = front(cloud, up=up, **dict(zip(("azimuth", "elevation", "distance"), orbit, strict=False)))
     expected = viewer.render(cloud, camera, (96, 64), "surfels").image()
     assert np.array_equal(picture(tmp_path / "a.png"), expected)
     assert run(*ball, f"--up={up}", f"--orbit={argument}", "--force").code == 0

@@ -1,4 +1,4 @@
-"""Replaying: the pictures of a recording, or of a picture that tells how it was made."""
+"""Replaying: the pictures of a recording, or of a picture with its recording inside."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from argparse import Namespace
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
+from typing import NamedTuple
 
 from ..document.anonymous import anonymous_pose, anonymous_request, middle_of
 from ..document.recording import (
@@ -32,8 +34,8 @@ from ._console import warn
 from ._drawing import Plan
 from ._outputs import claim
 
-# What the recording tells, by the names of arguments.
-_TOLD = (
+# Arguments that a recording replaces.
+_OF_RECORDING = (
     "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
     "budget", "error",
 )  # fmt: skip
@@ -41,7 +43,7 @@ _TOLD = (
 
 @contextmanager
 def planned(args: Namespace) -> Iterator[Plan]:
-    """The pictures of `args.replay`. Raises InputError where other arguments tell what to draw as well."""
+    """The pictures of `args.replay`. Raises InputError where other arguments say what to draw as well."""
     _check_arguments(args)
     recording = Recording.load(args.replay)
     entries: Sequence[Entry] = recording.entries
@@ -65,7 +67,7 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
 
 
 def _check_arguments(args: Namespace) -> None:
-    given = [f"--{name}" for name in _TOLD if _is_given(getattr(args, name))]
+    given = [f"--{name}" for name in _OF_RECORDING if _is_given(getattr(args, name))]
     if args.up is not None:
         given.append("--up")
     if given:
@@ -94,36 +96,44 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
 
     Broken frames among several are reported and left out. Raises InputError where none is left.
     """
-    timeline: Timeline | None = None
-    opened, source, failed, drawn = None, None, None, False
+    source, failed, drawn = None, None, False
+    for number, entry, opened in _opened(entries, args):
+        if entry is not source:
+            source, request = entry, None
+            try:
+                request, failed = _request(entry, args, opened.timeline), None
+            except InputError as error:
+                if not _may_be_left_out(entry, opened.timeline, entries):
+                    raise
+                if str(error) != str(failed):
+                    warn(f"{opened.timeline.name}: {frame_in_words(entry.pose)} is left out: {error}")
+                failed = error
+            else:
+                shown = _completed(entry, request, args, opened)
+        if request is not None:
+            drawn = True
+            yield number, request, shown, shown.legend(opened.timeline, request.pose)
+    if failed and not drawn:
+        raise failed
+
+
+class _Opened(NamedTuple):
+    """The scan of an entry: its name as it was found, its frames, and its hash."""
+
+    name: str
+    timeline: Timeline
+    hash: str | None
+
+
+def _opened(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int, Entry, _Opened]]:
+    """The entries by number, each with its scan, of which one at a time is open. Raises InputError."""
     salt = new_salt() if args.anonymous else None
-    try:
-        for number, entry in enumerate(entries):
-            if timeline is None or (entry.scan, entry.hash) != opened:
-                if timeline is not None:
-                    timeline.close()
-                found, timeline, hash = _scan_of(entry, args, salt)
-                opened = entry.scan, entry.hash
-            if entry is not source:
-                source = entry
-                try:
-                    request, failed = _request(entry, args, timeline), None
-                except InputError as error:
-                    if not _may_be_left_out(entry, timeline, entries):
-                        raise
-                    if str(error) != str(failed):
-                        warn(f"{timeline.name}: {frame_in_words(entry.pose)} is left out: {error}")
-                    failed = error
-                else:
-                    shown = _completed(entry, request, args, found, hash, timeline)
-            if failed is None:
-                drawn = True
-                yield number, request, shown, shown.legend(timeline, request.pose)
-        if failed and not drawn:
-            raise failed
-    finally:
-        if timeline is not None:
-            timeline.close()
+    for _, group in groupby(enumerate(entries), lambda item: (item[1].scan, item[1].hash)):
+        first, *others = group
+        opened = _scan_of(first[1], args, salt)
+        with opened.timeline:
+            for number, entry in (first, *others):
+                yield number, entry, opened
 
 
 def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
@@ -137,23 +147,21 @@ def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     return anonymous_request(request, start) if args.anonymous else request
 
 
-def _completed(
-    entry: Entry, request: Request, args: Namespace, scan: str, hash: str | None, timeline: Timeline
-) -> Entry:
-    """The entry with what is known by now, and with the marks and the unit that the arguments tell.
+def _completed(entry: Entry, request: Request, args: Namespace, opened: _Opened) -> Entry:
+    """The entry with what is known by now, and with the marks and the unit of the arguments.
 
     What is anonymous stays so.
     """
     marks = entry.marks if args.marks is None else marks_of(args.marks)
-    unit = args.unit or entry.unit or timeline.unit
+    unit = args.unit or entry.unit or opened.timeline.unit
     look = replace(entry.look, quality=request.look.quality)
-    shown = replace(entry, scan=scan, hash=hash, look=look, marks=marks, unit=unit)
+    shown = replace(entry, scan=opened.name, hash=opened.hash, look=look, marks=marks, unit=unit)
     if not (entry.anonymous or args.anonymous):
         return shown
     time = float(request.pose.time)
     world_from_pose = matrix_of(request.layers.world_from_pose)
     if not entry.anonymous:
-        shown = shown.drawn_from(middle_of(timeline.pose(entry.pose)))
+        shown = shown.drawn_from(middle_of(opened.timeline.pose(entry.pose)))
     return replace(
         shown, time=time, camera=request.camera, look=request.look, place=world_from_pose
     ).without_names()
@@ -164,8 +172,8 @@ def _may_be_left_out(entry: Entry, timeline: Timeline, entries: Sequence[Entry])
     return entry.pose in timeline.broken and any(other.pose != entry.pose for other in entries)
 
 
-def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Timeline, str | None]:
-    """The scan of an entry: how it was found, opened, and its hash.
+def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
+    """The scan of an entry, open.
 
     salt: of the hash where what is drawn is made anonymous. Raises InputError where it is unusable, or where
     the one that was named is another one.
@@ -184,7 +192,9 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> tuple[str, Time
             what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
             raise InputError(what, found, "Name the scan as it was when you recorded")
         warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
-    return found, timeline, hash if salt is None or entry.anonymous else fingerprint(timeline.files, salt)
+    if salt is not None and not entry.anonymous:
+        hash = fingerprint(timeline.files, salt)
+    return _Opened(found, timeline, hash)
 
 
 def _open(scan: str, path: Path) -> tuple[str, Timeline]:

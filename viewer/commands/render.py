@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..backends import backend as find_backend
 from ..camera import Camera
@@ -178,7 +178,8 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         marks = marks_of(args.marks)
 
         def pictures() -> Iterator[tuple[int, Request, Entry, Legend]]:
-            drawn = _requests(args, timeline, shots, size, look, values, camera, upright, name, goal)
+            wanted = _Wanted(size, look, values, camera, upright, name, goal)
+            drawn = _requests(args, timeline, shots, wanted)
             for shot, request, choice in drawn:
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
@@ -220,23 +221,27 @@ def _write_json(data: dict[str, Any], path: Path) -> None:
         temporary.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
 
 
+class _Wanted(NamedTuple):
+    """The settings of all pictures. values: of the backend's parameters, by name."""
+
+    size: tuple[int, int]
+    look: Look
+    values: dict[str, object]
+    camera: Camera | None
+    upright: Upright
+    backend: str | None
+    goal: Goal | None
+
+
 def _requests(
-    args: Namespace,
-    timeline: Timeline,
-    shots: list[Shot],
-    size: tuple[int, int],
-    look: Look,
-    values: dict[str, object],
-    camera: Camera | None,
-    upright: Upright,
-    backend: str | None,
-    goal: Goal | None,
+    args: Namespace, timeline: Timeline, shots: list[Shot], wanted: _Wanted
 ) -> Iterator[tuple[Shot, Request, Choice | None]]:
     """Requests for each shot, and how backend and parameters were chosen, where they were for a goal. The
     first pose settles the backend, several the camera if there is none.
 
     A pose without the number that the look colours by is reported, and has colours of its own choice.
     """
+    size, look, values, camera, upright, backend, goal = wanted
     chosen, choice = None, None
     camera_of = None if camera is None else lambda shot: camera
     for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):

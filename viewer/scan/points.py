@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +26,20 @@ _SCALAR = "scalar:"  # begins the names of scalars among those of all arrays
 
 NOTHING = 0xFFFFFFFF  # the row, or the number of a face or node, where there is none
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
+
+
+class CloudAttributes(TypedDict, total=False):
+    """CloudAttributes of N points, as `PointCloud.from_arrays` takes them; all are optional.
+
+    colors: (N, 3) or (N, 4), uint8 or float in 0..1. axes: (N, 4), of which rows without two lengths count as
+    round, with the radius given; the others set it. scalars: name -> (N,).
+    """
+
+    normals: ArrayLike | None
+    colors: ArrayLike | None
+    radii: ArrayLike | None
+    axes: ArrayLike | None
+    scalars: Mapping[str, ArrayLike] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,21 +86,15 @@ class PointCloud:
         cls,
         positions: ArrayLike,
         *,
-        normals: ArrayLike | None = None,
-        colors: ArrayLike | None = None,
-        radii: ArrayLike | None = None,
-        axes: ArrayLike | None = None,
-        scalars: Mapping[str, ArrayLike] | None = None,
         origin: ArrayLike | None = None,
         precise: bool = True,
         viewpoint: ArrayLike | None = None,
+        **attributes: Unpack[CloudAttributes],
     ) -> PointCloud:
         """Points with a NaN or infinite coordinate are dropped and counted.
 
-        positions: (N, 3) absolute, any real type. colors: (N, 3) or (N, 4), uint8 or
-        float in 0..1. axes: (N, 4), of which rows without two lengths count as round, with the radius
-        given; the others set it. origin: (3,); chosen by `choose_origin` where None. precise: whether what
-        the coordinates have beyond float32 offsets is stored. viewpoint: (3,) absolute.
+        positions: (N, 3) absolute, any real type. origin: (3,); chosen by `choose_origin` if None. precise:
+        whether what the coordinates have beyond float32 offsets is stored. viewpoint: (3,) absolute.
         Raises InputError where shapes do not fit, and where the viewpoint is not finite.
         """
         points = np.asarray(positions)
@@ -107,29 +115,27 @@ class PointCloud:
                 raise InputError(f"{name} have shape {array.shape} ({array.dtype}) for {count} points")
             return array if finite is None else array[finite]
 
-        normals_ = pick(normals, "normals", (3,))
-        colors_ = pick(colors, "colors", (3, 4))
-        radii_ = pick(radii, "radii", (1,))
-        axes_ = pick(axes, "axes", (4,))
+        normals = pick(attributes.get("normals"), "normals", (3,))
+        colors = pick(attributes.get("colors"), "colors", (3, 4))
+        radii = pick(attributes.get("radii"), "radii", (1,))
+        axes = pick(attributes.get("axes"), "axes", (4,))
         if finite is not None:
             points = points[finite]
-        radii_ = None if radii_ is None else np.ascontiguousarray(radii_, np.float32)
+        radii = None if radii is None else np.ascontiguousarray(radii, np.float32)
         shortened = 0
-        if radii_ is not None or axes_ is not None:
-            radii_, axes_, shortened = _splats(
-                radii_, axes_, _LONGEST_SPLAT * (_robust_extent(points) or 1.0)
-            )
+        if radii is not None or axes is not None:
+            radii, axes, shortened = _splats(radii, axes, _LONGEST_SPLAT * (_robust_extent(points) or 1.0))
         base = choose_origin(points) if origin is None else np.array(origin, np.float64)
         offsets, remainders = _relative(points, base, precise)
         return cls(
             positions=offsets,
             origin=base,
-            normals=None if normals_ is None else np.ascontiguousarray(normals_, np.float32),
-            colors=None if colors_ is None else _rgba8(colors_),
-            radii=radii_,
-            axes=axes_,
+            normals=None if normals is None else np.ascontiguousarray(normals, np.float32),
+            colors=None if colors is None else _rgba8(colors),
+            radii=radii,
+            axes=axes,
             scalars={name: np.ascontiguousarray(pick(values, f"values of '{name}'", (1,)))
-                     for name, values in (scalars or {}).items()},
+                     for name, values in (attributes.get("scalars") or {}).items()},
             ids=None if finite is None else np.flatnonzero(finite).astype(np.uint32),
             dropped=count - retained,
             shortened=shortened,

@@ -123,24 +123,38 @@ def parse_header(head: bytes) -> PlyHeader:
                 if encoding not in ENDIAN:
                     raise unknown_name("PLY format", encoding[:_LONGEST_WORD], list(ENDIAN))
             case ["element", name, count]:
-                if not count.isdecimal() or len(count) > _LONGEST_WORD:
-                    raise InputError(f"the header promises '{count[:_LONGEST_WORD]}' rows of {name}")
-                elements.append(Element(name, int(count)))
-            case ["property", "list", length_type, type_, name] if elements:
-                elements[-1].properties.append(Property(name, type_, length_type))
-            case ["property", type_, name] if elements:
-                elements[-1].properties.append(Property(name, type_))
-            case [type_, name] if elements and type_ in TYPES:  # some exporters forget the word
-                elements[-1].properties.append(Property(name, type_))
+                elements.append(_element(name, count))
             case ["comment" | "obj_info", *_] | []:
                 pass
-            case _:
-                odd_lines.append(line.strip())
+            case words:
+                declared = _property(words) if elements else None
+                if declared is None:
+                    odd_lines.append(line.strip())
+                else:
+                    elements[-1].properties.append(declared)
     for element in elements:
         check_count(len(element.properties), MOST_COLUMNS, "properties of an element")
     if not encoding:
         raise InputError("the PLY header has no format line")
     return PlyHeader(encoding, elements, odd_lines, end.end())
+
+
+def _element(name: str, count: str) -> Element:
+    if not count.isdecimal() or len(count) > _LONGEST_WORD:
+        raise InputError(f"the header promises '{count[:_LONGEST_WORD]}' rows of {name}")
+    return Element(name, int(count))
+
+
+def _property(words: list[str]) -> Property | None:
+    """The property that a line declares, None if it declares none."""
+    match words:
+        case ["property", "list", length_type, type_, name]:
+            return Property(name, type_, length_type)
+        case ["property", type_, name]:
+            return Property(name, type_)
+        case [type_, name] if type_ in TYPES:  # some exporters forget the word
+            return Property(name, type_)
+    return None
 
 
 def header_text(encoding: str, elements: list[Element]) -> bytes:
