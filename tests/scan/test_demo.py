@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import rarely
 
-from viewer.scan.demo import DemoSource, colors, head, motion, sampling
+from viewer.scan.demo import DemoSource, colors, head, motion
 from viewer.scan.demo.asset import asset_path, rest_points
 from viewer.scan.demo.dual import Dual, coordinates
+from viewer.scan.demo.solids import projected
 from viewer.scan.open import open_scan
 
 REST, MOUTH_OPEN, EYES_SHUT, SMILE = 0, 20, 36, 48  # poses
@@ -18,6 +23,20 @@ TWISTS = (motion.EYELID, motion.BROW, motion.JAW, motion.MOUTH_CORNER)
 STEP = 1e-5  # mm, of finite differences
 
 Rows = NDArray[np.float64]
+
+
+def imported_tool() -> ModuleType:
+    """The script that made the points."""
+    path = Path(__file__).resolve().parents[2] / "tools" / "demo_head.py"
+    spec = importlib.util.spec_from_file_location("demo_head", path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+sampling = imported_tool()
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +155,7 @@ def test_points_cover_the_surface(demo: DemoSource, index: int) -> None:
     """Random places of the surface are within the radius of a point that faces the same way."""
     cloud, time = demo.load(index), seconds(demo, index)
     scattered = sampling._scattered(head.skin, sampling._skin_shows, 1500, np.random.default_rng(2))
-    places, normals = sampling.projected(head.skin, scattered)
+    places, normals = projected(head.skin, scattered)
     places, normals = places[:, head.eyes(*places) > 0.3], normals[:, head.eyes(*places) > 0.3]
     places, normals, _ = motion.move(places, normals, time)
     rows, distances = nearest(places.T, cloud.world())

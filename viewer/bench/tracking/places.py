@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...errors import unknown_name
 from ...scan.demo import head
 from ...scan.demo.motion import HeadMotion, move
-from ...scan.demo.sampling import projected
+from ...scan.demo.solids import projected
 
 _NEWTON_STEPS = 12
 _LONGEST_STEP = 2.0  # mm

@@ -12,7 +12,7 @@ from ...mesh.triangles import Mesh
 from ...scan.demo import DemoSource, colors, head
 from ...scan.demo.asset import rest_points
 from ...scan.demo.motion import move, turn
-from ...scan.demo.sampling import Rows, Solid, projected
+from ...scan.demo.solids import Rows, Solid, projected
 from ...scan.faces import Faces
 from ...scan.points import PointCloud
 from ...scan.sources import FrameSource

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ...mesh.triangles import Mesh
 from ...scan.demo import colors, head
 from ...scan.demo.motion import TALK, HeadMotion, move, turn
-from ...scan.demo.sampling import Solid, projected
+from ...scan.demo.solids import Solid, projected
 from ...scan.faces import Triangles
 from ...scan.points import PointCloud
 from .isosurface import grid_values, isosurface

@@ -1,4 +1,4 @@
-"""The points of the demo scan at rest, sampled beforehand by `sampling` and shipped as one file."""
+"""The points of the demo scan at rest, sampled beforehand by tools/demo_head.py and shipped as one file."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...files import whole_file
 from ...resources import resource_path
 
 
@@ -45,17 +44,4 @@ def rest_points() -> RestPoints:
             colors=arrays["colors"],
             radii=arrays["radii"].astype(np.float32),
             skin=int(arrays["skin"]),
-        )
-
-
-def save_asset(points: RestPoints, path: Path) -> None:
-    """Write points as `rest_points` reads them: normals in 16 bits an axis, radii as halves."""
-    with whole_file(path) as temporary:
-        np.savez_compressed(
-            temporary,
-            positions=points.positions,
-            normals=np.rint(points.normals * 32767.0).astype(np.int16),
-            colors=points.colors,
-            radii=points.radii.astype(np.float16),
-            skin=points.skin,
         )

@@ -1,25 +1,24 @@
 """Spreads the points of the demo scan over the head at rest, and colours them.
 
-`python -m viewer.scan.demo.sampling` writes the shipped file anew, in about a minute.
+`python tools/demo_head.py` writes assets/demo_head.npz anew, in about a minute.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from . import colors, head
-from .asset import RestPoints, asset_path, save_asset
-from .dual import coordinates
-from .motion import normalized
-from .shapes import Scalar, bump, ramp
+from viewer.files import whole_file
+from viewer.scan.demo import colors, head
+from viewer.scan.demo.asset import RestPoints, asset_path
+from viewer.scan.demo.shapes import bump, ramp
+from viewer.scan.demo.solids import Rows, Solid, projected
 
-Solid: TypeAlias = Callable[[Scalar, Scalar, Scalar], Scalar]
 Shows: TypeAlias = Callable[[NDArray, float], NDArray[np.bool_]]
-Rows: TypeAlias = NDArray[np.float64]  # (3, N) or (N,)
 
 COUNT = 88_000  # points before those hidden for good are left out
 SEED = 20
@@ -111,25 +110,6 @@ def _scattered(solid: Solid, shows: Shows, count: int, rng: np.random.Generator)
     return np.concatenate(found, axis=1)[:, :count]
 
 
-def projected(
-    solid: Solid, points: NDArray[np.float64], steps: int = 6, longest: float = 0.5
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Points (3, N) brought to the surface by Newton steps, and the normals there (3, N).
-
-    longest: a step along each axis, mm.
-    """
-    parts = [points[:, i : i + _BATCH] for i in range(0, points.shape[1], _BATCH)]
-    normals = []
-    for index, part in enumerate(parts):
-        for _ in range(steps):
-            solid_here = solid(*coordinates(part))
-            step = solid_here.gradient * (solid_here.value / np.square(solid_here.gradient).sum(axis=0))
-            part = part - np.clip(step, -longest, longest)
-        parts[index] = part
-        normals.append(normalized(solid(*coordinates(part)).gradient))
-    return np.concatenate(parts, axis=1), np.concatenate(normals, axis=1)
-
-
 def _neighbors(
     points: NDArray[np.float64], normals: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
@@ -154,6 +134,19 @@ def _batched(solid: Solid, points: NDArray[np.float64]) -> NDArray[np.float32]:
     """The values of a solid at points (3, N), (N,)."""
     single = points.astype(np.float32)
     return np.concatenate([solid(*single[:, i : i + _BATCH]) for i in range(0, single.shape[1], _BATCH)])
+
+
+def save_asset(points: RestPoints, path: Path) -> None:
+    """Write points as `rest_points` reads them: normals in 16 bits an axis, radii as halves."""
+    with whole_file(path) as temporary:
+        np.savez_compressed(
+            temporary,
+            positions=points.positions,
+            normals=np.rint(points.normals * 32767.0).astype(np.int16),
+            colors=points.colors,
+            radii=points.radii.astype(np.float16),
+            skin=points.skin,
+        )
 
 
 if __name__ == "__main__":
