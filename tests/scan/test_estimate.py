@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.estimate import cloud_normals, cloud_radii, fake_color
+from viewer.scan.estimate import cloud_normals, cloud_radii
 from viewer.scan.open import open_scan
 from viewer.scan.planes import NeighborSearch
 from viewer.scan.points import PointCloud
@@ -314,14 +314,3 @@ def test_a_line_beside_a_surface_has_no_normals_and_a_bent_one_does() -> None:
 def test_an_unusable_viewpoint(viewpoint: tuple[float, ...]) -> None:
     with pytest.raises(InputError, match="is not a viewpoint"):
         cloud_normals(PointCloud.from_arrays(grid(3)), viewpoint=viewpoint)
-
-
-def test_fake_color_tells_the_direction() -> None:
-    normals = np.array([[1, 0, 0], [0, 1, 0], [0, 0, -1], [np.nan, 0, 0], [2, 0, 0]], np.float32)
-    assert fake_color(normals).tolist() == [
-        [255, 128, 128, 255],
-        [128, 255, 128, 255],
-        [128, 128, 0, 255],
-        [128, 128, 128, 255],
-        [255, 128, 128, 255],
-    ]

@@ -24,13 +24,11 @@ def write_obj(path: Path, points: np.ndarray, faces: Faces) -> None:
     path.write_text("\n".join(lines) + "\n")
 
 
-def one_topology(scan: Path) -> bool | None:
-    """As a timeline says once all frames are read."""
+def one_topology(scan: Path) -> bool:
+    """Whether a row is the same point of the subject in all frames."""
     with open_scan(scan) as timeline:
-        assert timeline.one_topology is None, "nothing is known before frames are read"
-        for index in range(len(timeline)):
-            timeline.pose(index)
-        return timeline.one_topology
+        known = {timeline.pose(index).cloud.topology for index in range(len(timeline))}
+        return len(known) == 1 and None not in known
 
 
 WRITERS = {

@@ -2,7 +2,7 @@
 
 A spot is the place that was picked, not the nearest point. Its uncertainty is a covariance: of what the
 points around leave open of the surface, of the pixel's size, and of what following the points adds. Where a
-scan has one topology (`Timeline.one_topology`), a spot follows its points as a rigid body does.
+scan has one topology (`PointCloud.topology`), a spot follows its points as a rigid body does.
 """
 
 from __future__ import annotations

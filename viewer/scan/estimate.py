@@ -90,16 +90,6 @@ def cloud_radii(cloud: PointCloud, k: int = 7) -> NDArray[np.float32]:
     return np.clip(radii, _FLOAT.tiny, _FLOAT.max).astype(np.float32)[copies]
 
 
-def fake_color(normals: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """A colour that tells the direction of a normal, for scans without texture, (N, 4) uint8.
-
-    x, y and z from -1 to 1 become red, green and blue from 0 to 255. Slomp 2014, III.
-    """
-    rgba = np.full((len(normals), 4), 255, np.uint8)
-    rgba[:, :3] = np.rint(np.clip(np.nan_to_num(normals) * 0.5 + 0.5, 0, 1) * 255)
-    return rgba
-
-
 def _in_lines(points: Vectors, near: NDArray[np.int32]) -> NDArray[np.intp]:
     """The rows of points (N, 3) that lie in a line with all their neighbours, near (N, K), the farthest last;
     as far as float32 tells, which points were stored in."""

@@ -88,7 +88,6 @@ class Timeline:
         self._loading: dict[int, Future[Pose]] = {}
         self._broken: dict[int, InputError] = {}
         self._sizes: dict[int, int] = {}  # bytes of every pose read so far
-        self._topologies: dict[int, str | None] = {}  # of every pose read so far
         self._typical_size = 0
         self._requests: list[int] = []  # latest last
         self._playhead, self._direction = 0, 1
@@ -153,17 +152,6 @@ class Timeline:
         """The frames found unreadable so far, and why."""
         with self._state:
             return dict(self._broken)
-
-    @property
-    def one_topology(self) -> bool | None:
-        """Whether an id is the same point of the subject in all frames, as far as they have been read.
-
-        None while fewer than two have been: then nothing is known. The scan says so by faces between the
-        points that are the same in every frame; equal numbers of points alone say nothing.
-        """
-        with self._state:
-            known = set(self._topologies.values())
-            return None if len(self._topologies) < 2 else len(known) == 1 and None not in known
 
     @property
     def reading(self) -> Task | None:
@@ -388,7 +376,6 @@ class Timeline:
                 what = f"{pose.label}: Scan4D shrinks {shortened} splats that are far larger than the scan"
                 self.messages.append(ScanMessage("shortened", what, index))
             self._sizes[index] = self._typical_size = pose.nbytes
-            self._topologies[index] = pose.overview.topology
             if not self._closed:
                 distance = self._distance(index) if ahead else 0
                 self._cache.put(pose, is_needed=lambda other: self._distance(other) < distance)
