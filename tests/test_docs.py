@@ -15,7 +15,8 @@ import pytest
 from command_line import Run
 
 from viewer.app import tools
-from viewer.app.commands import Command, Commands, Menu
+from viewer.app.commands import Command, Menu
+from viewer.app.menus import Commands
 from viewer.backends import backends
 from viewer.bench import measuring
 from viewer.bench.papers.farooq_2013 import farooq, laplacian

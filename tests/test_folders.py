@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from command_line import Run
 
-from viewer.app.settings import FILE, Settings, save
+from viewer.app.settings import FILE, save
 from viewer.document.document import Document
 from viewer.document.journal import Journal, journal_folder
 from viewer.document.saved_session import SavedSession, keep, kept_file
@@ -50,7 +50,7 @@ def modes(folder: Path) -> dict[str, int]:
 def test_nobody_else_can_replace_the_folders_that_are_made_for_a_user(umask: int, tmp_path: Path) -> None:
     """Who can write to the folder around it can put another one in its place."""
     os.umask(umask)
-    save(Settings(), user_folder() / FILE)
+    save({}, user_folder() / FILE)
     assert {mode(folder) for folder in user_folder().parents if folder.is_relative_to(tmp_path / "home")} == {
         0o700
     }
@@ -59,7 +59,7 @@ def test_nobody_else_can_replace_the_folders_that_are_made_for_a_user(umask: int
 @posix
 def test_nobody_else_can_read_what_is_kept_of_a_user(run: Run, tmp_path: Path) -> None:
     keep(SavedSession("/scans/doe.ply", None, 0, Document()))
-    save(Settings(), user_folder() / FILE)
+    save({}, user_folder() / FILE)
     journal = Journal(tmp_path)
     with whole_file(cache_folder() / "facts.json") as temporary:
         temporary.write_text("{}")
@@ -107,7 +107,7 @@ def test_nothing_is_kept_in_a_folder_of_another_user() -> None:
     user_folder().mkdir(parents=True)
     os.chown(user_folder(), 12345, 12345)
     with pytest.raises(InputError, match="permission denied"):
-        save(Settings(), user_folder() / FILE)
+        save({}, user_folder() / FILE)
     assert list(user_folder().iterdir()) == []
 
 

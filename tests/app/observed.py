@@ -27,7 +27,6 @@ from imgui_bundle import imgui
 from viewer.analysis.pick import SURE
 from viewer.app import run
 from viewer.app.app import App
-from viewer.app.scene.view import words_over
 from viewer.backends import backends
 from viewer.document.schema import plain
 
@@ -157,12 +156,12 @@ def is_idle(app: App) -> bool:
 
 def shown(app: App) -> dict[str, Any]:
     """What the window shows."""
-    viewport, surface, document = app.viewport, app.viewport.surface, app.document
+    viewport, surface, document = app.viewport, app.viewport.surface, app.session.document
     left, bottom, width, height = viewport.place
     state: dict[str, Any] = {
         **asdict(app.session.pace),
         "scan": app.session.scan,
-        "is_opening": app.opening is not None,
+        "is_opening": app.opener.job.scan is not None,
         "view": (left, app.window.buffer_size[1] - bottom - height, width, height),
         "place": app.window.place and asdict(app.window.place),
         "size": app.window.buffer_size,
@@ -178,14 +177,14 @@ def shown(app: App) -> dict[str, Any]:
         "is_recording": app.capture.recorder is not None,
         "pointed": app.pointer.words,
         "unit": app.playback.unit,
-        "words": words_over(app),
+        "words": app.view.words_over(),
         "renderer": backends()[app.rendering.backend].title if app.rendering.backend else None,
-        "renderer_named": app.naming.name,
+        "renderer_named": app.naming.shown,
         "shown_notes": [note.text for note in app.notices.shown(time.monotonic())],
         "latest_note": app.notices.latest,
         "loading": app.loading.awaited and app.loading.awaited.words,
-        "theme": app.theme,
-        "is_replaying": app.replayer.replaying is not None,
+        "theme": app.window_look.theme,
+        "is_replaying": app.replayer.is_on,
         "is_welcomed": app.welcome.is_over,
         "is_browser_open": app.browser.is_open,
         "pages": app.help.open,

@@ -99,17 +99,17 @@ def until(condition: Callable[[], object]) -> None:
 
 def test_frames_are_asked_for_as_they_are_due_and_none_at_rest(renderer: Noting, start: Callable) -> None:
     playback, ahead = start()
-    ahead.advance()
+    ahead.advance(0.0)
     assert set(renderer.asked[-1]) == {0}, "at rest the one that is shown"
     playback.toggle(0.0)
-    ahead.advance()
+    ahead.advance(0.0)
     assert list(dict.fromkeys(renderer.asked[-1])) == [*range(COUNT)]
     playback.change(0.0, reverse=True)
-    ahead.advance()
+    ahead.advance(0.0)
     assert list(dict.fromkeys(renderer.asked[-1])) == [0, *reversed(range(1, COUNT))]
     playback.change(0.0, reverse=False, loop=False)
     playback.seek(9, 0.0)
-    ahead.advance()
+    ahead.advance(0.0)
     assert [index for index in renderer.asked[-1] if index] == [9, 10, 11]
 
 
@@ -117,12 +117,12 @@ def test_what_would_be_late_comes_last_but_for_every_frame(renderer: Noting, sta
     playback, ahead = start()
     renderer.seconds = 0.25
     playback.toggle(0.0)
-    ahead.advance()
+    ahead.advance(0.0)
     shown, *asked = renderer.asked[-1]
     assert shown == 0
     assert asked == [*range(3, COUNT), 2, 1, 0]
     playback.change(0.0, every_frame=True)
-    ahead.advance()
+    ahead.advance(0.0)
     assert renderer.asked[-1][1:] == [*range(COUNT)]
 
 
@@ -130,7 +130,7 @@ def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Calla
     playback, ahead = start()
 
     def is_afresh() -> bool:
-        ahead.advance()
+        ahead.advance(0.0)
         return renderer.afresh[-1]
 
     assert is_afresh()
@@ -152,11 +152,11 @@ def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Calla
 def test_a_second_lap_needs_no_work(renderer: Noting, start: Callable, backend: str) -> None:
     playback, ahead = start(backend)
     playback.toggle(0.0)
-    until(lambda: (ahead.advance(), ahead.ready == COUNT - 1 and renderer.unfinished == 0)[1])
+    until(lambda: (ahead.advance(0.0), ahead.ready == COUNT - 1 and renderer.unfinished == 0)[1])
     shown = []
     for frame in range(1, 2 * COUNT):
         now = frame / 10 + 0.01
-        ahead.advance()
+        ahead.advance(0.0)
         assert renderer.unfinished == 0
         playback.advance(now)
         assert playback.pose is not None
@@ -198,7 +198,7 @@ def test_every_frame_waits_until_it_is_prepared(renderer: Noting, start: Callabl
     while len(shown) < 2 * COUNT:
         assert time.monotonic() < deadline
         now += 0.01
-        ahead.advance()
+        ahead.advance(0.0)
         playback.advance(now)
         if playback.pose.index != shown[-1]:
             shown.append(playback.pose.index)
@@ -215,7 +215,7 @@ def test_a_scan_is_shown_before_anything_is_prepared(renderer: Noting, start: Ca
     playback.seek(5, 0.0)
     playback.advance(0.1)
     assert playback.pose.index == 0, "the picture before stays"
-    until(lambda: (ahead.advance(), playback.advance(0.2), playback.pose.index == 5)[2])
+    until(lambda: (ahead.advance(0.0), playback.advance(0.2), playback.pose.index == 5)[2])
 
 
 def test_layers_are_found_for_no_other_pose_than_the_one_that_is_shown(
@@ -231,7 +231,7 @@ def test_layers_are_found_for_no_other_pose_than_the_one_that_is_shown(
     laid.lay("tool", numbers, lambda index: STILL)
     shown = laid.layers(playback.pose)
     playback.toggle(0.0)
-    ahead.advance()
+    ahead.advance(0.0)
     assert ahead.ready >= 0
     assert looked == [0]
     assert laid.layers(playback.pose) is shown
@@ -241,6 +241,6 @@ def test_nothing_is_asked_for_before_there_is_a_camera(renderer: Noting, start: 
     playback, ahead = start()
     playback.session.amend(camera=None)
     playback.toggle(0.0)
-    ahead.advance()
+    ahead.advance(0.0)
     assert renderer.asked[-1] == []
     assert ahead.is_prepared(playback.pose)

@@ -16,6 +16,7 @@ import pytest
 from scenes import sphere
 from written import picture
 
+from viewer.app.later import Later
 from viewer.app.output.capture import Capture
 from viewer.app.output.export_plan import Choices
 from viewer.app.output.exporting import Exporting
@@ -108,7 +109,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
         capture = Capture(app.session, playback, app.viewport, app.note, Marks, no_film)
         exporting = Exporting(
             app.session, playback, app.viewport, app.note, capture.shown,
-            Choices(what="frames", folder=str(tmp_path), name="a"), Marks(), lambda: None,
+            lambda: None, choices=Choices(what="frames", folder=str(tmp_path), name="a"), marks=Marks(),
         )  # fmt: skip
         exporting.start()
         (told,) = app.told
@@ -125,7 +126,7 @@ def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) 
     capture.screenshot()
     colour_by_a_layer(app)
     capture.screenshot()
-    capture.close()
+    capture.finish()
     cannot, *saved = app.told
     assert "This picture cannot be replayed: the colours come from 'deviation'" in cannot
     first, second = (Path(words.removeprefix("Saved ")) for words in saved)
@@ -187,10 +188,10 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
 
 
 def test_closing_waits_for_no_question(app: Any) -> None:
-    capture = Capture(app.session, app.playback, app.viewport, app.note, Marks, no_film)
-    answered = threading.Event()
-    capture.tell_later(lambda: str(answered.wait()))
-    capture.close()  # or else for ever
+    later, answered = Later(app.note), threading.Event()
+    later.tell(lambda: str(answered.wait()))
+    later.advance(0.0)
+    later.finish()  # or else for ever
     assert app.told == []
     answered.set()
 
@@ -216,7 +217,7 @@ def test_a_saved_picture_says_what_the_colour_bar_of_the_view_does(app: Any) -> 
     app.viewport.is_refined = True
     for _ in range(2):
         capture.screenshot()
-    capture.close()
+    capture.finish()
     without, with_it = (picture(Path(words.removeprefix("Saved "))) for words in app.told)
     assert without.any()
     assert (without[..., :3].any(axis=-1) != with_it[..., :3].any(axis=-1)).sum() > 50

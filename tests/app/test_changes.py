@@ -25,7 +25,7 @@ class Watch:
         self.told: list[str] = []
         self.opened: list[str] = []
         self.changes = Changes(Session(str(scan)), self.told.append, self.opened.append)
-        self.changes.begin(SimpleNamespace(files=files))
+        self.changes.begin_scan(SimpleNamespace(files=files))
         self.now = 0.0
         self.look()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from scenes import sphere
@@ -32,29 +33,35 @@ def viewport() -> Iterator[Viewport]:
     viewport.release()
 
 
-def counted(counting: Counting, viewport: Viewport) -> dict[str, int]:
+def counting_of(viewport: Viewport) -> Counting:
+    return Counting(viewport, SimpleNamespace(is_moving=False))  # type: ignore[arg-type]
+
+
+def counted(counting: Counting) -> dict[str, int]:
     now = time.monotonic() + LATER
-    while not counting.advance(viewport, at_rest=True, now=now):
+    while not counting.advance(now):
         time.sleep(0.001)
     assert counting.counts is not None
-    assert not counting.advance(viewport, at_rest=True, now=now), "no others"
+    assert not counting.advance(now), "no others"
     return counting.counts
 
 
 def test_a_picture_at_rest_is_counted_once(viewport: Viewport) -> None:
-    counting = Counting()
+    counting = counting_of(viewport)
     viewport.draw(REQUEST)
     now = time.monotonic()
-    assert not counting.advance(viewport, at_rest=True, now=now), "it has just been drawn"
-    assert not counting.advance(viewport, at_rest=False, now=now + LATER)
+    assert not counting.advance(now), "it has just been drawn"
+    counting.activity.is_moving = True  # type: ignore[misc]
+    assert not counting.advance(now + LATER)
+    counting.activity.is_moving = False  # type: ignore[misc]
     assert viewport.surface is not None
-    assert counted(counting, viewport) == viewport.surface.point_counts()
+    assert counted(counting) == viewport.surface.point_counts()
 
     turned = replace(REQUEST, camera=REQUEST.camera.orbited(30, 0))
     viewport.draw(turned)
-    assert counting.advance(viewport, at_rest=False, now=now), "those of the picture before are gone"
+    assert counting.advance(now), "those of the picture before are gone"
     assert counting.counts is None
-    assert counted(counting, viewport) == viewport.surface.point_counts()
+    assert counted(counting) == viewport.surface.point_counts()
 
 
 @pytest.mark.parametrize("backend", ["points", "voxels"])
@@ -72,17 +79,17 @@ def test_a_preview_says_how_many_of_the_points_are_drawn(viewport: Viewport, bac
 
 
 def test_a_preview_is_not_counted_and_a_count_that_is_overtaken_is_dropped(viewport: Viewport) -> None:
-    counting = Counting()
+    counting = counting_of(viewport)
     viewport.draw(REQUEST)
     viewport.took(1000.0, goal_ms=10.0)
     later = time.monotonic() + LATER
-    counting.advance(viewport, at_rest=True, now=later)  # begins
+    counting.advance(later)  # begins
     viewport.draw(replace(REQUEST, camera=REQUEST.camera.orbited(30, 0)), held=True)
     assert viewport.is_preview
     for _ in range(50):
-        counting.advance(viewport, at_rest=True, now=later)
+        counting.advance(later)
         time.sleep(0.001)
     assert counting.counts is None
     viewport.finish()
     assert viewport.surface is not None
-    assert counted(counting, viewport) == viewport.surface.point_counts()
+    assert counted(counting) == viewport.surface.point_counts()

@@ -39,7 +39,7 @@ def test_it_begins_and_ends_where_it_should_and_turns_evenly(
 
 
 def test_a_jump_glides_and_a_drag_does_not() -> None:
-    glide, side = Glide(True), FRONT.orbited(90, 0)
+    glide, side = Glide(), FRONT.orbited(90, 0)
     assert glide.follow(FRONT, True, 0.0) == FRONT, "the first is shown at once"
     glide.follow(side, True, 1.0)
     assert glide.is_on
@@ -57,12 +57,12 @@ def test_a_jump_glides_and_a_drag_does_not() -> None:
 
 
 def test_what_shows_the_same_and_other_projections_do_not_glide() -> None:
-    glide = Glide(True)
+    glide = Glide()
     glide.follow(FRONT, True, 0.0)
     for camera in (FRONT.focused((1, 2, 5)), FRONT.projected("orthographic")):
         assert glide.follow(camera, True, 1.0) == camera
         assert not glide.is_on
-    glide.end()
+    glide.begin_scan(None)
     assert glide.follow(FRONT.orbited(50, 0), True, 2.0) == FRONT.orbited(50, 0), "of another scan"
     glide.toggle()
     assert glide.follow(FRONT, True, 3.0) == FRONT

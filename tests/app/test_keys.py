@@ -12,8 +12,9 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import imgui
 
-from viewer.app.commands import Command, Commands, Menu
+from viewer.app.commands import Command, Menu
 from viewer.app.keys import Keys, chord, chords, load_keys, write_template
+from viewer.app.menus import Commands
 from viewer.errors import InputError
 
 COMMANDS = Commands()

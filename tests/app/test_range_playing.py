@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -87,8 +88,9 @@ def test_a_sequence_plays_without_merging(
     picked = viewport.pick((SIZE[0] // 2, SIZE[1] // 2))
     assert picked is not None
     assert picked.id == surface.texel(SIZE[0] // 2, SIZE[1] // 2).row
-    counting, now = Counting(), time.monotonic() + LATER
-    while not counting.advance(viewport, at_rest=True, now=now):
+    at_rest, now = SimpleNamespace(is_moving=False), time.monotonic() + LATER
+    counting = Counting(viewport, at_rest)  # type: ignore[arg-type]
+    while not counting.advance(now):
         time.sleep(0.001)
     assert counting.counts == surface.point_counts()
     assert counting.counts["in"] == shown[-1].count

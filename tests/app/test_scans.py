@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -23,15 +24,15 @@ def looked(scans: Scans) -> None:
     until = time.monotonic() + 10
     while scans.waits:
         assert time.monotonic() < until
-        scans.advance()
+        scans.advance(0.0)
         time.sleep(0.001)
 
 
 def test_steps_go_through_what_was_named_together_and_round_its_end(names: list[str]) -> None:
     opened: list[str] = []
     session = Session(names[0])
-    scans = Scans(session, pytest.fail, pytest.fail, opened.append, names, ())
-    scans.opened(names[0])
+    scans = Scans(session, pytest.fail, pytest.fail, opened.append, names)
+    scans.begin_scan(SimpleNamespace())  # type: ignore[arg-type]
     looked(scans)
     assert (scans.listed, scans.are_together) == (names, True)
     scans.step(1)
@@ -45,9 +46,9 @@ def test_steps_go_through_what_was_named_together_and_round_its_end(names: list[
 
 def test_those_opened_lately_are_told_without_the_open_one_and_what_is_gone(names: list[str]) -> None:
     session = Session(names[0])
-    scans = Scans(session, pytest.fail, pytest.fail, pytest.fail, names[:1], (names[1], names[2]))
+    scans = Scans(session, pytest.fail, pytest.fail, pytest.fail, names[:1], recent=(names[1], names[2]))
     Path(names[2]).unlink()
-    scans.opened(names[0])
+    scans.begin_scan(SimpleNamespace())  # type: ignore[arg-type]
     looked(scans)
     assert scans.recent == tuple(names)
     assert [title(scan) for scan in scans.lately] == ["b.ply"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
@@ -11,14 +12,14 @@ import pytest
 
 from viewer.app.playing.playback import Playback
 from viewer.app.scene.rendering import Rendering
-from viewer.app.session import Session, edit_name
-from viewer.app.settings import Settings
+from viewer.app.session import Session, SessionSettings, edit_name
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.choice.goal import Goal
 from viewer.choice.ways import DrawingWay
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
+from viewer.document.schema import usable
 from viewer.look import Look
 from viewer.rigid import STILL, Rigid
 from viewer.scan.layers import NO_LAYERS
@@ -60,6 +61,11 @@ def test_a_scan_is_found_again_where_it_was_left() -> None:
     assert session.index == 2
 
 
+def restarted(session: Session) -> Document:
+    """The document that a new scan begins with after a restart."""
+    return usable(SessionSettings(), json.loads(json.dumps(session.remembered()))).document
+
+
 SOME = Pose(0, 0.0, "some", PointCloud.from_arrays([[0.0, 0, 0], [1, 1, 0]], normals=[[0.0, 0, 1]] * 2))
 
 
@@ -77,7 +83,7 @@ def test_a_choice_for_one_scan_says_nothing_of_the_next() -> None:
     session.turn_to("two")
     assert rendered(session) == of_its_own
     assert session.document == Document(look=Look(light="flat")), "how light it is goes with the user"
-    assert Settings.of(session).document == session.document, "after a restart as well"
+    assert restarted(session) == session.document, "after a restart as well"
     session.turn_to("one")
     assert session.document.goal == Goal("time", 20.0), "where it was chosen it stays"
 
@@ -99,7 +105,7 @@ def test_a_renderer_for_all_scans_is_chosen_and_cleared() -> None:
         assert rendering.is_for_all
         session.turn_to("two")
         assert rendered(session) == ("points", LARGE)
-        again = Session("three", Settings.of(session).document)
+        again = Session("three", restarted(session))
         assert rendered(again) == ("points", LARGE), "after a restart as well"
 
         rendering.choose("voxels")

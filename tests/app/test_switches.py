@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import pytest
 
-from viewer.app.commands import Commands, switch_commands
 from viewer.app.keys import chord
+from viewer.app.menus import Commands
+from viewer.app.scene.rendering import switch_commands
 from viewer.backends import Backend, backends
 from viewer.errors import InputError
 from viewer.params import param

@@ -7,12 +7,14 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from scenes import sphere
 
 from viewer.app.playing.playback import Playback
 from viewer.app.scene.choosing import Choosing
+from viewer.app.scene.rendering import Rendering
 from viewer.app.scene.viewport import Viewport
 from viewer.app.session import Session
 from viewer.camera import Camera
@@ -59,14 +61,25 @@ class Shown:
         self.session = session
         self.viewport = Viewport(shared_renderer(), (0, 0, *SIZE))
         self.told: list[str] = []
-        self.choosing = Choosing(session, playback, self.viewport, self.told.append)
+        self.is_at_rest = True
+        activity = SimpleNamespace(rests=lambda now: self.is_at_rest)
+        rendering = Rendering(session, playback, self.told.append)
+        self.choosing = Choosing(
+            session,
+            playback,
+            self.viewport,
+            rendering,
+            activity,
+            self.told.append,  # type: ignore[arg-type]
+        )
 
     def draw(self) -> None:
         self.viewport.rest()
         self.viewport.draw(self.session.document.request(POSE))
 
     def advance(self, at_rest: bool = True) -> bool:
-        return self.choosing.advance(at_rest, time.monotonic() + LATER)
+        self.is_at_rest = at_rest
+        return self.choosing.advance(time.monotonic() + LATER)
 
     def settle(self) -> DrawingWay | None:
         self.draw()

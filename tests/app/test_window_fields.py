@@ -11,7 +11,7 @@ from scenes import rarely
 from virtual_screen import RunningApp, Screen, running_app
 
 from viewer.app import tools
-from viewer.app.commands import Commands
+from viewer.app.menus import Commands
 
 XDO = {
     "Space": "space", "Right": "Right", "Left": "Left", "Up": "Up", "Down": "Down", "Home": "Home",

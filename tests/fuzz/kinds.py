@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import io
-import json
 import os
 import shutil
 import time
@@ -25,13 +24,16 @@ from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.analysis.landmarks.templates import read_template, save_template, templates
 from viewer.analysis.spot import Spot
 from viewer.app import keys, settings
-from viewer.app.commands import Commands
+from viewer.app.menus import Commands
+from viewer.app.part import part_classes, stored_values
+from viewer.app.session import SessionSettings
 from viewer.backends import backend, backends
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
 from viewer.document.landmarks import Landmarks
 from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
+from viewer.document.schema import usable
 from viewer.drawing.frame import render_frame, shared_renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -94,8 +96,8 @@ def _write_choices(folder: Path) -> None:
     write_png(np.zeros((2, 2, 4), np.uint8), folder / "recording.png", entry.description())
     (folder / TIMES_FILE).write_text("file,time\nf0.ply,0\nf1.ply,0.04\n")
     marks = (Bookmark("front", camera),)
-    chosen = settings.Settings(look=Look(light="head"), recent=("demo",)).to_json()
-    (folder / "settings.json").write_text(json.dumps(chosen))
+    chosen = {"session": {"look": {"light": "head"}}, "scans": {"recent": ["demo"]}}
+    settings.save(chosen, folder / "settings.json")
     end = Spot(0, 0.0, (1.0, 2.0, 3.0), 3, 0.1, 0)
     document = Document(camera, (1.0, 2.0, 3.0), Look(light="head"), "points", unit="mm", bookmarks=marks)
     document = document.with_params("points", backend("points").params()).with_part(
@@ -187,7 +189,11 @@ def _times(path: Path) -> None:
 
 
 def _settings(path: Path) -> None:
-    settings.save(settings.load(path)[0], path)
+    stored = settings.load(path)[0]
+    for name, part in part_classes().items():
+        stored_values(part, stored.get(name))
+    usable(SessionSettings(), stored.get("session"))
+    settings.save(stored, path)
 
 
 def _landmarks(path: Path) -> None:

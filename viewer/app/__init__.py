@@ -54,27 +54,30 @@ def run(
         with uncollected():
             from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
             from . import settings
-            from .app import App
+            from .app import App, Stated
             from .loop import Loop
             from .window import Window
+            from .window_look import stored_placement
 
-        remembered, notes = settings.load(user_folder() / settings.FILE)
+        stored, notes = settings.load(user_folder() / settings.FILE)
         try:
-            window = Window("Scan4D", remembered.window)
+            window = Window("Scan4D", stored_placement(stored))
         except NoOpenGLError as error:
             if is_lost:  # which is nearer to the user than the window
                 raise problems[0] from error
             raise
         try:
             with uncollected():  # tools are imported
-                app = App(window, found, timeline, remembered, unit=unit, fps=fps, up=up, session=session)
+                app = App(window, found, timeline, stored, Stated(unit, fps, up), session)
             try:
                 for note in notes:
-                    app.note(note)
+                    app.notices.tell(note)
                 app.scans.tell([refused, *problems] if refused else problems)
                 app.capture.find_unfinished()
                 if device is not None:
-                    app.note("The display's own GPU draws the window, so a device number has no effect.")
+                    app.notices.tell(
+                        "The display's own GPU draws the window, so a device number has no effect."
+                    )
                 if replay is not None:
                     app.replayer.replay(replay)
                 Loop(app, signals, watch).run()

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 from imgui_bundle import ImVec2, imgui
 
 from .. import __version__
+from ..drawing.renderer import Renderer
 from ..files import printable
 from ..folders import user_folder
-from ..gpu.context import Gpu
 from . import widgets
-from .commands import Command, Commands, Menu
+from .commands import Command, Menu
 from .keys import Keys
+from .menus import Commands
 from .notices import Notices
+from .part import Place, WindowPart
 
 _PAGES = ("Keys and mouse", "Messages", "About")
 _SIZE = ImVec2(60.0, 34.0)  # in heights of the font
@@ -23,15 +25,24 @@ _TWO_COLUMNS = 50.0  # least width of two columns
 Section = tuple[str, Sequence[tuple[str, str]]]  # its title and rows
 
 
-class Help:
+@dataclass(eq=False)
+class Help(WindowPart):
     """Windows with all commands, all messages and what this is.
 
     open: the pages that are, the one opened last at the end. focused: the one of them that has the focus,
     None where none has.
     """
 
-    def __init__(self, commands: Commands, keys: Keys, notices: Notices, gpu: Gpu) -> None:
-        self._commands, self._keys, self._notices, self._gpu = commands, keys, notices, gpu
+    name = "help"
+    layer = 60
+    shows = "Help"
+    OFFERS = {"focused_page": "focused"}
+    commands: Commands
+    keys: Keys
+    notices: Notices
+    renderer: Renderer
+
+    def __post_init__(self) -> None:
         self.open: list[str] = []
         self.focused: str | None = None
         self._searched = ""
@@ -44,6 +55,10 @@ class Help:
         else:
             self.open.append(page)
 
+    def enders(self) -> Iterable[tuple[int, Callable[[], bool]]]:
+        """The page that has the focus; below what goes on in the view, the one that was opened last."""
+        return (self.layer, self.on_escape), (25, self.close_last)
+
     def on_escape(self) -> bool:
         """Close the page that has the focus; whether one has."""
         focused, self.focused = self.focused, None
@@ -55,7 +70,7 @@ class Help:
         """Close the page that was opened last; whether one was open."""
         return self.open.pop() is not None if self.open else False
 
-    def draw(self) -> None:
+    def dialog(self, view: Place) -> None:
         """Declare the windows of the open pages."""
         self.focused = None
         pages = self._draw_keys, self._draw_messages, self._draw_about
@@ -83,8 +98,8 @@ class Help:
         if imgui.is_window_appearing():
             imgui.set_keyboard_focus_here()
         self._searched = imgui.input_text_with_hint("##search", "Search", self._searched)[1]
-        sections = [("Mouse", [(does, how) for how, does in self._commands.mouse])]
-        sections += [(menu.title, list(self._rows(menu))) for menu in self._commands.menus]
+        sections = [("Mouse", [(does, how) for how, does in self.commands.mouse])]
+        sections += [(menu.title, list(self._rows(menu))) for menu in self.commands.menus]
         words = self._searched.lower().split()
         found = [
             (title, [row for row in rows if has_words((title, *row), words)]) for title, rows in sections
@@ -103,29 +118,29 @@ class Help:
                         _row(keys, does)
             imgui.end_table()
 
-    def _rows(self, menu: Menu[Any], path: str = "") -> Iterator[tuple[str, str]]:
+    def _rows(self, menu: Menu, path: str = "") -> Iterator[tuple[str, str]]:
         """The commands of a menu: what each does, and its keys."""
         for group in menu.groups:
             for entry in group:
                 if isinstance(entry, Command):
-                    yield path + entry.title, self._keys.of[entry.name] or "-"
+                    yield path + entry.title, self.keys.of[entry.name] or "-"
                 elif isinstance(entry, Menu):
                     yield from self._rows(entry, f"{path}{entry.title}: ")
 
     def _draw_messages(self) -> None:
         """Declare all messages, the latest first."""
-        if not self._notices.all:
+        if not self.notices.all:
             imgui.text_disabled("No messages")
         elif imgui.button("Copy all"):
-            lines = (f"{notice.at:%H:%M:%S}  {notice.text}" for notice in self._notices.all)
+            lines = (f"{notice.at:%H:%M:%S}  {notice.text}" for notice in self.notices.all)
             imgui.set_clipboard_text("\n".join(lines))
-        for notice in reversed(self._notices.all):
+        for notice in reversed(self.notices.all):
             imgui.text_disabled(f"{notice.at:%H:%M:%S}")
             imgui.same_line(5 * imgui.get_font_size())
             imgui.text_wrapped(notice.text)
 
     def _draw_about(self) -> None:
-        gpu = self._gpu
+        gpu = self.renderer.gpu
         imgui.text_wrapped(f"Scan4D {__version__}: a viewer for 4D scans.")
         imgui.spacing()
         software = ", in software" if gpu.software else ""
@@ -136,6 +151,12 @@ class Help:
         if imgui.button("Copy"):
             imgui.set_clipboard_text(f"Scan4D {__version__}, OpenGL {gpu.driver} on {gpu.device}{software}")
         widgets.tooltip("Copy version and device, for a report")
+
+    COMMANDS = (
+        Command("keys", "Keys and mouse", lambda help: help.toggle("Keys and mouse"), "F1"),
+        Command("messages", "Messages", lambda help: help.toggle("Messages")),
+        Command("about", "About", lambda help: help.toggle("About")),
+    )
 
 
 def has_words(texts: Iterable[str], words: Iterable[str]) -> bool:

@@ -8,14 +8,20 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
+from .commands import Command
+from .part import WindowPart
+
 VIEW = "view"
 NO_KEYS = imgui.WindowFlags_.no_nav_inputs.value
 _BUTTONS = 3  # of a mouse
 
 
-class Keyboard:
+class Keyboard(WindowPart):
     """Leads the keyboard from part to part. part: the one that has it, by name: `VIEW` at first, and whenever
     the mouse is pressed."""
+
+    name = "keyboard"
+    layer = 50
 
     def __init__(self) -> None:
         self.part = VIEW
@@ -63,6 +69,11 @@ class Keyboard:
             imgui.set_nav_cursor_visible(True)
         elif not _is_here():
             self.part = VIEW
+
+    COMMANDS = (
+        Command("next_part", "Focus next area", lambda keyboard: keyboard.go(1), "F6 Ctrl+F6"),
+        Command("part_before", "Focus previous area", lambda keyboard: keyboard.go(-1), "Shift+F6"),
+    )
 
 
 def _is_here() -> bool:

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from imgui_bundle import imgui
 
 from ..errors import InputError, did_you_mean, shortened, unknown_name
 from ..files import parsed_toml, read_text, whole_file
-from .keyboard import VIEW
+from .commands import Command
 
-if TYPE_CHECKING:
-    from .app import App
-    from .commands import Commands
+
+class Commands(Protocol):
+    """The table of commands, see `menus.Commands`."""
+
+    of: Mapping[str, Command]
+    tool_of: Mapping[str, str]
+
 
 FILE = "keys.toml"
 _MOST_BYTES, _MOST_TOLD = 64 * 2**10, 5
@@ -26,23 +30,14 @@ _NAMED = {
     "]": "right_bracket", ",": "comma", ".": "period", "-": "minus", "=": "equal", "/": "slash",
     ";": "semicolon", "'": "apostrophe", "\\": "backslash", "`": "grave_accent",
 }  # fmt: skip
-_KEYS = {
+KEYS = {
     **{name: getattr(imgui.Key, attribute) for name, attribute in _NAMED.items()},
     **{letter: getattr(imgui.Key, letter.lower()) for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ"},
     **{digit: getattr(imgui.Key, f"_{digit}") for digit in "0123456789"},
     **{f"F{n}": getattr(imgui.Key, f"f{n}") for n in range(1, 13)},
 }
-_SHIFT = int(imgui.Key.mod_shift)
-_MODIFIER_BITS = sum(int(bit) for bit in _MODIFIERS.values())
-_REPEATED = int(imgui.InputFlags_.route_global | imgui.InputFlags_.repeat)  # of shortcuts
-_ARROWS = {"Right": (1, 0), "Left": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
-# What leads the keyboard through widgets, and works them.
-_WIDGETS_OWN = {
-    int(_KEYS[name]) for name in (
-        "Tab", "Space", "Enter", "Left", "Right", "Up", "Down", "Home", "End", "PageUp",
-        "PageDown", "Backspace",
-    )
-}  # fmt: skip
+MODIFIER_BITS = sum(int(bit) for bit in _MODIFIERS.values())
+ARROWS = {"Right": (1, 0), "Left": (-1, 0), "Up": (0, 1), "Down": (0, -1)}
 _HEAD = """\
 # The keys of Scan4D. Remove the '#' at the start of a line and change its keys; "" means no key.
 # Scan4D reads this file when it starts. Keys: letters, digits, F1 to F12, {named}. Write Ctrl+, Shift+
@@ -58,9 +53,9 @@ def chord(text: str) -> int:
     for name in modifiers:
         if name not in _MODIFIERS:
             raise unknown_name("modifier key", name, list(_MODIFIERS))
-    if key.upper() not in _KEYS and key not in _KEYS:
-        raise unknown_name("key", key, list(_KEYS))
-    value = int(_KEYS.get(key, _KEYS.get(key.upper(), 0)))
+    if key.upper() not in KEYS and key not in KEYS:
+        raise unknown_name("key", key, list(KEYS))
+    value = int(KEYS.get(key, KEYS.get(key.upper(), 0)))
     for name in modifiers:
         value |= int(_MODIFIERS[name])
     return value
@@ -72,79 +67,34 @@ def chords(text: str) -> list[int]:
 
 
 class Keys:
-    """The keys of every command. of: command's name -> its keys as text, empty for none."""
+    """The keys of every command.
+
+    of: command's name -> its keys as text, empty for none. chords: names of commands, each with the ImGui
+    chord of keys that it has.
+    """
 
     def __init__(self, commands: Commands, changes: Mapping[str, str] | None = None) -> None:
         """changes: command's name -> its keys, where they are not the usual ones."""
-        self._commands = commands.of
+        self._titles = {name: command.title for name, command in commands.of.items()}
         self.of: dict[str, str] = {name: command.key for name, command in commands.of.items()} | dict(
             changes or {}
         )
-        self._chords = [
-            (self._commands[name], keys) for name, text in self.of.items() for keys in chords(text)
-        ]
-        self._used: imgui.Key | None = None  # the key of the last command, until it is released
+        self.chords = [(name, keys) for name, text in self.of.items() for keys in chords(text)]
 
     def has(self, keys: str) -> bool:
         """Whether a command has these keys."""
         wanted = chord(keys)
-        return any(pressed == wanted for _, pressed in self._chords)
+        return any(pressed == wanted for _, pressed in self.chords)
 
     def hint(self, name: str) -> str:
         """A command's title, and its keys where it has some."""
-        keys, title = self.of[name], self._commands[name].title
+        keys, title = self.of[name], self._titles[name]
         return f"{title} ({keys})" if keys else title
 
     @property
     def is_arrow_held(self) -> bool:
         """Whether an arrow key is down: what it repeats is one step."""
-        return any(imgui.is_key_down(_KEYS[name]) for name in _ARROWS)
-
-    def handle(self, app: App) -> None:
-        """Do what the keys pressed since the last frame say; keys typed into a text or a dialog go there,
-        and to widgets those that lead through them."""
-        self._run_commands(app)
-        self._drop_characters()
-
-    def _drop_characters(self) -> None:
-        """Keep the characters of a key that ran a command out of the text field that the command opened.
-
-        The system sends a character with the key, or later, and again while the user holds the key. Another
-        key ends this: what the user types next goes into the field.
-        """
-        if self._used is None:
-            return
-        others = (key for key in _KEYS.values() if key != self._used)
-        if any(imgui.is_key_pressed(key, repeat=False) for key in others):
-            self._used = None
-            return
-        imgui.get_io().input_queue_characters.clear()
-        if not imgui.is_key_down(self._used):
-            self._used = None
-
-    def _run_commands(self, app: App) -> None:
-        if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
-            return
-        is_in_widgets = app.keyboard.part != VIEW or app.help.focused is not None
-        of_tool = set() if is_in_widgets else _arrows_of_tool(app)
-        for command, pressed in self._chords:
-            if pressed in of_tool or (is_in_widgets and pressed & ~_SHIFT in _WIDGETS_OWN):
-                continue
-            if not imgui.shortcut(pressed, _REPEATED if command.repeats else imgui.InputFlags_.route_global):
-                continue
-            with app.failures.told(command.title):
-                if command.can(app):
-                    self._used = imgui.Key(pressed & ~_MODIFIER_BITS)
-                    command.act(app)
-
-
-def _arrows_of_tool(app: App) -> set[int]:
-    """The arrow keys that were pressed since the last frame and that a tool has taken, as chords."""
-    return {
-        pressed
-        for name, way in _ARROWS.items()
-        if imgui.shortcut(pressed := int(_KEYS[name]), _REPEATED) and app.tools.arrow(*way)
-    }
+        return any(imgui.is_key_down(KEYS[name]) for name in ARROWS)
 
 
 def load_keys(path: Path, commands: Commands) -> tuple[Keys, list[str]]:

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from imgui_bundle import ImVec2, imgui
 
-from . import escape, menu
-from .keyboard import NO_KEYS
-from .output import export_dialog
-from .playing import timeline_bar
-from .scene import view
-from .ui import Ui
+from . import escape
+from .drawer import Drawer
+from .failures import Failures
+from .keyboard import NO_KEYS, Keyboard
+from .menu import MenuBar
+from .panel import Panel
+from .part import Parts, Place, WindowPart
+from .playing.timeline_bar import TimelineBar
+from .scene.full_view import FullView
+from .scene.view import SceneView
+from .shortcuts import Shortcuts
+from .tasks import Tasks
 
-if TYPE_CHECKING:
-    from .app import App
-
-Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
 _GRIP = 0.4  # width of what resizes the panel and the drawer, in heights of the font
 _BAR_HEIGHT = 4.8
 # The least height of the view, in shares of the window, and of what it and the drawer have together:
@@ -30,77 +32,103 @@ _STILL = (
 )  # fmt: skip
 
 
-def draw(app: App) -> Place:
-    """Declare all widgets; returns where the 3D view is. Where a part fails, the others are there."""
-    told = app.failures.told
-    app.keyboard.begin_frame()
-    app.keys.handle(app)
-    with told("Escape"):
-        escape.handle((
-            app.welcome.on_escape, app.help.on_escape, app.keyboard.on_escape, app.tools.on_escape,
-            app.replayer.on_escape, app.help.close_last, app.notices.on_escape, app.tasks.on_escape,
-            app.full_view.on_escape,
-        ))  # fmt: skip
-    place = _draw_view_alone(app) if app.full_view.is_on else _draw_parts(app)
-    for name, draw_part in (
-        ("Messages that stay", lambda: app.notices.draw_staying(*place, app.palette.broken, app.keyboard)),
-        ("What is loaded", lambda: app.loading.draw(place, app.tasks.cancel)),
-        ("Help", app.help.draw),
-        ("The first card", lambda: app.welcome.draw(*place[:3])),
-        ("The dialog that opens scans", app.browser.draw),
-        ("The dialog that saves sessions", app.sessions.saving.draw),
-        ("The export dialog", lambda: export_dialog.draw(app.exporting, app.quit)),
-        ("Dialogs of tools", app.tools.draw_dialogs),
-    ):
-        with told(name):
-            draw_part()
-    return place
+@dataclass(eq=False)
+class Layout(WindowPart):
+    """Declares all parts where they stand."""
 
+    name = "layout"
+    parts: Parts
+    failures: Failures
+    keyboard: Keyboard
+    shortcuts: Shortcuts
+    menu_bar: MenuBar
+    view: SceneView
+    side_panel: Panel
+    timeline_bar: TimelineBar
+    drawer: Drawer
+    tasks: Tasks
+    full_view: FullView
 
-def _draw_view_alone(app: App) -> Place:
-    whole = imgui.get_io().display_size
-    place = _draw_view(app, 0, int(whole.x), int(whole.y))
-    with app.failures.told("The list of work"):
-        app.tasks.draw_alone(place)
-    return place
+    def draw(self) -> Place:
+        """Declare all widgets; returns where the 3D view is. Where a part fails, the others are there."""
+        told = self.failures.told
+        self.keyboard.begin_frame()
+        self.shortcuts.handle()
+        with told("Escape"):
+            enders = [ender for part in self.parts for ender in part.enders()]
+            escape.handle(end for _, end in sorted(enders, key=lambda ender: -ender[0]))
+        view = self._draw_view_alone() if self.full_view.is_on else self._draw_parts()
+        for part in sorted(self.parts, key=lambda part: part.layer):
+            with told(part.shows):
+                part.dialog(view)
+        return view
 
+    def _draw_view_alone(self) -> Place:
+        whole = imgui.get_io().display_size
+        place = self._draw_view(0, int(whole.x), int(whole.y))
+        with self.failures.told("The list of work"):
+            self.tasks.draw_alone(place)
+        return place
 
-def _draw_parts(app: App) -> Place:
-    whole = imgui.get_io().display_size
-    top = 0
-    with app.failures.told("The menu"):
-        top = _draw_head(app, whole.x)
-    em = imgui.get_font_size()
-    # Whole numbers, so that the picture's edges fall on pixels.
-    width = max(1, int(whole.x - min(app.panel.width * em, 0.5 * whole.x)))
-    grip = int(_GRIP * em)
-    bar = min(_BAR_HEIGHT * em, 0.5 * whole.y)
-    drawer = drawer_height(grip + app.drawer.shown_height * em, whole.y, whole.y - top - bar)
-    below = whole.y - drawer if app.drawer.is_open else whole.y
-    bottom = int(below - bar)
-    height = max(1, bottom - top)
-    place = _draw_view(app, top, width, height)
-    with app.failures.told("The panel"):
-        _place_grip("grip", width, top, grip, height)
-        app.panel.draw_grip(height)
-        imgui.end()
-        _place("panel", width + grip, top, whole.x - width - grip, height)
-        app.panel.draw(app)
-        imgui.end()
-    with app.failures.told("The timeline"):
-        _place("timeline", 0, bottom, whole.x, below - bottom, app.keyboard.flags("timeline"))
-        app.keyboard.take("timeline")
-        timeline_bar.draw(app)
-        imgui.end()
-    if below < whole.y:
-        with app.failures.told("What is under the timeline"):
-            _place_grip("grip below", 0, below, whole.x, grip)
-            app.drawer.draw_grip(whole.x)
+    def _draw_parts(self) -> Place:
+        whole = imgui.get_io().display_size
+        top = 0
+        with self.failures.told("The menu"):
+            top = self._draw_head(whole.x)
+        em = imgui.get_font_size()
+        # Whole numbers, so that the picture's edges fall on pixels.
+        width = max(1, int(whole.x - min(self.side_panel.width * em, 0.5 * whole.x)))
+        grip = int(_GRIP * em)
+        bar = min(_BAR_HEIGHT * em, 0.5 * whole.y)
+        drawer = drawer_height(grip + self.drawer.shown_height * em, whole.y, whole.y - top - bar)
+        below = whole.y - drawer if self.drawer.is_open else whole.y
+        bottom = int(below - bar)
+        height = max(1, bottom - top)
+        place = self._draw_view(top, width, height)
+        with self.failures.told("The panel"):
+            _place_grip("grip", width, top, grip, height)
+            self.side_panel.draw_grip(height)
             imgui.end()
-            _place("drawer", 0, below + grip, whole.x, whole.y - below - grip)
-            app.drawer.draw(app.keyboard, Ui(app.keys))
+            _place("panel", width + grip, top, whole.x - width - grip, height)
+            self.side_panel.draw()
             imgui.end()
-    return place
+        with self.failures.told("The timeline"):
+            _place("timeline", 0, bottom, whole.x, below - bottom, self.keyboard.flags("timeline"))
+            self.keyboard.take("timeline")
+            self.timeline_bar.draw()
+            imgui.end()
+        if below < whole.y:
+            with self.failures.told("What is under the timeline"):
+                _place_grip("grip below", 0, below, whole.x, grip)
+                self.drawer.draw_grip(whole.x)
+                imgui.end()
+                _place("drawer", 0, below + grip, whole.x, whole.y - below - grip)
+                self.drawer.draw()
+                imgui.end()
+        return place
+
+    def _draw_view(self, top: int, width: int, height: int) -> Place:
+        """Declare the view; returns where it is."""
+        with self.failures.told("The view"):
+            imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
+            _place("view", 0, top, width, height)
+            imgui.pop_style_var()
+            self.view.draw()
+            imgui.end()
+        return 0, top, width, height
+
+    def _draw_head(self, width: float) -> int:
+        """Declare menus and toolbar; returns where what is below them begins."""
+        below = self.menu_bar.draw()
+        padding = imgui.get_style().window_padding
+        padding = ImVec2(padding.x, 0.4 * padding.y)  # not the style's own, which the next line changes
+        imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
+        height = imgui.get_frame_height() + 2 * padding.y
+        _place("toolbar", 0, below, width, height)
+        self.menu_bar.draw_toolbar()
+        imgui.end()
+        imgui.pop_style_var()
+        return int(below + height)
 
 
 def drawer_height(wanted: float, window: float, room: float) -> float:
@@ -108,31 +136,6 @@ def drawer_height(wanted: float, window: float, room: float) -> float:
     room: for both. All in pixels."""
     room = max(room, 0.0)
     return min(wanted, room - min(_VIEW_SHARE * window, _VIEW_PART * room))
-
-
-def _draw_view(app: App, top: int, width: int, height: int) -> Place:
-    """Declare the view; returns where it is."""
-    with app.failures.told("The view"):
-        imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-        _place("view", 0, top, width, height)
-        imgui.pop_style_var()
-        view.draw(app)
-        imgui.end()
-    return 0, top, width, height
-
-
-def _draw_head(app: App, width: float) -> int:
-    """Declare menus and toolbar; returns where what is below them begins."""
-    below = app.menu_bar.draw(app)
-    padding = imgui.get_style().window_padding
-    padding = ImVec2(padding.x, 0.4 * padding.y)  # not the style's own, which the next line changes
-    imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
-    height = imgui.get_frame_height() + 2 * padding.y
-    _place("toolbar", 0, below, width, height)
-    menu.draw_toolbar(app)
-    imgui.end()
-    imgui.pop_style_var()
-    return int(below + height)
 
 
 def _place_grip(name: str, left: float, top: float, width: float, height: float) -> None:

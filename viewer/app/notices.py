@@ -7,7 +7,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from imgui_bundle import ImVec2, imgui
@@ -16,6 +16,9 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from ..files import printable
 from . import theme, widgets
 from .keyboard import Keyboard
+from .part import Place, WindowPart
+from .window import Window
+from .window_look import WindowLook
 
 log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
@@ -68,8 +71,15 @@ class Notice:
         return self.is_problem or self.offer is not None
 
 
-class Notices:
+class Notices(WindowPart):
     """All messages, the last one at the end."""
+
+    name = "notices"
+    layer = 20
+    OFFERS = {
+        "note": "tell", "note_of_scan": "tell_of_scan", "note_of_work": "tell_of_work",
+        "note_of_opening": "tell_of_opening",
+    }  # fmt: skip
 
     def __init__(self) -> None:
         self.all: list[Notice] = []
@@ -89,6 +99,23 @@ class Notices:
         self.all.append(new)
         del self.all[:-_MOST_KEPT]
         self.count += 1
+
+    def tell_of_scan(self, text: str) -> None:
+        """Show a message about the open scan, until another one opens."""
+        self.tell(text, "scan")
+
+    def tell_of_work(self, text: str) -> None:
+        """Show what came of something that was done with the open scan, until another one opens; a problem or
+        an offer stays."""
+        self.tell(text, "" if isinstance(text, (Problem, Offer)) else "scan")
+
+    def tell_of_opening(self, text: str) -> None:
+        """Show a message about what could not be opened, until something else is to be opened."""
+        self.tell(text, "opening")
+
+    def leave_scan(self) -> None:
+        """Messages about the scan go with it."""
+        self.end("scan")
 
     def end(self, of: str) -> None:
         """Show no longer what was about something that is over: the scan that was open, or an opening."""
@@ -137,11 +164,10 @@ class Notices:
             draw_text(notice.text, corner, extent, wrap, pad)
             bottom = corner.y - 2 * pad.y - 0.4 * em
 
-    def draw_staying(
-        self, left: float, top: float, width: float, height: float, color: int, keyboard: Keyboard
-    ) -> None:
+    def draw_staying(self, view: Place, color: int, keyboard: Keyboard) -> None:
         """Declare a window with problems and offers, over the 3D view. color: 0xRRGGBB, of the mark beside
         each problem. keyboard: which goes there as well."""
+        left, top, width, height = view
         staying = [notice for notice in self.shown(time.monotonic()) if notice.stays]
         self._foot = 0.0
         if not staying:
@@ -193,6 +219,31 @@ class Notices:
                     act()
                 imgui.same_line()
             imgui.new_line()
+
+
+@dataclass(eq=False)
+class StayingNotices(WindowPart):
+    """The window with the messages that stay."""
+
+    name = "staying_notices"
+    layer = 20
+    shows = "Messages that stay"
+    notices: Notices
+    window_look: WindowLook
+    keyboard: Keyboard
+    window: Window
+    _seen: tuple[int, int] = field(default=(0, 0), init=False)  # how many there are, and how many are shown
+
+    def advance(self, now: float) -> None:
+        """Have the window drawn where other messages are shown."""
+        seen = self.notices.count, len(self.notices.shown(now))
+        if seen != self._seen:
+            self.window.touch()  # ImGui shows a window that fits its content from the second frame on
+            self._seen = seen
+
+    def dialog(self, view: Place) -> None:
+        """Declare it over the 3D view."""
+        self.notices.draw_staying(view, self.window_look.palette.broken, self.keyboard)
 
 
 def _replaces(new: Notice, former: Notice) -> bool:

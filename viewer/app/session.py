@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 from concurrent.futures import Future
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from ..document.document import Document
+from ..backends import backend
+from ..document.document import Document, KeptGoal
 from ..document.history import History
 from ..document.part import Part
 from ..document.saved_session import SavedSession
+from ..document.schema import BackendName, ReadBy, is_object, usable
+from ..errors import InputError
 from ..files import absolute
 from ..geometry import UP
+from ..look import Look
 from ..scan.open import is_demo
 from .laid import Laid
+from .part import WindowPart, chosen
 from .playing.player import Pace
 
 _MOST_LEFT = 50  # scans whose changes can still be undone
@@ -39,7 +45,35 @@ def named_like(scan: str, folder: Path, suffix: str) -> Path:
     return next(path for path in paths if not os.path.exists(path))
 
 
-class Session:
+def _read_params(data: Any) -> dict[str, Any]:
+    """Parameters by name of backends; those of backends that are not there are left out."""
+    found = {}
+    for name, values in data.items() if is_object(data) else ():
+        with suppress(InputError):
+            found[name] = usable(backend(name).params(), values)
+    return found
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """How a scan begins that was never open.
+
+    backend, params, goal: what the user chose for all scans. look, pace: those of the last scan.
+    """
+
+    backend: BackendName | None = None
+    params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
+    goal: KeptGoal = None
+    look: Look = field(default_factory=Look)
+    pace: Pace = field(default_factory=Pace)
+
+    @property
+    def document(self) -> Document:
+        """The document of such a scan."""
+        return Document(look=self.look.of_any_scan, backend=self.backend, params=self.params, goal=self.goal)
+
+
+class Session(WindowPart):
     """The open scan, and those that were open.
 
     scan: as the user named it. index: the frame. history: of the scan's document. laid: what tools lay over
@@ -47,6 +81,9 @@ class Session:
     which those begin that were never open; without one, each begins with its own default.
     hash_found: brings the scan's hash (see `fingerprint`), None where it has no files.
     """
+
+    name = "session"
+    Settings = SessionSettings
 
     def __init__(
         self,
@@ -66,6 +103,16 @@ class Session:
         self._left: dict[
             str, tuple[History, int]
         ] = {}  # by scan, as `known_as` has it; the last one left last
+
+    def remembered(self) -> dict[str, Any]:
+        """The values that come back at the next start. Parameters that are the defaults are not written,
+        since a later version may change those."""
+        params = {name: chosen(of) for name, of in self.for_all.params.items() if is_dataclass(of)}
+        return {
+            "backend": self.for_all.backend, "params": params,
+            "goal": None if self.for_all.goal is None else asdict(self.for_all.goal),
+            "look": chosen(self.document.look.of_any_scan), "pace": asdict(self.pace),
+        }  # fmt: skip
 
     @property
     def document(self) -> Document:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..task import Task
 from . import widgets
-from .files.opening import Opening
+from .files.opener import Opener
 from .output.capture import Capture
 from .output.exporting import Exporting
+from .part import Place, WindowPart
 from .playing.playback import Playback
 from .scene.viewport import Viewport
 from .session import Session
@@ -29,53 +30,62 @@ _FLAGS = (
 )  # fmt: skip
 
 
-class Tasks:
+@dataclass(eq=False)
+class Tasks(WindowPart):
     """All work that goes on beside the window."""
 
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        viewport: Viewport,
-        opening: Opening,
-        tools: Toolbox,
-        exporting: Exporting,
-        capture: Capture,
-        note: Callable[[str], None],
-    ) -> None:
-        self._session, self._playback, self._viewport = session, playback, viewport
-        self._opening, self._tools, self._exporting, self._note = opening, tools, exporting, note
-        self._capture = capture
+    name = "tasks"
+    layer = 10
+    doing = "Looking at work"
+    turn = 5
+    OFFERS = {"cancel_task": "cancel"}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    opener: Opener
+    tools: Toolbox
+    exporting: Exporting
+    capture: Capture
+    note: Callable[[str], None]
+
+    def __post_init__(self) -> None:
+        self._report: list[tuple[str, int]] = []
         self._corner = ImVec2(0, 0)  # lower left one of the list
 
     @property
     def all(self) -> list[Task]:
         """All of the work, the latest last."""
-        preparing = self._viewport.renderer.preparing
-        tasks = [self._exporting.task, self._capture.task, preparing, self._opening.task, *self._tools.tasks]
-        if self._playback.pose is None:
-            tasks.append(self._playback.timeline.reading)
+        preparing = self.viewport.renderer.preparing
+        tasks = [self.exporting.task, self.capture.task, preparing, self.opener.job.task, *self.tools.tasks]
+        if self.playback.pose is None:
+            tasks.append(self.playback.timeline.reading)
         return [task for task in tasks if task is not None]
 
     @property
     def shown(self) -> list[Task]:
         """The work to show, the latest last."""
-        patience = {self._viewport.renderer.preparing: _PLAYING_PATIENCE} if self._is_playing else {}
+        patience = {self.viewport.renderer.preparing: _PLAYING_PATIENCE} if self._is_playing else {}
         return [task for task in self.all if task.seconds > patience.get(task, _PATIENCE)]
 
     @property
     def _is_playing(self) -> bool:
-        return self._playback.player.playing
+        return self.playback.player.playing
+
+    def advance(self, now: float) -> bool:
+        """Whether something else is to be shown."""
+        before = self._report
+        self._report = [(task.name, int(task.seconds / _TICK)) for task in self.shown]
+        return self._report != before
 
     @property
-    def report(self) -> list[tuple[str, int]]:
-        """A value that changes when something else is to be shown."""
-        return [(task.name, int(task.seconds / _TICK)) for task in self.shown]
+    def waits(self) -> bool:
+        """Whether any work goes on."""
+        return bool(self.all)
 
     def on_escape(self) -> bool:
         """Cancel opening a scan, which stands over the view; whether one is being opened. Work in the status
         bar goes on: whoever presses Escape means something else."""
-        task = self._opening.task
+        task = self.opener.job.task
         if task is None or task not in self.shown:
             return False
         self.cancel(task)
@@ -83,35 +93,32 @@ class Tasks:
 
     def cancel(self, task: Task) -> None:
         """Stop a piece of the work; what was shown before it stays."""
-        is_told = task is self._playback.timeline.reading  # by what the timeline says of the frame
-        if task is self._opening.task:
-            self._opening.cancel()
-        elif task is self._viewport.renderer.preparing:
+        is_told = task is self.playback.timeline.reading  # by what the timeline says of the frame
+        if task is self.opener.job.task:
+            self.opener.job.cancel()
+        elif task is self.viewport.renderer.preparing:
             self._choose_prepared()
         task.cancel()
         if not is_told:
-            self._note(f"Cancelled: {task.name}.")
+            self.note(f"Cancelled: {task.name}.")
 
     def _choose_prepared(self) -> None:
         """Go back to what was drawn before, or to plain points."""
-        if self._viewport.request is not None:
-            drawn, chosen = self._viewport.request.look, self._session.document.look
-            pose = self._playback.timeline.ready(self._session.index) or self._viewport.request.pose
-            request = self._viewport.without_preparing(replace(self._viewport.request, pose=pose))
+        if self.viewport.request is not None:
+            drawn, chosen = self.viewport.request.look, self.session.document.look
+            pose = self.playback.timeline.ready(self.session.index) or self.viewport.request.pose
+            request = self.viewport.without_preparing(replace(self.viewport.request, pose=pose))
             look = request.look
             if look.color_by == drawn.color_by:  # which may stand for a scalar that the frame lacks
                 look = replace(look, color_by=chosen.color_by)
-            before = replace(self._session.document.drawn_by(str(request.backend)), look=look)
-            self._session.history.change("Cancel preparing", before)
+            before = replace(self.session.document.drawn_by(str(request.backend)), look=look)
+            self.session.history.change("Cancel preparing", before)
 
-    def draw_alone(self, place: tuple[float, float, float, float]) -> None:
-        """Declare the work in a corner of the 3D view, where there is no status bar.
-
-        place: left, top, width, height of the view.
-        """
+    def draw_alone(self, view: Place) -> None:
+        """Declare the work in a corner of the 3D view, where there is no status bar."""
         if not self.shown:
             return
-        left, top, width, height = place
+        left, top, width, height = view
         corner = ImVec2(left + width, top + height) - imgui.get_style().window_padding
         imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(1, 1))
         imgui.begin("work", flags=_FLAGS)
@@ -157,7 +164,7 @@ class Tasks:
         imgui.same_line(0, padding)
         if imgui.small_button(f"{icons.ICON_FA_XMARK}###cancel"):
             self.cancel(task)
-        widgets.tooltip(f"Cancel: {task.name}" + (" (Esc)" if task is self._opening.task else ""))
+        widgets.tooltip(f"Cancel: {task.name}" + (" (Esc)" if task is self.opener.job.task else ""))
 
     def _draw_task(self, task: Task) -> None:
         width = _WIDTH * imgui.get_font_size()

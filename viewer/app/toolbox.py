@@ -4,36 +4,38 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from imgui_bundle import ImVec2
 
-from ..analysis.pick import before_gap, pick
 from ..document.part import Part
-from ..document.schema import usable
+from ..document.schema import Values, is_object, structured, unread, usable
 from ..errors import InputError
-from ..geometry import Vector
 from ..output.labels import Box, LabelPlaces
 from ..output.overlays import NOTHING_DRAWN, DrawnMarks
 from ..rigid import STILL, Rigid
 from ..scan.layers import Layers
 from ..scan.pose import Pose
+from ..scan.timeline import Timeline
 from ..task import Cancelled, Task
 from . import failures, tools
-from .commands import Command, Commands, Entry, Item, Listing, Menu
+from .clicks import Clicks
+from .commands import Command, Item, Listing, Menu
 from .failures import Failures
 from .followed import Followed
 from .laid import Numbers, NumbersOf, PlaceOf
+from .menus import Commands
 from .notices import Problem
+from .part import Place, WindowPart, chosen
 from .playing.playback import Playback
 from .scene.canvas import Canvas, ViewPlace
 from .scene.viewport import Viewport
 from .session import Session
-from .settings import chosen
-from .tool_context import Click, FrameSpan, ToolContext
+from .tool_context import FrameSpan, ToolContext
 from .ui import Ui
 
 _BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
@@ -57,76 +59,111 @@ class Slot:
         return getattr(self.tool, hook, None) is not None
 
 
-class Toolbox:
-    """All tools of `tools.tool_names`.
+class ToolModules:
+    """The modules of all tools of `tools.tool_names`. of: by name. problems: why one is not there."""
 
-    clicking: the name of the tool that clicks in the view go to; None where they only move the view.
-    is_dragging: whether the drag in the view is that tool's. label_places: of labels over the view.
-    session, playback, viewport, followed, note, redraw: what tools reach through their contexts.
-    """
-
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        viewport: Viewport,
-        failures: Failures,
-        note: Callable[[str], None],
-        redraw: Callable[[], None],
-        commands: Commands,
-        remembered: Mapping[str, Mapping[str, Any]],
-    ) -> None:
-        """commands: takes in those of the tools. remembered: tool's name -> values of its `Settings`."""
-        self.session, self.playback, self.viewport = session, playback, viewport
-        self.note, self.redraw, self._failures = note, redraw, failures
-        self._remembered = remembered
-        self.followed = Followed()
-        self.label_places = LabelPlaces()
-        self.clicking: str | None = None
-        self.is_dragging = False
-        self._is_declined = False  # the last click, by the tool that had it
-        self._slots = {name: Slot(ToolContext(self, name)) for name in tools.tool_names()}
-        for slot in self._slots.values():
+    def __init__(self, commands: Commands) -> None:
+        """commands: takes in those of the tools."""
+        self.of: dict[str, Any] = {}
+        self.problems: dict[str, BaseException] = {}
+        for name in tools.tool_names():
             try:
-                self._open(slot, commands)
+                self.of[name] = self._added(name, commands)
             except Exception as error:  # whatever a tool's folder holds, the window stays
-                self._switch_off(slot, error)
-        for name, (used, *others) in tools.folders_of_tools().items():
-            for folder in others:
-                self.note(
-                    f"Scan4D does not use the tool '{name}' in {folder}, because {used} has one with "
-                    "this name. Rename it."
-                )
+                self.problems[name] = error
 
-    def _open(self, slot: Slot, commands: Commands) -> None:
-        name = slot.context.name
+    def _added(self, name: str, commands: Commands) -> Any:
         module = _imported(name)
-        slot.title = module.TITLE
-        if hasattr(module, "Settings"):
-            slot.context.settings = usable(module.Settings(), self._remembered.get(name, {}))
         for menu, entries in getattr(module, "COMMANDS", {}).items():
             if isinstance(entries, (Command, Listing, Menu)):
                 what = f"COMMANDS['{menu}'] must be a tuple of commands, not a {type(entries).__name__}"
                 raise TypeError(f"{what}: a comma is missing after it")
-            commands.add(menu, [self._bound(slot, entry) for entry in entries], name)
+            commands.add(menu, entries, name)
         commands.mouse = (*commands.mouse, *getattr(module, "MOUSE", ()))
-        slot.tool = module.Tool(slot.context)
+        return module
 
-    def _bound(self, slot: Slot, entry: Entry[Any]) -> Entry[Any]:
-        """An entry of a menu that speaks to the slot's tool, and does nothing while that is off."""
-        if isinstance(entry, Menu):
-            groups = (tuple(self._bound(slot, inner) for inner in group) for group in entry.groups)
-            return Menu(entry.title, tuple(groups))
-        if isinstance(entry, Listing):
-            return Listing(entry.title, lambda _: self._items(slot, entry))
-        is_on = entry.is_on
-        return Command(
-            entry.name, entry.title, lambda _: self._ask(slot, entry.act, self.note), entry.key,
-            entry.repeats, None if is_on is None else lambda _: bool(self._ask(slot, is_on)),
-            lambda _: bool(self._ask(slot, entry.can)), entry.short, entry.icon,
+
+@dataclass(eq=False)
+class Toolbox(WindowPart):
+    """All tools.
+
+    stored: the values of all parts that came back. is_dragging: whether the drag in the view is that of the
+    tool that has the clicks. label_places: of labels over the view.
+    """
+
+    name = "tools"
+    doing = "Advancing tools"
+    layer = 40
+    shows = "Dialogs of tools"
+    OFFERS = {
+        "take_file": "take_file", "take_arrow": "arrow", "abandon": "abandon", "drawn": "drawn",
+        "label_places": "label_places",
+    }  # fmt: skip
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    failures: Failures
+    commands: Commands
+    modules: ToolModules
+    stored: Mapping[str, Any]
+    note_of_scan: Callable[[str], None]
+    redraw: Callable[[], None]
+
+    def __post_init__(self) -> None:
+        self.clicks = Clicks(self.viewport)
+        self.followed = Followed()
+        self.label_places = LabelPlaces()
+        self.is_dragging = False
+        self._is_declined = False  # the last click, by the tool that had it
+        self._remembered = _values_by_tool(self.stored.get(self.name))
+        self._slots = {name: Slot(self._context(name)) for name in tools.tool_names()}
+        for name, slot in self._slots.items():
+            self.commands.bind_tool(name, partial(self._bound, slot))
+            try:
+                self._open(slot)
+            except Exception as error:
+                self._switch_off(slot, error)
+        for name, (used, *others) in tools.folders_of_tools().items():
+            for folder in others:
+                self.note_of_scan(
+                    f"Scan4D does not use the tool '{name}' in {folder}, because {used} has one with "
+                    "this name. Rename it."
+                )
+
+    def _context(self, name: str) -> ToolContext:
+        return ToolContext(
+            name, self.session, self.playback, self.viewport, self.clicks, self.followed,
+            partial(self._lay, name), self.note_of_scan, self.redraw,
         )  # fmt: skip
 
-    def _items(self, slot: Slot, listing: Listing[Any]) -> Iterator[Item]:
+    def _open(self, slot: Slot) -> None:
+        name = slot.context.name
+        if name in self.modules.problems:
+            raise self.modules.problems[name]
+        module = self.modules.of[name]
+        slot.title = module.TITLE
+        if hasattr(module, "Settings"):
+            slot.context.settings = usable(module.Settings(), self._remembered.get(name, {}))
+        slot.tool = module.Tool(slot.context)
+
+    @property
+    def clicking(self) -> str | None:
+        """The name of the tool that clicks in the view go to; None where they only move the view."""
+        return self.clicks.owner
+
+    def _bound(self, slot: Slot, entry: Command | Listing) -> Command | Listing:
+        """An entry of a menu that speaks to the slot's tool, and does nothing while that is off."""
+        if isinstance(entry, Listing):
+            return replace(entry, items=partial(self._items, slot, entry))
+        is_on = entry.is_on
+        return replace(
+            entry,
+            act=partial(self._ask, slot, entry.act, self.note_of_scan),
+            is_on=None if is_on is None else lambda: bool(self._ask(slot, is_on)),
+            can=lambda: bool(self._ask(slot, entry.can)),
+        )
+
+    def _items(self, slot: Slot, listing: Listing) -> Iterator[Item]:
         for title, act, is_on in self._ask(slot, lambda tool: list(listing.items(tool))) or ():
             yield title, partial(self._do, slot, act), is_on
 
@@ -151,11 +188,11 @@ class Toolbox:
 
     def _tell_problem(self, text: str) -> None:
         """Tell what stays until the user sends it away: the dialog that asked for it is gone by then."""
-        self.note(Problem(text))
+        self.note_of_scan(Problem(text))
 
     def _do(self, slot: Slot, act: Callable[[], object], tell: Callable[[str], object] | None = None) -> None:
         """Do something of the slot's tool that the user has asked for. tell: tells of the user's mistake."""
-        self._ask(slot, lambda _: act(), tell or self.note)
+        self._ask(slot, lambda _: act(), tell or self.note_of_scan)
 
     def _call(self, slot: Slot, hook: str, *arguments: Any) -> Any:
         """The answer of a hook of the slot's tool; None where the tool is off, lacks it or fails."""
@@ -168,18 +205,18 @@ class Toolbox:
             self._ask(slot, lambda tool: getattr(tool, hook)(*arguments), mistakes.append)
             before, slot.mistakes[hook] = slot.mistakes.get(hook), "".join(mistakes)
             if mistakes and mistakes[0] != before:
-                self.note(mistakes[0])
+                self.note_of_scan(mistakes[0])
 
     def _switch_off(self, slot: Slot, error: BaseException) -> None:
         slot.tool = None
         self.session.laid.take_away(slot.context.name)
         if self.clicking == slot.context.name:
-            self.clicking = None
+            self.clicks.owner = None
         slot.context.cancel_work()
         words = f"Scan4D switched off {slot.title} until the next start: {failures.reason(error)}"
-        self._failures.tell(f"The tool '{slot.context.name}'", error, words)
+        self.failures.tell(f"The tool '{slot.context.name}'", error, words)
 
-    def lay(self, name: str, numbers: NumbersOf | None, place: PlaceOf | None) -> None:
+    def _lay(self, name: str, numbers: NumbersOf | None = None, place: PlaceOf | None = None) -> None:
         """Lay over the open scan what a tool gives, or nothing; what it gives wrong switches it off."""
         if numbers is None and place is None:
             self.session.laid.take_away(name)
@@ -231,7 +268,7 @@ class Toolbox:
             found = found.with_more(self._call(slot, "drawn", frame) or NOTHING_DRAWN)
         return found
 
-    def draw_dialogs(self) -> None:
+    def dialog(self, view: Place) -> None:
         """Have the tools declare windows of their own."""
         for slot in self._slots.values():
             self._declare(slot, "dialog")
@@ -254,9 +291,11 @@ class Toolbox:
     def click(self, pixel: tuple[int, int]) -> None:
         """Give the tool that has the clicks what a pixel of the view shows."""
         self.viewport.finish()
-        click = self._click_at(pixel)
+        click = self.clicks.at(pixel)
         if self._first is not None and click is not None:
-            self._is_declined = self._ask(self._first, lambda tool: tool.on_click(click), self.note) is False
+            self._is_declined = (
+                self._ask(self._first, lambda tool: tool.on_click(click), self.note_of_scan) is False
+            )
 
     def press(self, mouse: ImVec2) -> None:
         """Ask the tool that has the clicks whether a drag that begins there is its own."""
@@ -268,42 +307,16 @@ class Toolbox:
         slot, self.is_dragging = self._first, not ends
         if ends:
             self.viewport.finish()
-        click = self._click_at(pixel, in_full=ends)
+        click = self.clicks.at(pixel, in_full=ends)
         if slot is not None and click is not None:
-            self._ask(slot, lambda tool: tool.on_drag(click, ends), self.note)
+            self._ask(slot, lambda tool: tool.on_drag(click, ends), self.note_of_scan)
 
     def arrow(self, right: int, up: int) -> bool:
         """Whether an arrow key was for the tool that has the clicks, which takes it."""
         slot = self._first
         if slot is None or not slot.has("on_arrow"):
             return False
-        return bool(self._ask(slot, lambda tool: tool.on_arrow(right, up), self.note))
-
-    def seen_at(self, position: Vector, step: tuple[int, int]) -> Click | None:
-        """Find the click that one beside a place would be, so many pixels to the right and up, in full;
-        None without a picture, and where the place is not in it."""
-        self.viewport.finish()
-        surface = self.viewport.surface
-        if surface is None:
-            return None
-        unmoved = surface.layers.world_from_pose.inverse.points(np.array([position])) - surface.view.origin
-        if not surface.view.contains(unmoved)[0]:
-            return None
-        across, down = np.floor(surface.view.project(unmoved)[0][0]).astype(int).tolist()
-        return self._click_at((across + step[0], down - step[1]))
-
-    def _click_at(self, pixel: tuple[int, int], *, in_full: bool = True) -> Click | None:
-        """The click at a pixel of the picture that is there; None without one. in_full: with the spacing,
-        in a picture as large as the view."""
-        viewport = self.viewport
-        surface, request = viewport.surface, viewport.request
-        if surface is None or request is None or not viewport.is_there:
-            return None
-        at = pixel if in_full else viewport.pixel_of_picture(pixel)
-        meant = before_gap(surface, *at)
-        picked = pick(surface, *at, shown=meant, spacing=in_full)
-        is_farther = meant != at and surface.texel(*at).depth < np.inf
-        return Click(picked, request.pose, is_farther, request.layers.world_from_pose, meant)
+        return bool(self._ask(slot, lambda tool: tool.on_arrow(right, up), self.note_of_scan))
 
     @property
     def spans(self) -> list[FrameSpan]:
@@ -313,7 +326,7 @@ class Toolbox:
     def take_file(self, path: Path) -> bool:
         """Whether a file that the user opens or drops is a tool's, which takes it."""
         return any(
-            self._ask(slot, lambda tool: tool.on_file(path), self.note)
+            self._ask(slot, lambda tool: tool.on_file(path), self.note_of_scan)
             for slot in self._slots.values()
             if slot.has("on_file")
         )
@@ -322,6 +335,10 @@ class Toolbox:
     def is_under_way(self) -> bool:
         """Whether something is that undo would take back first."""
         return any([self._call(slot, "is_under_way") for slot in self._slots.values()])
+
+    def begin_scan(self, timeline: Timeline) -> None:
+        """Let go of what is under way."""
+        self.abandon()
 
     def abandon(self) -> None:
         """Let go of what is under way, since the document or the scan changes."""
@@ -333,7 +350,7 @@ class Toolbox:
         in_order = sorted(self._slots.values(), key=lambda slot: slot is not self._first)
         if any(self._call(slot, "on_escape") for slot in in_order):
             return True
-        had_clicks, self.clicking = self.clicking is not None, None
+        had_clicks, self.clicks.owner = self.clicking is not None, None
         return had_clicks
 
     # --- in the loop ------------------------------------------------------------------
@@ -343,7 +360,7 @@ class Toolbox:
         """Work that runs beside the window for tools."""
         return [work.task for slot in self._slots.values() for work in slot.context.works]
 
-    def advance(self) -> bool:
+    def advance(self, now: float) -> bool:
         """Let tools take in what was done for them, and go on; whether there is something to show."""
         changed = False
         for slot in self._slots.values():
@@ -363,10 +380,19 @@ class Toolbox:
                 kept[name] = chosen(slot.context.settings)
         return {name: values for name, values in kept.items() if values}
 
-    def close(self) -> None:
+    def finish(self) -> None:
         """Cancel what runs for tools."""
         for slot in self._slots.values():
             slot.context.cancel_work()
+
+
+def _values_by_tool(data: Any) -> dict[str, Any]:
+    """Tool's name -> values of its `Settings`, as far as the file has any; each tool reads its own."""
+    found = {}
+    for name, values in data.items() if is_object(data) else ():
+        with suppress(InputError):
+            found[name] = unread(structured(Values, values))
+    return found
 
 
 def _checked(numbers: Numbers, pose: Pose) -> Numbers:

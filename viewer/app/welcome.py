@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..scan.open import DEMO
+from .part import Place, WindowPart, remembered
 from .session import Session
 
 _LINES = (
@@ -22,16 +25,19 @@ _FLAGS = (
 _TEXT_AT = 2.2  # in heights of the font
 
 
-class Welcome:
-    """The card. is_over: whether it was seen, in this window or one before; then it never comes back."""
+@dataclass(eq=False)
+class Welcome(WindowPart):
+    """The card."""
 
-    def __init__(self, session: Session, is_over: bool) -> None:
-        self._session = session
-        self.is_over = is_over
+    name = "welcome"
+    layer = 70
+    shows = "The first card"
+    session: Session
+    is_over: bool = remembered(False)  # whether it was seen, in this window or one before
 
     @property
     def _is_shown(self) -> bool:
-        return not self.is_over and self._session.scan == DEMO
+        return not self.is_over and self.session.scan == DEMO
 
     def on_escape(self) -> bool:
         """Send the card away; whether it was there."""
@@ -39,14 +45,15 @@ class Welcome:
         self.is_over = self.is_over or was_shown
         return was_shown
 
-    def draw(self, left: float, top: float, width: float) -> None:
+    def dialog(self, view: Place) -> None:
         """Declare it at the top of the 3D view, where the demo is shown, until the first act, which is done
-        as without it. left, top, width: of the view."""
+        as without it."""
         if not self._is_shown:
             return
         if _is_act():
             self.is_over = True
             return
+        left, top, width, _ = view
         em = imgui.get_font_size()
         imgui.set_next_window_pos(ImVec2(left + width / 2, top + em), imgui.Cond_.always, ImVec2(0.5, 0.0))
         imgui.begin("welcome", None, _FLAGS)

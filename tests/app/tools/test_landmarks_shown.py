@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from viewer.analysis.landmarks import Landmark
 from viewer.analysis.measures import Measure
 from viewer.analysis.spot import Spot
 from viewer.analysis.track import Known, Track
+from viewer.app.clicks import Clicks
+from viewer.app.followed import Followed
 from viewer.app.session import Session
 from viewer.app.tool_context import ToolContext
 from viewer.app.tools.landmarks import Settings, Tool
@@ -81,13 +84,13 @@ def test_gaps_are_marked_in_runs() -> None:
 
 
 def tool_on(session: Session) -> Tool:
-    playback = SimpleNamespace(pose=None)
-    followed = SimpleNamespace(tracks={})
-    box = SimpleNamespace(
-        session=session, playback=playback, clicking="landmarks", redraw=lambda: None, followed=followed
+    playback: Any = SimpleNamespace(pose=None)
+    unused: Any = None
+    clicks = Clicks(unused)
+    clicks.owner = "landmarks"
+    context = ToolContext(
+        "landmarks", session, playback, unused, clicks, Followed(), unused, print, list, Settings()
     )
-    context = ToolContext(box, "landmarks")  # type: ignore[arg-type]
-    context.settings = Settings()
     return Tool(context)
 
 

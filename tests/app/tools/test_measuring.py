@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from imgui_bundle import ImVec2
 
 from viewer.analysis.spot import Spot
+from viewer.app.clicks import Clicks
+from viewer.app.followed import Followed
 from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
 from viewer.app.tool_context import ToolContext
@@ -40,7 +42,10 @@ def test_it_says_where_the_ends_are(ids: tuple[int | None, int | None], words: s
 
 def test_two_ends_make_a_distance_of_the_document() -> None:
     session = Session("scan")
-    measuring = Tool(ToolContext(SimpleNamespace(session=session), "measuring"))  # type: ignore[arg-type]
+    unused: Any = None
+    clicks = Clicks(unused)
+    context = ToolContext("measuring", session, unused, unused, clicks, Followed(), unused, print, list)
+    measuring = Tool(context)
     first, second = end(3), replace(end(4), position=(1, 0, 0))
     measuring.set_end(first)
     assert (measuring.begun, measuring.made.all) == (first, ())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
@@ -14,10 +15,14 @@ from ...document.saved_session import is_session
 from ...files import printable
 from ...scan.listing import list_folder
 from ...scan.open import DEMO, is_demo
+from ...scan.timeline import Timeline
 from .. import widgets
+from ..commands import Command
+from ..part import Place, WindowPart
 from ..session import Session, known_as
+from ..window import Window
 from .folder_view import FolderView, date_in_words, size_in_words
-from .opening import Opening
+from .opener import Opener
 from .preview import Previewer
 from .scans import Scans, title
 from .sessions import Sessions
@@ -30,7 +35,8 @@ _LINGERS = 0.15  # seconds that a row is chosen before its scan is read
 _HINT = "You can also drop files, folders and recordings onto the window."
 
 
-class Browser:
+@dataclass(eq=False)
+class Browser(WindowPart):
     """The folder that the dialog shows, and what is chosen in it. A folder is listed beside the window.
 
     It stays open until what was chosen is open, and tells why that cannot be.
@@ -38,22 +44,22 @@ class Browser:
     is_open: whether the dialog is.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        scans: Scans,
-        sessions: Sessions,
-        opening: Opening,
-        open: Callable[[str], None],
-        replay: Callable[[Path], None],
-        take_file: Callable[[Path], bool],
-        previewer: Previewer,
-    ) -> None:
-        """opening: what opens scans. open: opens a scan that was opened before. replay: shows a recording.
-        take_file: has a tool take a file that is its own."""
-        self._session, self._scans, self._sessions, self._opening = session, scans, sessions, opening
-        self._open_again, self._replay, self._previewer = open, replay, previewer
-        self._take_file = take_file
+    name = "browser"
+    doing = "Listing a folder"
+    layer = 80
+    shows = "The dialog that opens scans"
+    OFFERS = {"ask_for_scan": "show", "close_browser": "opened"}
+    session: Session
+    scans: Scans
+    sessions: Sessions
+    opener: Opener
+    open_scan: Callable[[str], None]
+    replay: Callable[[Path], None]
+    take_file: Callable[[Path], bool]
+    window: Window
+
+    def __post_init__(self) -> None:
+        self._previewer = Previewer(self.window.ctx)
         self._asked = False  # to be opened
         self.is_open = self._is_done = False
         self._asks_for: str | None = None  # what is being opened
@@ -70,7 +76,7 @@ class Browser:
         if folder is not None:
             self._view.show(folder)
             return
-        scan = self._session.scan
+        scan = self.session.scan
         here = self._view.folder if is_demo(scan) else Path(known_as(scan)).parent
         self._view.show(here, "" if is_demo(scan) else known_as(scan))
 
@@ -92,7 +98,11 @@ class Browser:
         self._asks_for, self._view.refusal = None, problem
         return True
 
-    def advance(self) -> bool:
+    def begin_scan(self, timeline: Timeline) -> None:
+        """Close the dialog where it waited for a scan."""
+        self.opened()
+
+    def advance(self, now: float) -> bool:
         """Take in the folder's list and the preview; whether anything has come."""
         changed = self._previewer.advance()
         if self.is_open and time.monotonic() - self._view.chosen_at > _LINGERS:
@@ -100,7 +110,7 @@ class Browser:
             self._previewer.ask(row.path if row is not None and row.frames else None)
         return self._view.advance() or changed
 
-    def draw(self) -> None:
+    def dialog(self, view: Place) -> None:
         """Declare the dialog where it is open."""
         if self._asked:
             imgui.open_popup(_TITLE)
@@ -121,7 +131,7 @@ class Browser:
                 self._is_done = False
             imgui.end_popup()
         elif not self._asked:
-            self._sessions.homeless, self._asks_for = None, None  # the user gave up
+            self.sessions.homeless, self._asks_for = None, None  # the user gave up
             self._previewer.ask(None)
 
     # --- what the user does -----------------------------------------------------------
@@ -129,22 +139,22 @@ class Browser:
     def _give_up(self) -> None:
         """Close the dialog; what it waits for is not opened."""
         if self._asks_for is not None:
-            self._opening.cancel()
+            self.opener.job.cancel()
         imgui.close_current_popup()
 
     def _open(self, scan: str) -> None:
         self._asks_for, self._view.refusal = scan, ""
         if is_session(Path(scan)):
-            self._sessions.open(Path(scan))
-        elif (session := self._sessions.homeless) is not None:
-            self._sessions.open_with(session, scan)
+            self.sessions.open(Path(scan))
+        elif (session := self.sessions.homeless) is not None:
+            self.sessions.open_with(session, scan)
         elif is_recording(Path(scan)):
-            self._replay(Path(scan))
+            self.replay(Path(scan))
             self.opened()
-        elif self._take_file(Path(scan)):
+        elif self.take_file(Path(scan)):
             self.opened()
         else:
-            self._scans.open([scan])
+            self.scans.open([scan])
 
     # --- widgets ----------------------------------------------------------------------
 
@@ -189,11 +199,11 @@ class Browser:
     def _draw_known(self) -> None:
         """Declare the places to look in, and the lists of what can be opened at once, wherever it is."""
         self._view.draw_places()
-        is_open = self._session.scan == DEMO
+        is_open = self.session.scan == DEMO
         if imgui.selectable(f"{icons.ICON_FA_CUBE}  Demo scan###Demo scan", is_open)[0]:
             self._open_known(DEMO)
         imgui.spacing()
-        scans = self._scans
+        scans = self.scans
         if scans.are_together:
             self._draw_names("Opened together", scans.listed)
             imgui.spacing()
@@ -204,7 +214,7 @@ class Browser:
         imgui.push_id(head)
         for number, scan in enumerate(scans):
             name = widgets.fitted(title(scan), imgui.get_content_region_avail().x)
-            is_open = known_as(scan) == known_as(self._session.scan)
+            is_open = known_as(scan) == known_as(self.session.scan)
             if imgui.selectable(widgets.labelled(name, number), is_open)[0]:
                 self._open_known(scan)
             widgets.tooltip(printable(scan))
@@ -214,7 +224,7 @@ class Browser:
 
     def _open_known(self, scan: str) -> None:
         self._asks_for, self._view.refusal = scan, ""
-        self._open_again(scan)
+        self.open_scan(scan)
 
     def _draw_foot(self) -> None:
         row = self._view.row
@@ -235,3 +245,10 @@ class Browser:
         imgui.same_line()
         if imgui.button(texts[1]):
             self._give_up()
+
+    COMMANDS = (
+        Command(
+            "open", "Open a scan...", lambda browser: browser.show(), "Ctrl+O Q", short="Open",
+            icon=icons.ICON_FA_FOLDER_OPEN,
+        ),
+    )  # fmt: skip

@@ -14,6 +14,7 @@ from ...scan.open import find_source
 from ...scan.timeline import Timeline
 from ...task import Task, in_background
 from ..notices import Offer
+from ..part import WindowPart
 from ..session import Session
 
 EVERY = 3.0  # seconds between looks
@@ -39,19 +40,24 @@ class Seen:
         return cls({file: _stamp(file) for file in there}, folders)
 
 
-class Changes:
+@dataclass(eq=False)
+class Changes(WindowPart):
     """Looks whether the open scan's files are as they were when it was opened."""
 
-    def __init__(self, session: Session, note: Callable[[str], None], open: Callable[[str], None]) -> None:
-        """open: opens a scan anew."""
-        self._session, self._note, self._open = session, note, open
+    name = "changes"
+    doing = "Looking for changes"
+    session: Session
+    note_of_scan: Callable[[str], None]
+    open_scan: Callable[[str], None]
+
+    def __post_init__(self) -> None:
         self._files: Sequence[Path] = ()
         self._known: Seen | None = None  # as they were when the scan was opened, or reading was offered
         self._last: Seen | None = None  # as they were at the last look
         self._look: Future[Seen] | None = None
         self._next = 0.0  # by the clock, when to look again
 
-    def begin(self, timeline: Timeline) -> None:
+    def begin_scan(self, timeline: Timeline) -> None:
         """Look at the files of another scan from now on."""
         self._files, self._known, self._last, self._look, self._next = timeline.files, None, None, None, 0.0
 
@@ -69,19 +75,19 @@ class Changes:
                 self._offer(len(found.files) - len(self._known.files))
                 self._known = found
         if self._look is None and self._files and now >= self._next:
-            scan, files, last = self._session.scan, self._files, self._last
+            scan, files, last = self.session.scan, self._files, self._last
             self._look = in_background(Task("Looking for changes"), lambda: Seen.of(scan, files, last))
 
     def _offer(self, new: int) -> None:
         """Offer to read the scan anew. new: how many files it has more."""
-        scan = self._session.scan
-        choices = {"Reload": lambda: self._open(scan)}
+        scan = self.session.scan
+        choices = {"Reload": lambda: self.open_scan(scan)}
         told = (
             f"The scan has {new} more files on disk."
             if new > 0
             else "Files of the scan have changed on disk."
         )
-        self._note(Offer(told.replace("1 more files", "1 more file"), choices, "changes"))
+        self.note_of_scan(Offer(told.replace("1 more files", "1 more file"), choices, "changes"))
 
 
 def _stamp(path: Path) -> _Stamp:

@@ -4,49 +4,58 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Annotated, Any
 
+from ...document.schema import ReadBy, ScanName, structured
 from ...errors import InputError
 from ...files import printable
 from ...scan.listing import is_there, named_scans, scans_beside
 from ...scan.open import DEMO
+from ...scan.timeline import Timeline
 from ...task import Task, in_background
+from ..commands import Command, Item, Listing
 from ..notices import Problem
+from ..part import WindowPart, remembered
 from ..session import Session, known_as
-
-if TYPE_CHECKING:
-    from ..commands import Item
 
 MOST_RECENT = 15  # scans that are remembered
 
 
-class Scans:
+def _read_recent(data: Any) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(structured(tuple[ScanName, ...], data)))[:MOST_RECENT]
+
+
+Recent = Annotated[tuple[str, ...], ReadBy(_read_recent)]
+
+
+@dataclass(eq=False)
+class Scans(WindowPart):
     """Lists of scans: those to go through one after another, and those opened lately.
 
     listed: what the user named together, else the scans in the folder of the open one, in natural order.
     are_together: whether the user did. recent: the last MOST_RECENT that were opened, newest first, as
-    `known_as` has them.
+    `known_as` has them. named: what the user named at the start, at least one.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        note: Callable[[str], None],
-        refuse: Callable[[str], None],
-        open: Callable[[str], None],
-        together: Sequence[str],
-        recent: Sequence[str],
-    ) -> None:
-        """refuse: tells why nothing is opened. open: opens a scan. together: what the user named at the
-        start, at least one."""
-        self._session, self._note, self._refuse, self._open = session, note, refuse, open
+    name = "scans"
+    doing = "Listing scans"
+    CONDITIONS = {"several scans": lambda scans: len(scans.listed) > 1}
+    OFFERS = {"list_scans": "open", "after": "after"}
+    session: Session
+    note_of_opening: Callable[[str], None]
+    refuse: Callable[[str], None]
+    open_scan: Callable[[str], None]
+    named: Sequence[str]
+    recent: Recent = remembered(())
+
+    def __post_init__(self) -> None:
         self.listed: list[str] = []
         self.are_together = False
-        self._place = ""  # in the list: what was asked for last
-        self._together = list(dict.fromkeys(together))
-        self.recent = tuple(recent)
+        self._asked = ""  # in the list: what was asked for last
+        self._together = list(dict.fromkeys(self.named))
         self._there: frozenset[str] = frozenset()  # of the recent ones
         self._naming: Future[tuple[list[str], list[InputError]]] | None = None
         self._looking: Future[tuple[list[str], frozenset[str]]] | None = None
@@ -61,13 +70,14 @@ class Scans:
             others = f" {len(problems) - 1} others cannot be opened either." if len(problems) > 1 else ""
             text = f"Cannot open: {problems[0]}.{others}"
             if is_all:
-                self._refuse(text)
+                self.refuse(text)
             else:
-                self._note(Problem(text))
+                self.note_of_opening(Problem(text))
 
-    def opened(self, scan: str) -> None:
+    def begin_scan(self, timeline: Timeline) -> None:
         """Take in that a scan was opened. The list stays where that is in it, else it is made anew."""
-        name, self._place = known_as(scan), scan
+        scan = self._asked = self.session.scan
+        name = known_as(scan)
         self.recent = (name, *(other for other in self.recent if other != name))[:MOST_RECENT]
         if len(self._together) > 1 and scan in self._together:
             self.listed, self._together, self.are_together = self._together, [], True
@@ -90,13 +100,18 @@ class Scans:
         """Whether something is being looked for."""
         return self._naming is not None or self._looking is not None
 
-    def advance(self) -> bool:
+    def refused(self, problem: str) -> bool:
+        """Look again what there is, since a scan could not be opened."""
+        self.look(self.session.scan)
+        return False
+
+    def advance(self, now: float) -> bool:
         """Take in what was found; whether there was anything."""
         if self._naming is not None and self._naming.done():
             (scans, problems), self._naming = self._naming.result(), None
             if scans:
                 self._together = list(dict.fromkeys(scans))
-                self._open(scans[0])
+                self.open_scan(scans[0])
             self.tell(problems, is_all=not scans)
         if self._looking is None or not self._looking.done():
             return False
@@ -107,9 +122,9 @@ class Scans:
     def step(self, count: int) -> None:
         """Open the scan so many places further in the list, round its end; past what cannot be opened."""
         if len(self.listed) > 1:
-            place = self._place if self._place in self.listed else self.listed[0]
-            self._place = self.listed[(self.listed.index(place) + count) % len(self.listed)]
-            self._open(self._place)
+            place = self._asked if self._asked in self.listed else self.listed[0]
+            self._asked = self.listed[(self.listed.index(place) + count) % len(self.listed)]
+            self.open_scan(self._asked)
 
     def after(self, scan: str) -> str | None:
         """The scan that the user named behind one of those named together; None where that is the last."""
@@ -119,13 +134,20 @@ class Scans:
     @property
     def lately(self) -> list[str]:
         """The recent ones that are still there, without the open one."""
-        return [one for one in self.recent if one in self._there and one != known_as(self._session.scan)]
+        return [one for one in self.recent if one in self._there and one != known_as(self.session.scan)]
 
     def items(self, scans: Iterable[str]) -> Iterator[Item]:
         """Entries of a menu for some of them."""
-        shown = known_as(self._session.scan)
+        shown = known_as(self.session.scan)
         for scan in scans:
-            yield title(scan), partial(self._open, scan), known_as(scan) == shown
+            yield title(scan), partial(self.open_scan, scan), known_as(scan) == shown
+
+    COMMANDS = (
+        Listing("Open recent", lambda scans: scans.items(scans.lately), "open_recent"),
+        Listing("Scans", lambda scans: scans.items(scans.listed), "scans"),
+        Command("next_scan", "Next scan", lambda scans: scans.step(1), "PageDown", "several scans"),
+        Command("previous_scan", "Previous scan", lambda scans: scans.step(-1), "PageUp", "several scans"),
+    )
 
 
 def title(scan: str) -> str:

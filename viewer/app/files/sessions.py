@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 from ...document.recording import place_of
@@ -11,36 +12,38 @@ from ...errors import InputError
 from ...files import printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
+from ..commands import Command
 from ..notices import Problem
+from ..part import Place, WindowPart
 from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
 from ..session import Session, known_as, named_like
 
 
-class Sessions:
+@dataclass(eq=False)
+class Sessions(WindowPart):
     """Saves and opens session files.
 
     saving: the dialog that saves. homeless: a session whose scan is not where it says, until the user has
     chosen that; None without one.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        note: Callable[[str], None],
-        refuse: Callable[[str], None],
-        open: Callable[[str, SavedSession], None],
-        take_up: Callable[[SavedSession], None],
-        ask: Callable[[Path], None],
-        redraw: Callable[[], None],
-    ) -> None:
-        """refuse: tells why nothing is opened. open: opens a scan with a session. take_up: shows the open one
-        so. ask: for one in a folder. redraw: has the window drawn again."""
-        self._session, self._playback, self._note = session, playback, note
-        self._refuse, self._open, self._take_up, self._ask = refuse, open, take_up, ask
+    name = "sessions"
+    layer = 81
+    shows = "The dialog that saves sessions"
+    OFFERS = {"open_with": "open_with"}
+    session: Session
+    playback: Playback
+    note_of_work: Callable[[str], None]
+    refuse: Callable[[str], None]
+    open_scan: Callable[[str, SavedSession], None]
+    take_up: Callable[[SavedSession], None]
+    ask_for_scan: Callable[[Path], None]
+    redraw: Callable[[], None]
+
+    def __post_init__(self) -> None:
         about = "Saves view, look, renderer, bookmarks, distances and landmarks, not the scan itself"
-        self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save, redraw)
+        self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save, self.redraw)
         self.homeless: SavedSession | None = None
         self._files: dict[str, Path] = {}  # of scans, as `known_as` has them: saved to or opened from
         self._opened: tuple[SavedSession, Path] | None = None  # last, and its file
@@ -54,21 +57,21 @@ class Sessions:
         try:
             self._save(file)
         except InputError as error:
-            self._note(Problem(f"The session is not saved: {error}"))
+            self.note_of_work(Problem(f"The session is not saved: {error}"))
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with the session's file, or one that is named like the scan."""
-        self.saving.ask(self._file or named_like(self._session.scan, working_folder(), SUFFIX))
+        self.saving.ask(self._file or named_like(self.session.scan, working_folder(), SUFFIX))
 
     @property
     def _file(self) -> Path | None:
-        return self._files.get(known_as(self._session.scan))
+        return self._files.get(known_as(self.session.scan))
 
     def _save(self, file: Path) -> None:
-        refuse_input(file, self._playback.timeline)
-        self._session.saved(self._session.index).export(file)
-        self._files[known_as(self._session.scan)] = file
-        self._note(f"Saved {file}")
+        refuse_input(file, self.playback.timeline)
+        self.session.saved(self.session.index).export(file)
+        self._files[known_as(self.session.scan)] = file
+        self.note_of_work(f"Saved {file}")
 
     def open(self, path: Path) -> None:
         """Open the scan of a session file with it; where it is not there, the user is asked to find it."""
@@ -76,21 +79,32 @@ class Sessions:
             session = SavedSession.load(path)
             scan = place_of(session.scan, path)
         except InputError as error:
-            self._refuse(str(error))
+            self.refuse(str(error))
             return
         self._opened = session, path
         if is_there(scan):
             self.open_with(session, scan)
             return
         self.homeless = session
-        self._note(f"{path.name}: its scan '{printable(session.scan)}' is missing. Choose where it is now.")
-        self._ask(path.parent)
+        self.note_of_work(
+            f"{path.name}: its scan '{printable(session.scan)}' is missing. Choose where it is now."
+        )
+        self.ask_for_scan(path.parent)
 
     def open_with(self, session: SavedSession, scan: str) -> None:
         """Open a scan with a session; at once where it is the open one."""
         if self._opened is not None and self._opened[0] is session:
             self._files[known_as(scan)] = self._opened[1]
-        if known_as(scan) == known_as(self._session.scan):
-            self._take_up(session)
+        if known_as(scan) == known_as(self.session.scan):
+            self.take_up(session)
         else:
-            self._open(scan, session)
+            self.open_scan(scan, session)
+
+    def dialog(self, view: Place) -> None:
+        """Declare the dialog that saves."""
+        self.saving.draw()
+
+    COMMANDS = (
+        Command("save_session", "Save session", save, "Ctrl+S", "view"),
+        Command("save_session_as", "Save session as...", ask_to_save, "Ctrl+Shift+S", "view"),
+    )

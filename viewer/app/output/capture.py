@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from threading import Lock
 
 import numpy as np
+from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
 from ...choice.choose import Choice
@@ -27,8 +28,11 @@ from ...output.marked import marked
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...picture.surface import Surface
 from ...task import Task, in_background
+from ..commands import Command
 from ..failures import failure_in_words
+from ..keys import Keys
 from ..notices import Offer, Problem
+from ..part import WindowPart
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -37,38 +41,37 @@ from .unsaved_picture import UnsavedPicture
 _PATIENCE = 10.0  # seconds that closing waits for pictures
 
 
-class Capture:
+@dataclass(eq=False)
+class Capture(WindowPart):
     """Saves what is shown in the working directory.
 
+    marks_of_files: brings the marks of what is saved. make_film: of a recording, under this name. range_note:
+    brings what the colour bar of the view says. drawn: brings what tools draw over a frame. choice_of: brings
+    the choice that a picture was drawn by. label_places: brings the positions of the view's labels.
     recorder: takes down what is shown, None while nothing is recorded. last: the recording saved last.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        viewport: Viewport,
-        note: Callable[[str], None],
-        marks: Callable[[], Marks],
-        film: Callable[[Recording, Path], object],
-        range_note: Callable[[], str] = str,
-        drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
-        choice: Callable[[Request], Choice | None] = lambda _: None,
-        places: Callable[[], LabelPlaces] = LabelPlaces,
-    ) -> None:
-        """marks: brings those that what is saved has. film: makes one of a recording, under this name.
-        range_note: brings what the colour bar of the view says. drawn: brings what tools draw over a
-        frame. choice: brings the one that a picture was drawn by. places: brings those of the view's
-        labels."""
-        self._marks, self._film, self._range_note, self._drawn = marks, film, range_note, drawn
-        self._choice, self._places = choice, places
-        self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
+    name = "capture"
+    doing = "Saving"
+    OFFERS = {"shown_entry": "shown", "last_recording": "last"}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    note_of_work: Callable[[str], None]
+    marks_of_files: Callable[[], Marks]
+    make_film: Callable[[Recording, Path], object]
+    range_note: Callable[[], str] = str
+    drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN
+    choice_of: Callable[[Request], Choice | None] = lambda _: None
+    label_places: Callable[[], LabelPlaces] = LabelPlaces
+    keys: Keys | None = None
+
+    def __post_init__(self) -> None:
         self.recorder: Recorder | None = None
         self.last: Path | None = None
         self._journal: Journal | None = None  # of what is recorded
         self._unsaved: list[tuple[UnsavedPicture, Callable[[Surface], None]]] = []
         self._saving: list[Future[str]] = []  # files; each brings what is to be told
-        self._looking: list[Future[str]] = []  # the same of what writes nothing
         self._naming = Lock()  # one free name at a time
 
     def shown(self, marks: Marks | None = None) -> Entry | None:
@@ -77,23 +80,23 @@ class Capture:
         marks: over it; None: those that what is saved has. Raises InputError where its colours are by numbers
         that no file has.
         """
-        session, viewport, request = self._session, self._viewport, self._viewport.request
+        session, viewport, request = self.session, self.viewport, self.viewport.request
         if not viewport.is_there or request is None:
             return None
         entry = Entry.of(
-            request, session.scan, session.hash, viewport.size, self._playback.unit,
-            self._marks() if marks is None else marks, session.document.shown_unit,
+            request, session.scan, session.hash, viewport.size, self.playback.unit,
+            self.marks_of_files() if marks is None else marks, session.document.shown_unit,
             session.document.part(Landmarks).notes,
-            self._drawn(request.pose.index), self._choice(request),
+            self.drawn(request.pose.index), self.choice_of(request),
         )  # fmt: skip
-        return replace(entry, labels=self._places().spots if entry.marks else ())
+        return replace(entry, labels=self.label_places().spots if entry.marks else ())
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels; what is not drawn of it yet is drawn
         in slices first."""
-        viewport, request = self._viewport, self._viewport.request
+        viewport, request = self.viewport, self.viewport.request
         if viewport.surface is None or request is None or not viewport.is_there:
-            self._note("There is no picture to save yet.")
+            self.note_of_work("There is no picture to save yet.")
             return
         if any(unsaved.request is request for unsaved, _ in self._unsaved):
             return
@@ -101,12 +104,12 @@ class Capture:
             entry = self.shown()
         except InputError as error:
             entry = None
-            self._note(Problem(f"This picture cannot be replayed: {error}"))
+            self.note_of_work(Problem(f"This picture cannot be replayed: {error}"))
         legend = None
         if entry is not None:
-            told = entry.legend(self._playback.timeline, request.pose)
-            legend = replace(told, range_note=self._range_note())
-        save = partial(self._begin_saving, entry, legend, self._session.hash_found)
+            told = entry.legend(self.playback.timeline, request.pose)
+            legend = replace(told, range_note=self.range_note())
+        save = partial(self._begin_saving, entry, legend, self.session.hash_found)
         if viewport.is_refined:
             save(viewport.surface)
         else:
@@ -125,7 +128,7 @@ class Capture:
             if surface is not None:
                 save(surface)
         except Exception as error:  # whatever a scan brings, the window stays
-            self._note(Problem(failure_in_words("Drawing the picture to save", error)))
+            self.note_of_work(Problem(failure_in_words("Drawing the picture to save", error)))
             unsaved.task.cancel()
             surface = None
         if surface is not None or unsaved.task.cancelled:
@@ -143,18 +146,18 @@ class Capture:
 
     # --- recording --------------------------------------------------------------------
 
-    def toggle_recording(self, keys: str = "") -> None:
-        """Take down what is shown from now on; or stop, and save it. keys: that do this, as the user knows
-        them."""
+    def toggle_recording(self) -> None:
+        """Take down what is shown from now on; or stop, and save it."""
         now = time.monotonic()
         if self.recorder is None:
             try:
                 self.shown()
             except InputError as error:
-                self._note(Problem(f"Cannot record: {error}"))
+                self.note_of_work(Problem(f"Cannot record: {error}"))
                 return
             self.recorder = Recorder(now)
-            self._note(f"Recording the view ({keys} stops)" if keys else "Recording the view")
+            keys = self.keys.of["record"] if self.keys else ""
+            self.note_of_work(f"Recording the view ({keys} stops)" if keys else "Recording the view")
             self._begin_journal()
             self.note_shown()
             return
@@ -163,7 +166,7 @@ class Capture:
         if len(recorder):
             self._save_recording(recorder.finish(now), journal)
         else:
-            self._note("The recording is empty: the window showed nothing.")
+            self.note_of_work("The recording is empty: the window showed nothing.")
             if journal is not None:
                 journal.remove()
 
@@ -176,15 +179,15 @@ class Capture:
             if journal is not None:
                 journal.leave()
                 words += " Scan4D keeps what it has recorded, and saves it at the next start."
-            self._note(Problem(words))
+            self.note_of_work(Problem(words))
             return
         if journal is not None:
             journal.remove()
         choices = {
-            "Save as film": lambda: self._film(recording, path.with_suffix(FILM_SUFFIX)),
+            "Save as film": lambda: self.make_film(recording, path.with_suffix(FILM_SUFFIX)),
             "Keep recording only": lambda: None,
         }
-        self._note(Offer(f"Recorded {recording.seconds:.1f} s.  Saved {path}", choices, "recording"))
+        self.note_of_work(Offer(f"Recorded {recording.seconds:.1f} s.  Saved {path}", choices, "recording"))
 
     def note_shown(self) -> None:
         """Take down what is shown where that is being recorded; where that cannot be, the recording ends."""
@@ -193,7 +196,7 @@ class Capture:
         try:
             entry = self.shown()
         except InputError as error:
-            self._note(Problem(f"The recording has stopped: {error}"))
+            self.note_of_work(Problem(f"The recording has stopped: {error}"))
             self.toggle_recording()
             return
         if entry is None:
@@ -214,7 +217,7 @@ class Capture:
 
     def _tell_unsafe(self, error: OSError) -> None:
         what, _ = explained(error)
-        self._note(f"The recording is only in memory until you stop it ({journal_folder()}: {what}).")
+        self.note_of_work(f"The recording is only in memory until you stop it ({journal_folder()}: {what}).")
 
     def find_unfinished(self) -> None:
         """Save what processes have recorded that were killed meanwhile."""
@@ -238,40 +241,40 @@ class Capture:
                 return failure_in_words(f"Saving {path}", error)
         return f"Saved {path}"
 
-    def tell_later(self, look: Callable[[], str]) -> None:
-        """Find something out beside the window, and tell what comes of it; empty: nothing."""
-        self._looking.append(in_background(Task("Looking"), look))
-
-    def advance(self) -> None:
+    def advance(self, now: float) -> None:
         """Draw a slice of what is to be saved, and tell of the work that is done: of files in the order of
         their names."""
         if self._unsaved:
             self._draw_unsaved()
-        done = [work for work in self._looking if work.done()]
-        self._looking = [work for work in self._looking if work not in done]
         while self._saving and self._saving[0].done():
-            done.append(self._saving.pop(0))
-        for words in [work.result() for work in done]:
-            if words:
-                self._note(words)
+            if words := self._saving.pop(0).result():
+                self.note_of_work(words)
 
     @property
     def waits(self) -> bool:
-        """Whether something is being saved or looked for."""
-        return bool(self._unsaved or self._saving or self._looking)
+        """Whether something is being saved."""
+        return bool(self._unsaved or self._saving)
 
-    def end_recording(self) -> None:
-        """Save what is being recorded."""
+    def finish(self) -> None:
+        """Save what is being recorded, and wait for pictures that are being drawn and written, but not for a
+        disk that does not answer."""
         if self.recorder is not None:
             self.toggle_recording()
-
-    def close(self) -> None:
-        """Wait for pictures that are being drawn and written, but not for a disk that does not answer."""
         end = time.monotonic() + _PATIENCE
         while self._unsaved and time.monotonic() < end:
             self._draw_unsaved()
         wait(self._saving, _PATIENCE)
-        self.advance()
+        self.advance(time.monotonic())
+
+    COMMANDS = (
+        Command(
+            "screenshot", "Screenshot", screenshot, "P", short="Screenshot", icon=icons.ICON_FA_CAMERA
+        ),
+        Command(
+            "record", "Record", toggle_recording, "R", is_on=lambda capture: capture.recorder is not None,
+            short="Record", icon=icons.ICON_FA_CIRCLE_DOT,
+        ),
+    )  # fmt: skip
 
 
 def _saved_late(journal: Path) -> str:

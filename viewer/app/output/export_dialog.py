@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
@@ -13,6 +13,8 @@ from ...output.export import numbered
 from ...output.legend import Marks
 from ...params import describe
 from .. import widgets
+from ..part import Place, WindowPart
+from ..window import Window
 from .export_plan import AS_SHOWN, EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices
 from .exporting import Exporting
 
@@ -34,8 +36,22 @@ _FIRST_MARKS = 0.55  # of a row of boxes, for the first one
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
 
 
-def draw(exporting: Exporting, quit: Callable[[], None]) -> None:
-    """Declare the dialogs that are open. quit: closes the window."""
+@dataclass(eq=False)
+class ExportDialog(WindowPart):
+    """The dialogs."""
+
+    name = "export_dialog"
+    layer = 82
+    shows = "The export dialog"
+    exporting: Exporting
+    window: Window
+
+    def dialog(self, view: Place) -> None:
+        """Declare the dialogs that are open."""
+        _draw(self.exporting, self.window.close)
+
+
+def _draw(exporting: Exporting, quit: Callable[[], None]) -> None:
     with widgets.modal(_TITLE, exporting.is_open) as is_drawn:
         if is_drawn:
             choices, problems = exporting.choices, exporting.problems()
@@ -190,8 +206,8 @@ def _draw_end(exporting: Exporting, can: bool) -> None:
     if can:
         names = dict.fromkeys(numbered(out, n).name for n in (numbers[0], numbers[-1]))
         imgui.text_wrapped(f"{len(numbers)} picture{'s' * (len(numbers) > 1)}: {' to '.join(names)}")
-    if exporting.refused:
-        _warn(f"{exporting.refused[0].name} is a file of the scan: Scan4D does not replace it.")
+    if exporting.own:
+        _warn(f"{exporting.own[0].name} is a file of the scan: Scan4D does not replace it.")
     elif exporting.replaced:
         _warn(_there_already([path.name for path in exporting.replaced]))
     imgui.begin_disabled(not can)

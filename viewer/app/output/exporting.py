@@ -7,12 +7,15 @@ import os
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import wait as wait_for
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from imgui_bundle import icons_fontawesome_6 as icons
+
 from ...document.recording import Entry, Recording
 from ...document.render_job import Made, make
+from ...document.schema import plain
 from ...errors import InputError
 from ...files import working_folder
 from ...output.legend import Marks
@@ -20,8 +23,10 @@ from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...scan.inputs import found_among, scan_inputs
 from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
+from ..commands import Command
 from ..folder_dialog import FolderDialog
 from ..notices import Offer, Problem
+from ..part import WindowPart, remembered
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -33,39 +38,37 @@ _CANCELLING = 10.0  # seconds that closing waits for a cancelled process to be g
 _MOST_WARNINGS = 3  # that are told
 
 
-class Exporting:
+@dataclass(eq=False)
+class Exporting(WindowPart):
     """The dialog's state, and one export at a time.
 
-    choices, marks: as the user left them. is_open: whether the dialog is. replaced: files that an export
-    would replace, which the dialog asks about. refused: those of them that are the scan's own. is_leaving:
-    whether to ask before the window closes.
-    task: the export that runs, None without one.
+    shown_entry: brings what the picture shows, with these marks. redraw: has the window drawn again. drawn:
+    brings what tools draw over a frame. is_open: whether the dialog is. replaced: files that an export would
+    replace, which the dialog asks about. own: those of them that are the scan's. is_leaving: whether to ask
+    before the window closes. task: the export that runs, None without one.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        viewport: Viewport,
-        note: Callable[[str], None],
-        shown: Callable[[Marks], Entry | None],
-        choices: Choices,
-        marks: Marks,
-        redraw: Callable[[], None],
-        drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
-    ) -> None:
-        """shown: brings what the picture shows, with these marks. redraw: has the window drawn again. drawn:
-        brings what tools draw over a frame."""
-        self._drawn = drawn
-        self._session, self._playback, self._viewport = session, playback, viewport
-        self._note, self._shown = note, shown
-        self.choices = choices
-        self.marks = marks
+    name = "exporting"
+    doing = "Exporting"
+    OFFERS = {"make_film": "film"}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    note_of_work: Callable[[str], None]
+    shown_entry: Callable[[Marks], Entry | None]
+    redraw: Callable[[], None]
+    drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN
+    choices: Choices = remembered(factory=Choices)
+    marks: Marks = remembered(
+        factory=lambda: Marks(plot=True)
+    )  # over the pictures; the plot where it is shown
+
+    def __post_init__(self) -> None:
         self.is_open = False
         about = "Scan4D saves the exported files in this folder"
-        self.choosing: FolderDialog = FolderDialog("Choose a folder", about, self._choose_folder, redraw)
+        self.choosing: FolderDialog = FolderDialog("Choose a folder", about, self._choose_folder, self.redraw)
         self.replaced: list[Path] = []
-        self.refused: list[Path] = []
+        self.own: list[Path] = []
         self.is_leaving = False
         self.task: Task | None = None
         self._work: Future[Made] | None = None
@@ -83,39 +86,39 @@ class Exporting:
     @property
     def can(self) -> bool:
         """Whether there is something to export, and nothing is being exported."""
-        return self._viewport.is_there and self.task is None
+        return self.viewport.is_there and self.task is None
 
-    @property
-    def kept(self) -> Choices:
-        """The choices that outlive a scan."""
-        return replace(self.choices, first=1, last=None, name="")
+    def remembered(self) -> dict[str, Any]:
+        """The values that come back at the next start; frames and name are those of one scan."""
+        choices = replace(self.choices, first=1, last=None, name="")
+        return super().remembered() | {"choices": plain(choices)}
 
     @property
     def count(self) -> int:
         """Frames of the scan."""
-        return len(self._playback.timeline)
+        return len(self.playback.timeline)
 
     @property
     def rate(self) -> float:
         """Pictures a second of a film, as chosen or as the scan has them."""
-        return self.choices.rate(self._playback.timeline.times)
+        return self.choices.rate(self.playback.timeline.times)
 
     @property
     def size(self) -> tuple[int, int] | None:
         """Width and height of the picture in the window, pixels; None where there is none."""
-        return self._viewport.size if self._viewport.surface else None
+        return self.viewport.size if self.viewport.surface else None
 
     @property
     def quality(self) -> str:
         """The quality of the view's look."""
-        return self._session.document.look.quality
+        return self.session.document.look.quality
 
     def ask(self) -> None:
         """Open the dialog; a name is suggested unless the user gave one."""
         if self._entry() is None:
             return
         choices = self.choices
-        if (span := (self._session.scan, self._session.document.span)) != self._span:
+        if (span := (self.session.scan, self.session.document.span)) != self._span:
             self._span = span
             first, last = span[1] or (0, None)
             choices = replace(choices, first=first + 1, last=None if last is None else last + 1)
@@ -131,31 +134,31 @@ class Exporting:
     def change(self, choices: Choices, marks: Marks) -> None:
         """Take in what the user has edited."""
         if (choices, marks) != (self.choices, self.marks):
-            self.choices, self.marks, self.replaced, self.refused = choices, marks, [], []
+            self.choices, self.marks, self.replaced, self.own = choices, marks, [], []
 
     def problems(self) -> dict[str, str]:
         """Find what is wrong with the choices, by field."""
-        return export_plan.problems(self.choices, self.count, self._viewport.renderer.gpu.max_pixels)
+        return export_plan.problems(self.choices, self.count, self.viewport.renderer.gpu.max_pixels)
 
     def start(self) -> None:
         """Export, unless that would replace files that the user was not asked about; closes the dialog.
 
         Frames are not exported by numbers that are laid over some, also where the one that is shown has none.
         """
-        name = self._session.document.look.color_by
-        if self.choices.what == export_plan.FRAMES and name in self._session.laid.names:
-            self._note(f"Cannot export: some frames are coloured by '{name}', which a tool computes.")
+        name = self.session.document.look.color_by
+        if self.choices.what == export_plan.FRAMES and name in self.session.laid.names:
+            self.note_of_work(f"Cannot export: some frames are coloured by '{name}', which a tool computes.")
             return
         there = export_plan.present(self.choices, self.count)
-        shown, choices, timeline = self._entry(), self.choices, self._playback.timeline
-        self.refused = found_among(there, scan_inputs(timeline))
-        if self.refused or there != self.replaced or shown is None:
-            self.replaced = [] if self.refused else there
+        shown, choices, timeline = self._entry(), self.choices, self.playback.timeline
+        self.own = found_among(there, scan_inputs(timeline))
+        if self.own or there != self.replaced or shown is None:
+            self.replaced = [] if self.own else there
             return
         self.is_open, self.replaced = False, []
-        pivot, place = self._session.document.pivot, self._session.laid.place
+        pivot, place = self.session.document.pivot, self.session.laid.place
         recording = export_plan.recording(
-            choices, shown, self.marks, timeline.times, pivot, place, self._drawn
+            choices, shown, self.marks, timeline.times, pivot, place, self.drawn
         )
         rate, numbers = self.rate, choices.numbers(self.count)
         self._begin(choices.name, recording, choices.out(), rate, choices.anonymous, numbers, replaced=there)
@@ -167,7 +170,7 @@ class Exporting:
             self._begin(out.name, recording, out, DEFAULT_FPS, False)
         else:
             again = {"Save as film": lambda: self.film(recording, out)}
-            self._note(Offer("An export is running. Wait for it, or cancel it.", again, "recording"))
+            self.note_of_work(Offer("An export is running. Wait for it, or cancel it.", again, "recording"))
 
     def _begin(self, name: str, recording: Recording, out: Path, *how: Any, **more: Any) -> None:
         """Have a process make pictures or a film. how, more: as `make` takes them."""
@@ -178,13 +181,13 @@ class Exporting:
     def _entry(self) -> Entry | None:
         """The entry of what the picture shows; where that cannot be drawn again, the user is told why."""
         try:
-            shown = self._shown(self.marks)
+            shown = self.shown_entry(self.marks)
             return shown and replace(shown, automatic=None)  # it was expected of this size and view
         except InputError as error:
-            self._note(Problem(f"Cannot export: {error}"))
+            self.note_of_work(Problem(f"Cannot export: {error}"))
         return None
 
-    def advance(self) -> None:
+    def advance(self, now: float) -> None:
         """Tell what came of an export that has ended."""
         if self._work is None or not self._work.done():
             return
@@ -195,16 +198,16 @@ class Exporting:
             log.debug("the export is gone")
         except Exception as error:  # whatever the process meets, the window stays
             log.debug("cannot export", exc_info=error)
-            self._note(Problem(f"Cannot export: {error}"))
+            self.note_of_work(Problem(f"Cannot export: {error}"))
 
     def _tell(self, made: Made) -> None:
         first, last = made.files[0], made.files[-1]
         several = f"{len(made.files)} pictures, {first} to {last.name}"
-        self._note(f"Saved {first if len(made.files) == 1 else several}")
+        self.note_of_work(f"Saved {first if len(made.files) == 1 else several}")
         for warning in made.warnings[:_MOST_WARNINGS]:
-            self._note(warning)
-        if made.device != self._viewport.renderer.gpu.device:
-            self._note(
+            self.note_of_work(warning)
+        if made.device != self.viewport.renderer.gpu.device:
+            self.note_of_work(
                 f"{made.device} drew the export, not the window's GPU: small differences are possible."
             )
 
@@ -215,8 +218,15 @@ class Exporting:
             log.debug("asks before it closes")
         return self.is_leaving
 
-    def close(self) -> None:
+    def finish(self) -> None:
         """Cancel what runs, and wait until it is gone."""
         if self.task is not None and self._work is not None:
             self.task.cancel()
             wait_for([self._work], _CANCELLING)
+
+    COMMANDS = (
+        Command(
+            "export", "Export...", ask, "Ctrl+E", can=lambda exporting: exporting.can, short="Export",
+            icon=icons.ICON_FA_FILM,
+        ),
+    )  # fmt: skip

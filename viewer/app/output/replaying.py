@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ...document.anonymous import in_place, middle_of
 from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
 from ...errors import InputError
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
+from ..commands import Command
+from ..files.opener import Opener
 from ..notices import Problem
-from ..session import known_as
-
-if TYPE_CHECKING:
-    from ..app import App
+from ..part import WindowPart
+from ..playing.playback import Playback
+from ..scene.steering import Steering
+from ..scene.viewport import Viewport
+from ..session import Session, known_as
 
 log = logging.getLogger(__name__)
 _LOOK = 0.015  # seconds between looks at whether what is awaited has come
@@ -35,102 +38,49 @@ class Replaying:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.recording = Recording.load(path)
-        self._next = 0
-        self._since: float | None = None  # by the clock, when the last one was there in full
-        self._asked: str | None = None  # the scan that was to be opened
-        self._compared: str | None = None  # the scan whose hash was
+        self.next = 0
+        self.since: float | None = None  # by the clock, when the last one was there in full
+        self.asked: str | None = None  # the scan that was to be opened
+        self.compared: str | None = None  # the scan whose hash was
 
     def __str__(self) -> str:
-        return f"Replaying {self.path.name}: {self._next} of {len(self.recording.entries)}. Esc to stop."
+        return f"Replaying {self.path.name}: {self.next} of {len(self.recording.entries)}. Esc to stop."
 
     def until_next(self, now: float) -> float:
         """Seconds until another picture is due, or is to be looked for while one is awaited."""
-        left = 0.0 if self._since is None else self._left(self._since, now)
+        left = 0.0 if self.since is None else self.left(self.since, now)
         return left if left > 0 else _LOOK
 
-    def _left(self, since: float, now: float) -> float:
+    def left(self, since: float, now: float) -> float:
         """Seconds for which what has been there since then is still shown; not above 0 once it is over."""
         entries = self.recording.entries
-        until = entries[self._next].at if self._next < len(entries) else self.recording.seconds
-        return since + until - entries[self._next - 1].at - now
-
-    def advance(self, app: App, now: float) -> bool:
-        """Show the next picture if it is due and all that it needs is there; whether it goes on."""
-        if self._next:
-            if self._since is None and not app.viewport.is_complete:
-                return True
-            self._since = now if self._since is None else self._since
-            if self._left(self._since, now) > 0:
-                return True
-        if self._next == len(self.recording.entries):
-            return False
-        entry = self.recording.entries[self._next]
-        if not self._has_opened(app, entry):
-            return app.opening is not None
-        timeline = app.playback.timeline
-        if entry.pose in timeline.broken or entry.pose >= len(timeline):
-            app.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown: Scan4D skips it.")
-            self._next += 1
-        elif (pose := timeline.ready(entry.pose)) is None:
-            timeline.request(entry.pose)
-        else:
-            _show(app, entry, pose)
-            self._next, self._since = self._next + 1, None
-        return True
-
-    def _has_opened(self, app: App, entry: Entry) -> bool:
-        """Whether the scan of an entry is open; it is being opened where it is not."""
-        if app.opening is not None:
-            return False
-        scan = app.session.scan
-        here = known_as(scan)
-        if entry.scan is not None and here not in map(known_as, places_of(entry.scan, self.path)):
-            try:
-                place = place_of(entry.scan, self.path)
-            except InputError as error:
-                app.note(Problem(str(error)))
-                return False
-            if self._asked != place:  # else it could not be opened, and that was told
-                self._asked = place
-                app.open(place)
-            return False
-        if self._compared != here:
-            self._compared = here
-            if entry.hash is not None:
-                app.capture.tell_later(partial(self._changed, scan, entry.hash, app.playback.timeline.files))
-        return True
-
-    def _changed(self, scan: str, hash: str, files: Sequence[Path]) -> str:
-        """Compare a scan with the hash that it had; what to tell of it, nothing where it is the same."""
-        if fingerprint_as(hash, files) in (hash, None):
-            return ""
-        return f"{scan} has changed since {self.path.name} was recorded: pictures may differ."
+        until = entries[self.next].at if self.next < len(entries) else self.recording.seconds
+        return since + until - entries[self.next - 1].at - now
 
 
-def _show(app: App, entry: Entry, pose: Pose) -> None:
-    """Show what an entry of a recording does. pose: of the scan, which is open."""
-    camera, look, place = entry.camera, entry.look, entry.motion
-    if entry.anonymous:
-        camera, look = in_place(camera, look, pose)
-        place = place.in_frame(-middle_of(pose))
-    app.seek(entry.pose)
-    app.session.laid.replay(entry.pose, place)
-    shown = replace(app.document.drawn_by(entry.backend), camera=camera, pivot=None, look=look)
-    shown = shown.with_params(entry.backend, entry.params)
-    app.session.history.change("Replay", shown, merge="replay")
-    app.viewport.rest()
-    app.window.touch()
-    log.debug("replays frame %d", entry.pose)
+@dataclass(eq=False)
+class Replayer(WindowPart):
+    """Shows recordings again. replaying: the one that is shown, None while none is."""
 
+    name = "replayer"
+    layer = 30
+    doing = "Replaying"
+    turn = -3
+    OFFERS = {"replay": "replay", "is_replaying": "is_on"}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    steering: Steering
+    opener: Opener
+    note: Callable[[str], None]
+    refuse: Callable[[str], None]
+    open_scan: Callable[[str], None]
+    close_browser: Callable[[], None]
+    tell_later: Callable[[Callable[[], str]], None]
+    last_recording: Callable[[], Path | None]
+    redraw: Callable[[], None]
 
-class Replayer:
-    """Shows recordings again. replaying: the one that is shown, None while none is.
-
-    It does what a user would, from opening scans to looking from elsewhere, so it knows the whole app.
-    """
-
-    def __init__(self, app: App) -> None:
-        self._app = app
+    def __post_init__(self) -> None:
         self.replaying: Replaying | None = None
 
     def replay(self, path: Path) -> None:
@@ -138,27 +88,110 @@ class Replayer:
         try:
             self.replaying = Replaying(path)
         except InputError as error:
-            self._app.refuse(str(error))
+            self.refuse(str(error))
             return
-        self._app.browser.opened()
-        self._app.playback.player.pause()
-        self._app.steering.turntable.stop()
+        self.close_browser()
+        self.playback.player.pause()
+        self.steering.turntable.stop()
+
+    @property
+    def is_on(self) -> bool:
+        """Whether a recording is shown."""
+        return self.replaying is not None
 
     def replay_last(self) -> None:
         """Show the recording saved last again."""
-        if self._app.capture.last is not None:
-            self.replay(self._app.capture.last)
+        if (last := self.last_recording()) is not None:
+            self.replay(last)
 
     def on_escape(self) -> bool:
         """End the replay, and stay at what is shown; whether there is one."""
-        was_replaying, self.replaying = self.replaying is not None, None
+        was_replaying, self.replaying = self.is_on, None
         return was_replaying
 
-    def until_next(self, now: float) -> float:
+    def next_change(self, now: float) -> float:
         """Seconds until there is something to do; infinite where there is nothing."""
         return math.inf if self.replaying is None else self.replaying.until_next(now)
 
     def advance(self, now: float) -> None:
         """Let the replay go on. The user's own moves end it."""
-        if self.replaying is not None and (self._app.moving or not self.replaying.advance(self._app, now)):
+        moves = self.playback.player.playing or self.steering.moves
+        if self.replaying is not None and (moves or not self._go_on(self.replaying, now)):
             self.replaying = None
+
+    def _go_on(self, replaying: Replaying, now: float) -> bool:
+        """Show the next picture if it is due and all that it needs is there; whether it goes on."""
+        if replaying.next:
+            if replaying.since is None and not self.viewport.is_complete:
+                return True
+            replaying.since = now if replaying.since is None else replaying.since
+            if replaying.left(replaying.since, now) > 0:
+                return True
+        if replaying.next == len(replaying.recording.entries):
+            return False
+        entry = replaying.recording.entries[replaying.next]
+        if not self._has_opened(replaying, entry):
+            return self.opener.job.scan is not None
+        timeline = self.playback.timeline
+        if entry.pose in timeline.broken or entry.pose >= len(timeline):
+            self.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown: Scan4D skips it.")
+            replaying.next += 1
+        elif (pose := timeline.ready(entry.pose)) is None:
+            timeline.request(entry.pose)
+        else:
+            self._show(entry, pose)
+            replaying.next, replaying.since = replaying.next + 1, None
+        return True
+
+    def _has_opened(self, replaying: Replaying, entry: Entry) -> bool:
+        """Whether the scan of an entry is open; it is being opened where it is not."""
+        if self.opener.job.scan is not None:
+            return False
+        scan = self.session.scan
+        here = known_as(scan)
+        if entry.scan is not None and here not in map(known_as, places_of(entry.scan, replaying.path)):
+            try:
+                place = place_of(entry.scan, replaying.path)
+            except InputError as error:
+                self.note(Problem(str(error)))
+                return False
+            if replaying.asked != place:  # else it could not be opened, and that was told
+                replaying.asked = place
+                self.open_scan(place)
+            return False
+        if replaying.compared != here:
+            replaying.compared = here
+            if entry.hash is not None:
+                self.tell_later(
+                    partial(_changed, replaying.path, scan, entry.hash, self.playback.timeline.files)
+                )
+        return True
+
+    def _show(self, entry: Entry, pose: Pose) -> None:
+        """Show what an entry of a recording does. pose: of the scan, which is open."""
+        camera, look, place = entry.camera, entry.look, entry.motion
+        if entry.anonymous:
+            camera, look = in_place(camera, look, pose)
+            place = place.in_frame(-middle_of(pose))
+        self.playback.seek(entry.pose, time.monotonic())
+        self.session.laid.replay(entry.pose, place)
+        shown = replace(self.session.document.drawn_by(entry.backend), camera=camera, pivot=None, look=look)
+        shown = shown.with_params(entry.backend, entry.params)
+        self.session.history.change("Replay", shown, merge="replay")
+        self.viewport.rest()
+        self.redraw()
+        log.debug("replays frame %d", entry.pose)
+
+    COMMANDS = (
+        Command(
+            "replay", "Replay the recording", replay_last, "Shift+R",
+            can=lambda replayer: replayer.last_recording() is not None,
+        ),
+    )  # fmt: skip
+
+
+def _changed(path: Path, scan: str, hash: str, files: Sequence[Path]) -> str:
+    """Compare a scan with the hash that it had; what to tell of it, nothing where it is the same."""
+    if fingerprint_as(hash, files) in (hash, None):
+        return ""
+    return f"{scan} has changed since {path.name} was recorded: pictures may differ."

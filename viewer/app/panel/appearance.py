@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
@@ -13,15 +12,15 @@ from ...backends import backend
 from ...files import printable
 from ...look import BACKGROUNDS, COLOR_BY, COLOR_WORDS, RANGE_WORDS, Look, drawable
 from ...params import in_words
+from ...scan.pose import Pose
+from ...scan.units import Scale
 from .. import theme, widgets
+from ..part import Section, WindowPart
+from ..playing.playback import Playback
+from ..scene.rendering import Rendering
+from ..scene.viewport import Viewport
+from ..session import Session
 from ..ui import Ui
-
-if TYPE_CHECKING:
-    from ...scan.pose import Pose
-    from ...scan.units import Scale
-    from ..scene.rendering import Rendering
-    from ..scene.viewport import Viewport
-    from ..session import Session
 
 _FIXED = "fixed"  # both ends are given
 _THEME, _OWN = "theme", "own"
@@ -35,10 +34,27 @@ _OF_LIGHT = ("ambient", "diffuse", "specular", "shininess")
 _OF_EDGES = ("eye_dome_strength", "eye_dome_radius")
 
 
-def draw(
+@dataclass(eq=False)
+class AppearanceSection(WindowPart):
+    """The section."""
+
+    name = "appearance_section"
+    SECTION = Section("Appearance", 30)
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    rendering: Rendering
+
+    def panel(self, ui: Ui) -> None:
+        """Declare it."""
+        if self.playback.pose is not None:
+            _draw(self.session, self.rendering, self.viewport, self.playback.scale, self.playback.pose, ui)
+
+
+def _draw(
     session: Session, rendering: Rendering, viewport: Viewport, scale: Scale, pose: Pose, ui: Ui
 ) -> None:
-    """Declare the section. scale: how lengths are told, as which heights and depths are edited."""
+    """Declare the section. scale: of displayed lengths, as which heights and depths are edited."""
     look = session.document.look
     names = session.laid.layers(pose).names(pose.overview.scalars)
     found = backend(session.document.chosen(pose)[0]).values

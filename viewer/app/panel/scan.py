@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -14,29 +14,30 @@ from ...geometry import AXES
 from ...output.legend import number
 from ...scan.guessed_unit import guess_unit
 from ...scan.points import UNKNOWN_UNIT
+from ...scan.pose import Pose
 from ...scan.times import FPS_LIMITS, TIMES_FILE
 from ...scan.units import UNIT_WORDS, is_length
 from .. import widgets
-from ..files.scans import title
-
-if TYPE_CHECKING:
-    from ...scan.pose import Pose
-    from ..files.scans import Scans
-    from ..keys import Keys
-    from ..playing.pacing import Pacing
-    from ..playing.playback import Playback
-    from ..scene.steering import Steering
-    from ..session import Session
+from ..files.scans import Scans, title
+from ..keys import Keys
+from ..part import Section, WindowPart
+from ..playing.pacing import Pacing
+from ..playing.playback import Playback
+from ..scene.steering import Steering
+from ..session import Session
+from ..ui import Ui
 
 _OWN = "own"  # the unit that the scan has
 _PLURALS = {"m": "metres", "mm": "millimetres"}  # of the units that are guessed
 _ATTRIBUTES = {"colors": "colours", "normals": "normals", "radii": "radii"}
 
 
-@dataclass(frozen=True)
-class ScanSection:
-    """The section, and what it tells of and changes."""
+@dataclass(eq=False)
+class ScanSection(WindowPart):
+    """The section, and what it shows and changes."""
 
+    name = "scan_section"
+    SECTION = Section("Scan", 10, needs_pose=False)
     scans: Scans
     session: Session
     playback: Playback
@@ -44,7 +45,7 @@ class ScanSection:
     steering: Steering
     keys: Keys
 
-    def draw(self) -> None:
+    def panel(self, ui: Ui) -> None:
         """Declare it."""
         if len(self.scans.listed) > 1:
             self._draw_scans()
@@ -131,7 +132,7 @@ class ScanSection:
         if len(self.playback.timeline) == 1:
             return
         if not pacing.can_change:
-            by = "set on the command line" if pacing.is_told else f"from {TIMES_FILE}"
+            by = "set on the command line" if pacing.is_stated else f"from {TIMES_FILE}"
             widgets.fact("Rate", f"{pacing.rate:.4g} Hz, {by}")
             return
         widgets.label(

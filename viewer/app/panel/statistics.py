@@ -2,47 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
 from ...backends import backend
+from ...drawing.renderer import Renderer
+from ...picture.stats import Stats
 from .. import widgets
-from ..scene import counting
+from ..part import Section, WindowPart
+from ..playing.ahead import Ahead
+from ..playing.playback import Playback
+from ..scene.activity import Activity
+from ..scene.counting import Counting, words
+from ..scene.viewport import Viewport
+from ..ui import Ui
 
-if TYPE_CHECKING:
-    from ...gpu.timers import Timers
-    from ...picture.stats import Stats
-    from ..scene.viewport import Viewport
 
+@dataclass(eq=False)
+class StatisticsSection(WindowPart):
+    """The section."""
 
-def draw(
-    viewport: Viewport,
-    timers: Timers,
-    counts: Mapping[str, int] | None,
-    rows: Iterable[tuple[str, str]],
-    is_moving: bool,
-) -> None:
-    """Declare the section. counts: of points, see `counting`. rows: others to tell. is_moving: whether
-    pictures come one after the other."""
-    timers.enabled = imgui.checkbox("Time each pass", timers.enabled)[1]
-    widgets.tooltip("Measure the time of each drawing pass; this slows drawing a little")
-    surface = viewport.surface
-    if surface is None or not viewport.is_there:
-        return
-    for name, number in counting.words(viewport, counts):
-        widgets.fact(name, number)
-    widgets.fact("Picture", f"{surface.size[0]} x {surface.size[1]}, {backend(surface.stats.backend).title}")
-    widgets.fact("Samples per pixel", str(surface.stats.samples))
-    for name, text in rows:
-        widgets.fact(name, text)
-    for name, choice in surface.stats.chosen.items():
-        widgets.fact(name.capitalize(), choice)
-    rate = f", {viewport.rate:.0f} fps" if is_moving else ""
-    widgets.fact("Time", _times(surface.stats) + rate)
-    for name, milliseconds in surface.stats.passes:
-        widgets.fact(f"  {name}", f"{milliseconds:.2f} ms")
+    name = "statistics_section"
+    SECTION = Section("Statistics", 60, is_open=False)
+    playback: Playback
+    viewport: Viewport
+    renderer: Renderer
+    ahead: Ahead
+    counting: Counting
+    activity: Activity
+
+    def panel(self, ui: Ui) -> None:
+        """Declare it."""
+        timers, viewport, surface = self.renderer.gpu.timers, self.viewport, self.viewport.surface
+        timers.enabled = imgui.checkbox("Time each pass", timers.enabled)[1]
+        widgets.tooltip("Measure the time of each drawing pass; this slows drawing a little")
+        if surface is None or not viewport.is_there:
+            return
+        stats, (width, height) = surface.stats, surface.size
+        for name, number in words(viewport, self.counting.counts):
+            widgets.fact(name, number)
+        widgets.fact("Picture", f"{width} x {height}, {backend(stats.backend).title}")
+        widgets.fact("Samples per pixel", str(stats.samples))
+        if self.playback.player.playing:
+            held = f"{self.renderer.held_bytes / 1e6:,.0f} MB"
+            widgets.fact("Ahead", f"{self.ahead.ready} ready, {self.renderer.unfinished} begun, {held}")
+        for name, choice in stats.chosen.items():
+            widgets.fact(name.capitalize(), choice)
+        rate = f", {viewport.rate:.0f} fps" if self.activity.is_moving else ""
+        widgets.fact("Time", _times(stats) + rate)
+        for name, milliseconds in stats.passes:
+            widgets.fact(f"  {name}", f"{milliseconds:.2f} ms")
 
 
 def _times(stats: Stats) -> str:

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from ...camera import PROJECTIONS
 from .. import widgets
+from ..part import Section, WindowPart
+from ..scene.bookmarks import Bookmarks
+from ..scene.steering import Steering
+from ..session import Session
 from ..ui import Ui
 
-if TYPE_CHECKING:
-    from ...camera import Camera
-    from ..scene.bookmarks import Bookmarks
-    from ..scene.steering import Steering
 
+@dataclass(eq=False)
+class ViewsSection(WindowPart):
+    """The section."""
 
-def draw(steering: Steering, camera: Camera | None, bookmarks: Bookmarks, ui: Ui) -> None:
-    """Declare the section."""
-    widgets.label(
-        "Projection", "Perspective: near things look larger. Orthographic: sizes are comparable at any depth"
-    )
-    now = camera.projection if camera else PROJECTIONS[0]
-    chosen = widgets.combo("projection", now, PROJECTIONS, {name: name.capitalize() for name in PROJECTIONS})
-    if chosen != now:
-        steering.project(chosen)
-    bookmarks.draw(ui)
+    name = "views_section"
+    SECTION = Section("Views", 40)
+    session: Session
+    steering: Steering
+    bookmarks: Bookmarks
+
+    def panel(self, ui: Ui) -> None:
+        """Declare it."""
+        widgets.label(
+            "Projection",
+            "Perspective: near things look larger. Orthographic: sizes are comparable at any depth",
+        )
+        camera = self.session.document.camera
+        now = camera.projection if camera else PROJECTIONS[0]
+        titles = {name: name.capitalize() for name in PROJECTIONS}
+        chosen = widgets.combo("projection", now, PROJECTIONS, titles)
+        if chosen != now:
+            self.steering.project(chosen)
+        self.bookmarks.draw(ui)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 from ...document.document import Document
@@ -10,45 +11,53 @@ from ...drawing.frame import is_prepared, prepare_ahead
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request
 from ...scan.pose import Pose
+from ..part import WindowPart
 from ..session import Session
 from .playback import Playback
 
 _REACH = 24  # frames looked at beyond those that would be late
 
 
-class Ahead:
+@dataclass(eq=False)
+class Ahead(WindowPart):
     """Has the renderer's workers prepare the poses that are shown next, as the document draws them."""
 
-    def __init__(self, session: Session, playback: Playback, renderer: Renderer) -> None:
-        self._session, self._playback, self._renderer = session, playback, renderer
+    name = "ahead"
+    doing = "Preparing"
+    turn = -2
+    session: Session
+    playback: Playback
+    renderer: Renderer
+
+    def __post_init__(self) -> None:
         self._asked: Any = None
-        playback.is_prepared = self.is_prepared
-        renderer.steps_to = self._steps_to
+        self.playback.is_prepared = self.is_prepared
+        self.renderer.steps_to = self._steps_to
 
     def is_prepared(self, pose: Pose) -> bool:
         """Whether a pose can be drawn as the document has it, but for what its view alone needs."""
         request = self._request(pose)
-        return request is None or is_prepared(self._renderer, request)
+        return request is None or is_prepared(self.renderer, request)
 
-    def advance(self) -> None:
+    def advance(self, now: float) -> None:
         """Take in what was prepared, and ask for what is shown next; what is not any more is dropped."""
-        playback, document = self._playback, self._session.document
+        playback, document = self.playback, self.session.document
         asked = (playback.jumps, playback.timeline, *_how(document))
         ahead = [playback.timeline.ready(index) for index in reversed(self._next())]  # the next one used last
         requests = [self._request(pose) for pose in (playback.pose, *reversed(ahead)) if pose is not None]
-        prepare_ahead(self._renderer, [r for r in requests if r is not None], afresh=asked != self._asked)
+        prepare_ahead(self.renderer, [r for r in requests if r is not None], afresh=asked != self._asked)
         self._asked = asked
 
     def _next(self) -> list[int]:
         """The frames to prepare, the most urgent first; while playing in real time those that would be late
         come after all others, the latest last."""
-        playback, session = self._playback, self._session
+        playback, session = self.playback, self.session
         player, count, index = playback.player, len(playback.span), session.index
         if not player.playing:
             return [index]
         late = 0
         if not (session.pace.every_frame or playback.is_held):
-            late = min(math.ceil(self._renderer.latency * player.rate), count - 1)
+            late = min(math.ceil(self.renderer.latency * player.rate), count - 1)
         steps = [*range(late, min(late + _REACH, count)), *reversed(range(late))]
         frames = [playback.after(index, step) for step in steps]
         return [frame for frame in frames if frame is not None]
@@ -56,11 +65,11 @@ class Ahead:
     @property
     def ready(self) -> int:
         """How many of the next frames can be drawn, up to the first that cannot; 0 while none follows."""
-        playback = self._playback
+        playback = self.playback
         if not playback.player.playing:
             return 0
         for step in range(1, min(_REACH, len(playback.span))):
-            index = playback.after(self._session.index, step)
+            index = playback.after(self.session.index, step)
             pose = None if index is None else playback.timeline.ready(index)
             if pose is None or not self.is_prepared(pose):
                 return step - 1
@@ -69,13 +78,13 @@ class Ahead:
     def _request(self, pose: Pose) -> Request | None:
         """The picture to draw of a pose, without layers: nothing is prepared of them, and they are found for
         the pose that is shown alone. None before there is a camera."""
-        return None if self._session.document.camera is None else self._session.document.request(pose)
+        return None if self.session.document.camera is None else self.session.document.request(pose)
 
     def _steps_to(self, pose: Pose) -> int:
         """How many frames playing shows before a pose; 0 for all while it does not play."""
-        if not self._playback.player.playing:
+        if not self.playback.player.playing:
             return 0
-        return self._playback.steps_to(pose.index, self._session.index)
+        return self.playback.steps_to(pose.index, self.session.index)
 
 
 def _how(document: Document) -> tuple[Any, ...]:

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from ...scan.open import has_times_in_names, retime
 from ...scan.timeline import Timeline
 from ...scan.times import typical_rate
+from ..part import WindowPart
 from ..session import Session
 from .playback import Playback
 
 
-class Pacing:
+@dataclass(eq=False)
+class Pacing(WindowPart):
     """Keeps the times of the frames as the document has them.
 
-    is_told: whether the command line tells the rate of all scans, which wins. has_names: whether the names of
-    the open scan's frames tell when they are.
+    fps: the rate of all scans that the command line states, which wins; None without one. has_names: whether
+    the names of the open scan's frames say when they are.
     """
 
-    def __init__(self, session: Session, playback: Playback, is_told: bool) -> None:
-        self._session, self._playback = session, playback
-        self.is_told = is_told
+    name = "pacing"
+    doing = "Pacing"
+    turn = -2
+    session: Session
+    playback: Playback
+    fps: float | None
+
+    def __post_init__(self) -> None:
+        self.is_stated = self.fps is not None
         self.has_names = False
         self._timeline: Timeline | None = None  # the last one that was looked at,
         self._chosen: tuple[float | None, bool] = None, False  # and what its times are by
@@ -26,25 +36,25 @@ class Pacing:
     @property
     def rate(self) -> float:
         """Frames a second of the scan, as most of them follow each other."""
-        return typical_rate(self._playback.timeline.times)
+        return typical_rate(self.playback.timeline.times)
 
     @property
     def can_change(self) -> bool:
         """Whether the user can say when the frames are."""
-        timeline = self._playback.timeline
-        return len(timeline) > 1 and not (self.is_told or timeline.is_measured)
+        timeline = self.playback.timeline
+        return len(timeline) > 1 and not (self.is_stated or timeline.is_measured)
 
     def choose(self, fps: float | None) -> None:
         """Have this many frames a second."""
-        self._session.change("Change frame rate", fps=fps, times_by_names=False)
+        self.session.change("Change frame rate", fps=fps, times_by_names=False)
 
     def use_names(self, by_names: bool) -> None:
         """Have the names of the frames tell when they are, or not."""
-        self._session.change("Use times from file names", times_by_names=by_names)
+        self.session.change("Use times from file names", times_by_names=by_names)
 
     def advance(self, now: float) -> bool:
         """Take in what the document says; whether times have changed."""
-        timeline, document = self._playback.timeline, self._session.document
+        timeline, document = self.playback.timeline, self.session.document
         if timeline is not self._timeline:
             self._timeline, self._chosen = timeline, (None, False)
             self.has_names = self.can_change and has_times_in_names(timeline)
@@ -53,5 +63,5 @@ class Pacing:
             return False
         self._chosen = chosen
         retime(timeline, *chosen)
-        self._playback.retime(now)
+        self.playback.retime(now)
         return True

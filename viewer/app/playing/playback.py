@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,15 +14,36 @@ from ...errors import InputError
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
 from ...scan.units import Scale
+from ..commands import Command
+from ..part import WindowPart
 from ..session import Session
 from .player import Player
 
+log = logging.getLogger(__name__)
+FRAMES = "several frames"  # a condition
+_now = time.monotonic
 _RATE_SPAN = 1.0  # seconds over which shown frames are counted, longer where few are due
 _RATE_FRAMES = 4
 _PATIENCE = 0.5, 2.0  # seconds, and frames, that no other pose comes for until the clock waits for one
 
 
-class Playback:
+def _pace(name: str, title: str, key: str) -> Command:
+    """Switches a field of the `Pace`."""
+    return Command(
+        name, title,
+        lambda playback: playback.change(_now(), **{name: not getattr(playback.session.pace, name)}),
+        key, FRAMES, is_on=lambda playback: getattr(playback.session.pace, name),
+    )  # fmt: skip
+
+
+def _end(name: str, title: str, key: str, is_last: bool) -> Command:
+    """Chooses the frame that is shown as the first or the last that is played."""
+    return Command(
+        name, title, lambda playback: playback.set_end(is_last, playback.session.index), key, FRAMES
+    )
+
+
+class Playback(WindowPart):
     """Moves `session.index` along the timeline of the open scan and finds the pose to show.
 
     pose: the one that is shown, None before the first. Where reading or preparing is slower than
@@ -30,6 +53,11 @@ class Playback:
     stays. is_held: whether the clock waits, since no pose has come for a while. player: plays the frames that
     the document keeps to, `span`. whole: all frames, which steps go through.
     """
+
+    name = "playback"
+    doing = "Playing"
+    turn = -1
+    CONDITIONS = {FRAMES: lambda playback: len(playback.timeline) > 1}
 
     def __init__(self, timeline: Timeline, session: Session, first: int = 0) -> None:
         """first: the frame to begin with."""
@@ -148,9 +176,15 @@ class Playback:
         self._shown.clear()
         if self.player.playing:
             self._read_ahead()
+        log.debug("%s", self.session.pace)
+
+    def change_speed(self, direction: int) -> None:
+        """Play faster for 1, slower for -1."""
+        self.change(time.monotonic(), speed=self.session.pace.next_speed(direction))
 
     def seek(self, index: int, now: float) -> None:
-        """Go to a frame; playing goes on from there."""
+        """Go to a frame, -1 is the last one; playing goes on from there."""
+        index %= len(self.timeline)
         if index == self.session.index:
             return
         self.session.index = index
@@ -214,3 +248,34 @@ class Playback:
     def close(self) -> None:
         """Stop reading."""
         self.timeline.close()
+
+    @property
+    def waits(self) -> bool:
+        """Whether the current frame is about to come."""
+        return self.waiting
+
+    def next_change(self, now: float) -> float:
+        """Seconds until another frame is due; infinite while nothing plays."""
+        return self.player.until_next(now)
+
+    COMMANDS = (
+        Command("play", "Play", lambda playback: playback.toggle(_now()), "Space", FRAMES,
+            is_on=lambda playback: playback.player.playing),
+        Command("next", "Next frame", lambda playback: playback.step(1, _now()), "Right .", FRAMES,
+            repeats=True),
+        Command("back", "Previous frame", lambda playback: playback.step(-1, _now()), "Left ,", FRAMES,
+            repeats=True),
+        Command("first", "First frame", lambda playback: playback.seek(0, _now()), "Ctrl+Home", FRAMES),
+        Command("last", "Last frame", lambda playback: playback.seek(-1, _now()), "Ctrl+End End", FRAMES),
+        Command("slower", "Slower", lambda playback: playback.change_speed(-1), "[", FRAMES, repeats=True),
+        Command("faster", "Faster", lambda playback: playback.change_speed(1), "]", FRAMES, repeats=True),
+        Command("speed_1", "Speed 1x", lambda playback: playback.change(_now(), speed=1.0), "Backspace",
+            FRAMES),
+        _end("span_first", "Set start of playback", "I", is_last=False),
+        _end("span_last", "Set end of playback", "Shift+I", is_last=True),
+        Command("span_all", "Play all frames", clear_span, "Alt+I",
+            can=lambda playback: playback.session.document.span is not None),
+        _pace("loop", "Loop", "L"),
+        _pace("reverse", "Backward", "Shift+Space"),
+        _pace("every_frame", "Every frame", "E"),
+    )  # fmt: skip

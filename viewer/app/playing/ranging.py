@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ...drawing.request import Request
 from ...look import Look, is_open_range, with_range
@@ -13,13 +13,16 @@ from ...scan.pose import Pose
 from ...scan.ranges import ValueRanges
 from ...scan.timeline import Timeline
 from ...task import Task, checkpoint, in_background
+from ..part import WindowPart
+from ..scene.activity import Activity
 from ..session import Session
 
 _LOOK = 0.2  # seconds between looks at whether the work goes on, or shall stop
 _PAUSE = 0.5  # the same between pictures that show what has come meanwhile
 
 
-class Ranging:
+@dataclass(eq=False)
+class Ranging(WindowPart):
     """Finds what the colour map spans where the look leaves that to the frames.
 
     Frames come as they are read. The others are visited one by one on a thread, spread over the scan, while
@@ -27,17 +30,22 @@ class Ranging:
     shown are known.
     """
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    name = "ranging"
+    doing = "Finding the colour range"
+    OFFERS = {"range_note": "words"}
+    session: Session
+    activity: Activity
+
+    def __post_init__(self) -> None:
         self._timeline: Timeline | None = None
         self._ranges = ValueRanges(1)
-        self._laid = session.laid.version
+        self._laid = self.session.laid.version
         self._wanted: Look | None = None  # that frames of the scan alone tell the range of
         self._is_idle = threading.Event()
         self._visiting: tuple[Look, Task, Future[None]] | None = None
         self._shown = 0, 0.0  # how many frames were known to what was drawn, and when by the clock
 
-    def begin(self, timeline: Timeline) -> None:
+    def begin_scan(self, timeline: Timeline) -> None:
         """Gather of another scan from now on, also where others read it."""
         self.close()
         self._timeline, self._wanted = timeline, None
@@ -54,10 +62,10 @@ class Ranging:
 
     def ranged(self, request: Request) -> Request:
         """The request with the ends of the colour map as far as they are known."""
-        look, laid, pose = request.look, self._session.laid, request.pose
+        look, laid, pose = request.look, self.session.laid, request.pose
         if laid.version != self._laid:
             self._laid, self._ranges = laid.version, ValueRanges(self._ranges.count)
-        chosen, layers = self._session.document.look, request.layers
+        chosen, layers = self.session.document.look, request.layers
         is_laid = chosen.color_by in laid.names or not layers.world_from_pose.is_identity
         self._wanted = None if is_laid or not is_open_range(chosen) else chosen
         if not is_open_range(look) or self._ranges.count == 1:
@@ -67,13 +75,13 @@ class Ranging:
 
     def words(self) -> str:
         """Words of the colour bar while not all frames are known; empty once they are."""
-        look, count = self._session.document.look, self._ranges.count
+        look, count = self.session.document.look, self._ranges.count
         known = self._ranges.known(look)
         return f"range from {known} of {count} frames" if is_open_range(look) and 0 < known < count else ""
 
-    def advance(self, now: float, is_idle: bool) -> bool:
-        """Go on; whether there is more to show. is_idle: whether nothing else reads or draws."""
-        (self._is_idle.set if is_idle else self._is_idle.clear)()
+    def advance(self, now: float) -> bool:
+        """Go on while nothing else reads or draws; whether there is more to show."""
+        (self._is_idle.set if self.activity.is_idle else self._is_idle.clear)()
         wanted, timeline, ranges = self._wanted, self._timeline, self._ranges
         if self._visiting is not None:
             look, task, work = self._visiting

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import moderngl
@@ -17,6 +18,9 @@ from ...errors import InputError
 from ...scan.preview import preview_picture
 from ...scan.timeline import Timeline, TimelineClosed
 from ...task import Cancelled, Task, in_background
+from ..part import WindowPart
+from ..scene.activity import Activity
+from ..window import Window
 
 _HEIGHT = 120  # pixels of a picture
 _NARROWEST, _WIDEST = 0.7, 1.8  # its width / height
@@ -32,12 +36,17 @@ class _Work(NamedTuple):
     future: Future[Picture | None]
 
 
-class Thumbnails:
+@dataclass(eq=False)
+class Thumbnails(WindowPart):
     """Pictures of the frames of one scan by one camera. One is drawn at a time, so that one frame at most is
     read for this; a frame that is not in memory takes no place there."""
 
-    def __init__(self, ctx: moderngl.Context) -> None:
-        self._ctx = ctx
+    name = "thumbnails"
+    doing = "Picturing frames"
+    window: Window
+    activity: Activity
+
+    def __post_init__(self) -> None:
         self._of: tuple[Timeline, Camera, int] | None = None  # scan, camera, width of the pictures
         self._there: OrderedDict[int, moderngl.Texture | None] = OrderedDict()  # by frame, last used last;
         # None of one that cannot be drawn
@@ -69,15 +78,15 @@ class Thumbnails:
         if texture is not None:
             imgui.image(imgui.ImTextureRef(texture.glo), size)
 
-    def advance(self, is_idle: bool) -> bool:
-        """Take in what was drawn, and draw what was asked for last; whether there is another. is_idle:
-        whether nothing else reads or draws."""
+    def advance(self, now: float) -> bool:
+        """Take in what was drawn, and draw what was asked for last while nothing else reads or draws;
+        whether there is another."""
         is_new = self._take()
         wanted, of = self._wanted, self._of
         if self._work is not None:
             if wanted is not None and wanted != self._work.frame:
                 self._work.task.cancel()
-        elif wanted is not None and of is not None and is_idle:
+        elif wanted is not None and of is not None and self.activity.is_idle:
             self._wanted = None
             task = Task("Picture of a frame")
             self._work = _Work(wanted, task, in_background(task, lambda: _picture(*of, wanted)))
@@ -97,13 +106,17 @@ class Thumbnails:
         texture = None
         if picture is not None:
             height, width = picture.shape[:2]
-            texture = self._ctx.texture((width, height), 4, np.ascontiguousarray(picture).tobytes())
+            texture = self.window.ctx.texture((width, height), 4, np.ascontiguousarray(picture).tobytes())
         self._there[frame] = texture
         if self._wanted == frame:
             self._wanted = None
         while len(self._there) > _MOST:
             _release(self._there.popitem(last=False)[1])
         return True
+
+    def close(self) -> None:
+        """Let go of all pictures."""
+        self.clear()
 
     def clear(self) -> None:
         """Let go of all pictures, and of one that is being drawn."""

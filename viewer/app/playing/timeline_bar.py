@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -14,14 +14,19 @@ from numpy.typing import NDArray
 
 from ...scan.times import frame_in_words
 from .. import theme, widgets
+from ..keys import Keys
+from ..menus import Commands
+from ..notices import Notices
+from ..part import WindowPart
+from ..scene.pointed import Pointer
+from ..scene.viewport import Viewport
+from ..session import Session
+from ..tasks import Tasks
+from ..toolbox import Toolbox
+from ..window_look import WindowLook
+from .playback import Playback
 from .player import SPEEDS
-
-if TYPE_CHECKING:
-    from ..app import App
-    from ..notices import Notices
-    from ..scene.pointed import Pointer
-    from ..tasks import Tasks
-    from .playback import Playback
+from .thumbnails import Thumbnails
 
 _SPEED_WIDTH = 4.6  # in heights of the font
 _STEPS, _PACES = 4, 3  # buttons
@@ -38,89 +43,152 @@ _WORK_SHARE = 0.4  # of the status bar's width, for work that goes on
 _GAP = "    "  # between what is said of the place under the mouse
 
 
-def draw(app: App) -> None:
-    """Declare the bar in the current ImGui window. Where it is narrow, the track has its room first: how the
-    scan plays moves into a list, and the time goes."""
-    several = len(app.playback.timeline) > 1
-    em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
-    button = widgets.ICON_WIDTH * imgui.get_frame_height() + gap
-    place = _widest_place(app.playback) + em
-    room = imgui.get_content_region_avail().x - _STEPS * button - _SHORTEST_TRACK * em
-    has_pace = room > _PACES * button + _SPEED_WIDTH * em + gap + place
-    imgui.begin_disabled(not several)
-    _draw_steps(app)
-    if has_pace:
-        _draw_pace(app)
-    else:
-        _draw_list_of_pace(app)
-    imgui.end_disabled()
-    if has_pace or room > button + place:
-        _draw_place(app.playback, place)
-    report = _report(app.playback) if app.playback.player.playing else ""
-    # Its width stays while it says nothing: the track must not move under the mouse.
-    room = imgui.calc_text_size(_rates("100", "100", "10000 skipped")).x + imgui.get_style().item_spacing.x
-    width = imgui.get_content_region_avail().x
-    is_wide = several and width - room > _SHORTEST_TRACK * imgui.get_font_size()
-    _draw_track(app, width - room if is_wide else width)
-    if is_wide:
-        imgui.same_line()
-        imgui.text_disabled(report)
-        widgets.tooltip(
-            "How many frames per second you see, and how many the scan has at this speed. "
-            "Scan4D skips frames that it cannot load or draw in time"
+@dataclass(eq=False)
+class TimelineBar(WindowPart):
+    """Declares the bar."""
+
+    name = "timeline_bar"
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    tools: Toolbox
+    thumbnails: Thumbnails
+    pointer: Pointer
+    notices: Notices
+    tasks: Tasks
+    commands: Commands
+    keys: Keys
+    window_look: WindowLook
+
+    def draw(self) -> None:
+        """Declare the bar in the current ImGui window. Where it is narrow, the track has its room first: how
+        the scan plays moves into a list, and the time goes."""
+        several = len(self.playback.timeline) > 1
+        em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
+        button = widgets.ICON_WIDTH * imgui.get_frame_height() + gap
+        place = _widest_place(self.playback) + em
+        room = imgui.get_content_region_avail().x - _STEPS * button - _SHORTEST_TRACK * em
+        has_pace = room > _PACES * button + _SPEED_WIDTH * em + gap + place
+        imgui.begin_disabled(not several)
+        self._draw_steps()
+        if has_pace:
+            self._draw_pace()
+        else:
+            self._draw_list_of_pace()
+        imgui.end_disabled()
+        if has_pace or room > button + place:
+            _draw_place(self.playback, place)
+        report = _report(self.playback) if self.playback.player.playing else ""
+        # Its width stays while it says nothing: the track must not move under the mouse.
+        room = (
+            imgui.calc_text_size(_rates("100", "100", "10000 skipped")).x + imgui.get_style().item_spacing.x
         )
-    _draw_status(app.playback, app.pointer, app.notices, app.tasks)
+        width = imgui.get_content_region_avail().x
+        is_wide = several and width - room > _SHORTEST_TRACK * imgui.get_font_size()
+        self._draw_track(width - room if is_wide else width)
+        if is_wide:
+            imgui.same_line()
+            imgui.text_disabled(report)
+            widgets.tooltip(
+                "How many frames per second you see, and how many the scan has at this speed. "
+                "Scan4D skips frames that it cannot load or draw in time"
+            )
+        _draw_status(self.playback, self.pointer, self.notices, self.tasks)
 
+    def _draw_steps(self) -> None:
+        """Buttons that go somewhere or start to."""
+        playing = self.playback.player.playing
+        for icon, name in (
+            (icons.ICON_FA_BACKWARD_FAST, "first"),
+            (icons.ICON_FA_BACKWARD_STEP, "back"),
+            (icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY, "play"),
+            (icons.ICON_FA_FORWARD_STEP, "next"),
+        ):
+            self._draw_button(icon, name)
 
-def _draw_steps(app: App) -> None:
-    """Buttons that go somewhere or start to."""
-    playing = app.playback.player.playing
-    for icon, name in (
-        (icons.ICON_FA_BACKWARD_FAST, "first"),
-        (icons.ICON_FA_BACKWARD_STEP, "back"),
-        (icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY, "play"),
-        (icons.ICON_FA_FORWARD_STEP, "next"),
-    ):
-        _draw_button(app, icon, name)
+    def _draw_button(self, icon: str, name: str, color: int | None = None, about: str = "") -> None:
+        """The button of a command. about: what more its tooltip says."""
+        # By its name: the keyboard stays with it where the icon changes.
+        if widgets.icon_button(f"{icon}###{name}", self.keys.hint(name) + about, color):
+            self.commands.of[name].act()
+        imgui.same_line()
 
+    def _draw_pace(self) -> None:
+        """Declare how it plays."""
+        pace, accent = self.session.pace, self.window_look.palette.accent
+        for icon, name, about in (
+            (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": start again at the end"),
+            (icons.ICON_FA_BACKWARD, "reverse", ""),
+            (icons.ICON_FA_FILM, "every_frame", ": show each one, even if that is slower"),
+        ):
+            self._draw_button(icon, name, accent if getattr(pace, name) else None, about)
+        imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())
+        titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
+        chosen = float(widgets.combo("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
+        hints = (self.keys.hint(name) for name in ("slower", "faster", "speed_1"))
+        widgets.tooltip("Playback speed. " + ", ".join(hints))
+        if chosen != pace.speed:
+            self.playback.change(time.monotonic(), speed=chosen)
+        imgui.same_line()
 
-def _draw_button(app: App, icon: str, name: str, color: int | None = None, about: str = "") -> None:
-    """The button of a command. about: what more its tooltip says."""
-    # By its name: the keyboard stays with it where the icon changes.
-    if widgets.icon_button(f"{icon}###{name}", app.keys.hint(name) + about, color):
-        app.commands.of[name].act(app)
-    imgui.same_line()
+    def _draw_list_of_pace(self) -> None:
+        """Declare a button that opens how the scan plays."""
+        if widgets.icon_button(
+            f"{icons.ICON_FA_CARET_DOWN}###pace", "Playback options: loop, direction, speed"
+        ):
+            imgui.open_popup("how it plays")
+        corner = imgui.get_item_rect_min() - ImVec2(0, imgui.get_style().item_spacing.y)
+        imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(0, 1))
+        if imgui.begin_popup("how it plays"):
+            self._draw_pace()
+            imgui.end_popup()
+        imgui.same_line()
 
+    def _draw_track(self, width: float) -> None:
+        """Draw the frames over time: cached ones coloured, broken ones red, and seconds. A press or a drag
+        goes there; a tooltip describes the frame under the mouse."""
+        playback, palette, height = self.playback, self.window_look.palette, imgui.get_frame_height()
+        inset = ImVec2(_GRAB * _HANDLE * height, 0)  # so that handles at the ends are grabbed by either half
+        if width < 2 * inset.x + 1:
+            return
+        imgui.invisible_button("track", ImVec2(width, height))
+        spans = self.tools.spans
+        track = _Track(
+            playback.whole.edges, imgui.get_item_rect_min() + inset, ImVec2(width, height) - inset * 2
+        )
+        timeline, frame = playback.timeline, playback.whole.frame_at(track.time(imgui.get_mouse_pos().x))
+        if imgui.is_item_active() or imgui.is_item_deactivated():
+            storage, grabbed = imgui.get_state_storage(), imgui.get_id("grabbed")
+            if imgui.is_item_activated():
+                storage.set_int(grabbed, track.grabbed(playback.span, imgui.get_mouse_pos()))
+            if end := storage.get_int(grabbed):
+                playback.set_end(end == _LAST, frame)
+            else:
+                playback.seek(frame, time.monotonic())
+        if len(timeline) > 1:
+            if imgui.is_item_hovered():
+                self._draw_frame(frame, [span.words for span in spans if frame in span.frames])
+            track.seconds(float(timeline.times[0]), playback.span)
+        track.bar(0, len(playback.timeline), palette.frame[0])
+        for run in playback.timeline.cached():
+            track.bar(run.start, run.stop, palette.cached)
+        for index in playback.timeline.broken:
+            track.bar(index, index + 1, palette.broken)
+        for span in spans:
+            track.bar(span.frames.start, span.frames.stop, span.color, _SPANS)
+        if len(playback.timeline) > 1:
+            track.ends(playback.span, palette.accent)
+            track.head(playback.session.index, palette.text if playback.problem is None else palette.broken)
 
-def _draw_pace(app: App) -> None:
-    """Declare how it plays."""
-    pace, accent = app.session.pace, app.palette.accent
-    for icon, name, about in (
-        (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": start again at the end"),
-        (icons.ICON_FA_BACKWARD, "reverse", ""),
-        (icons.ICON_FA_FILM, "every_frame", ": show each one, even if that is slower"),
-    ):
-        _draw_button(app, icon, name, accent if getattr(pace, name) else None, about)
-    imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())
-    titles = {f"{speed:g}": f"{speed:.1f}x" for speed in (*SPEEDS, pace.speed)}
-    chosen = float(widgets.combo("speed", f"{pace.speed:g}", [f"{speed:g}" for speed in SPEEDS], titles))
-    hints = (app.keys.hint(name) for name in ("slower", "faster", "speed_1"))
-    widgets.tooltip("Playback speed. " + ", ".join(hints))
-    if chosen != pace.speed:
-        app.change_pace(speed=chosen)
-    imgui.same_line()
-
-
-def _draw_list_of_pace(app: App) -> None:
-    """Declare a button that opens how the scan plays."""
-    if widgets.icon_button(f"{icons.ICON_FA_CARET_DOWN}###pace", "Playback options: loop, direction, speed"):
-        imgui.open_popup("how it plays")
-    corner = imgui.get_item_rect_min() - ImVec2(0, imgui.get_style().item_spacing.y)
-    imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(0, 1))
-    if imgui.begin_popup("how it plays"):
-        _draw_pace(app)
-        imgui.end_popup()
-    imgui.same_line()
+    def _draw_frame(self, frame: int, marks: Sequence[str]) -> None:
+        """Describe a frame beside the mouse: a small picture, its time and its name, and its marks."""
+        timeline, camera = self.playback.timeline, self.session.document.camera
+        if imgui.begin_tooltip():
+            if camera is not None:
+                self.thumbnails.draw(timeline, frame, camera, self.viewport.aspect)
+            words = [frame_in_words(frame), timeline.label(frame)]
+            imgui.text("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words), *marks)))
+            imgui.end_tooltip()
 
 
 def _draw_place(playback: Playback, width: float) -> None:
@@ -154,52 +222,6 @@ def _report(playback: Playback) -> str:
 
 def _rates(shown: str, due: str, more: str) -> str:
     return f"playing {shown} of {due} frames/s ({more})"
-
-
-def _draw_track(app: App, width: float) -> None:
-    """Draw the frames over time: cached ones coloured, broken ones red, and seconds. A press or a drag goes
-    there; what is under the mouse is told."""
-    playback, palette, height = app.playback, app.palette, imgui.get_frame_height()
-    inset = ImVec2(_GRAB * _HANDLE * height, 0)  # so that handles at the ends are grabbed by either half
-    if width < 2 * inset.x + 1:
-        return
-    imgui.invisible_button("track", ImVec2(width, height))
-    spans = app.tools.spans
-    track = _Track(playback.whole.edges, imgui.get_item_rect_min() + inset, ImVec2(width, height) - inset * 2)
-    timeline, frame = playback.timeline, playback.whole.frame_at(track.time(imgui.get_mouse_pos().x))
-    if imgui.is_item_active() or imgui.is_item_deactivated():
-        storage, grabbed = imgui.get_state_storage(), imgui.get_id("grabbed")
-        if imgui.is_item_activated():
-            storage.set_int(grabbed, track.grabbed(playback.span, imgui.get_mouse_pos()))
-        if end := storage.get_int(grabbed):
-            playback.set_end(end == _LAST, frame)
-        else:
-            playback.seek(frame, time.monotonic())
-    if len(timeline) > 1:
-        if imgui.is_item_hovered():
-            _draw_frame(app, frame, [span.words for span in spans if frame in span.frames])
-        track.seconds(float(timeline.times[0]), playback.span)
-    track.bar(0, len(playback.timeline), palette.frame[0])
-    for run in playback.timeline.cached():
-        track.bar(run.start, run.stop, palette.cached)
-    for index in playback.timeline.broken:
-        track.bar(index, index + 1, palette.broken)
-    for span in spans:
-        track.bar(span.frames.start, span.frames.stop, span.color, _SPANS)
-    if len(playback.timeline) > 1:
-        track.ends(playback.span, palette.accent)
-        track.head(playback.session.index, palette.text if playback.problem is None else palette.broken)
-
-
-def _draw_frame(app: App, frame: int, marks: Sequence[str]) -> None:
-    """Tell of a frame beside the mouse: a small picture, its time and its name, and what it is marked for."""
-    timeline, camera = app.playback.timeline, app.document.camera
-    if imgui.begin_tooltip():
-        if camera is not None:
-            app.thumbnails.draw(timeline, frame, camera, app.viewport.aspect)
-        words = [frame_in_words(frame), timeline.label(frame)]
-        imgui.text("\n".join((f"{timeline.times[frame]:.2f} s", *dict.fromkeys(words), *marks)))
-        imgui.end_tooltip()
 
 
 class _Track:

@@ -3,33 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
-from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...document.document import Bookmark
 from .. import widgets
+from ..commands import Command, Item, Listing
+from ..part import WindowPart
 from ..session import Session
 from ..ui import Ui
-
-if TYPE_CHECKING:
-    from ..commands import Item
 
 _LONGEST = 60  # letters of a name
 
 
-class Bookmarks:
-    """Actions on the bookmarks of the document. tell: takes messages.
+@dataclass(eq=False)
+class Bookmarks(WindowPart):
+    """Actions on the bookmarks of the document.
 
     editing: the one whose name is being typed, None while none is.
     """
 
-    def __init__(self, session: Session, tell: Callable[[str], None]) -> None:
-        self._session, self._tell = session, tell
+    name = "bookmarks"
+    CONDITIONS = {"bookmarks": lambda bookmarks: bool(bookmarks.all)}
+    session: Session
+    note_of_scan: Callable[[str], None]
+
+    def __post_init__(self) -> None:
         self.editing: Bookmark | None = None
         self._is_asked = False  # for its name, but the field is not there yet
         self._last: Bookmark | None = None  # gone to or added
@@ -38,22 +41,22 @@ class Bookmarks:
     @property
     def all(self) -> tuple[Bookmark, ...]:
         """The bookmarks of the open scan."""
-        return self._session.document.bookmarks
+        return self.session.document.bookmarks
 
     def add(self) -> None:
         """Keep the camera under the next free name."""
-        camera = self._session.document.camera
+        camera = self.session.document.camera
         if camera is not None:
             names = {bookmark.name for bookmark in self.all}
             name = next(name for n in count(1) if (name := f"View {n}") not in names)
             self._last = Bookmark(name, camera)
-            self._session.change("Add bookmark", bookmarks=(*self.all, self._last))
-            self._tell(f"Bookmark '{name}' added.")
+            self.session.change("Add bookmark", bookmarks=(*self.all, self._last))
+            self.note_of_scan(f"Bookmark '{name}' added.")
 
     def go_to(self, bookmark: Bookmark) -> None:
         """Look from there."""
         self._last = bookmark
-        self._session.change("Go to bookmark", camera=bookmark.camera, pivot=None)
+        self.session.change("Go to bookmark", camera=bookmark.camera, pivot=None)
 
     def step(self, direction: int) -> None:
         """Go to the next one for 1, the previous for -1, round the end."""
@@ -68,13 +71,13 @@ class Bookmarks:
             named = replace(self.all[number], name=name)
             self._last = named if self._last == self.all[number] else self._last
             renamed = *self.all[:number], named, *self.all[number + 1 :]
-            self._session.change("Rename bookmark", bookmarks=renamed)
+            self.session.change("Rename bookmark", bookmarks=renamed)
 
     def delete(self, number: int) -> None:
         """Forget one."""
-        self._tell(f"Bookmark '{self.all[number].name}' deleted.")
+        self.note_of_scan(f"Bookmark '{self.all[number].name}' deleted.")
         left = *self.all[:number], *self.all[number + 1 :]
-        self._session.change("Delete bookmark", bookmarks=left)
+        self.session.change("Delete bookmark", bookmarks=left)
 
     def items(self) -> Iterator[Item]:
         """Bookmarks for a menu."""
@@ -83,7 +86,7 @@ class Bookmarks:
 
     def is_shown(self, bookmark: Bookmark) -> bool:
         """Whether the view is that of a bookmark."""
-        return self._session.document.camera == bookmark.camera
+        return self.session.document.camera == bookmark.camera
 
     # --- the section of the panel -----------------------------------------------------
 
@@ -101,7 +104,7 @@ class Bookmarks:
             imgui.pop_id()
         if deleted is not None:
             self.delete(deleted)
-        imgui.begin_disabled(self._session.document.camera is None)
+        imgui.begin_disabled(self.session.document.camera is None)
         if imgui.button(f"{icons.ICON_FA_PLUS}  Add"):
             self.add()
         imgui.end_disabled()
@@ -134,3 +137,12 @@ class Bookmarks:
             if not imgui.is_key_pressed(imgui.Key.escape):
                 self.rename(number, self._text)
             self.editing = None
+
+    COMMANDS = (
+        Command("bookmark_add", "Add this view", add, "Ctrl+B", "view"),
+        Command("bookmark_next", "Next", lambda bookmarks: bookmarks.step(1), "N", "bookmarks"),
+        Command(
+            "bookmark_previous", "Previous", lambda bookmarks: bookmarks.step(-1), "Shift+N", "bookmarks"
+        ),
+        Listing("Go to", items, "bookmarks"),
+    )

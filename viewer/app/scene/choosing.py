@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass
 from functools import cached_property
 from statistics import median
 from typing import Any
@@ -17,8 +18,12 @@ from ...choice.seen import ScanInView
 from ...drawing.request import Request, view_of
 from ...errors import InputError
 from ...task import Task, in_background
+from ..commands import Command
+from ..part import WindowPart
 from ..playing.playback import Playback
 from ..session import Session
+from .activity import Activity
+from .rendering import Rendering
 from .viewport import Viewport
 
 _REST = 0.2  # seconds after the last picture
@@ -27,7 +32,8 @@ _OVER = 1.5  # times the limit: what pictures take from then on is told
 _SCALES = (1.0,)  # pictures at rest have all their pixels, and in motion those that there is time for
 
 
-class Choosing:
+@dataclass(eq=False)
+class Choosing(WindowPart):
     """Chooses the way that the scan is drawn in, as long as the document has a goal.
 
     comparison: of all ways in the view that is shown, or was at rest last; choice: of one of them; both None
@@ -35,11 +41,17 @@ class Choosing:
     overrun: words on pictures that take far longer than the limit, empty where they do not.
     """
 
-    def __init__(
-        self, session: Session, playback: Playback, viewport: Viewport, note: Callable[[str], None]
-    ) -> None:
-        """note: tells the user something."""
-        self._session, self._playback, self._viewport, self._note = session, playback, viewport, note
+    name = "choosing"
+    doing = "Choosing the renderer"
+    OFFERS = {"choice_of": "choice_of"}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    rendering: Rendering
+    activity: Activity
+    note_of_scan: Callable[[str], None]
+
+    def __post_init__(self) -> None:
         self._forget()
 
     def _forget(self) -> None:
@@ -58,7 +70,7 @@ class Choosing:
     def _model(self) -> Model | str:
         """The model of the device, or why there is none."""
         try:
-            return model_of(self._viewport.renderer.gpu)
+            return model_of(self.viewport.renderer.gpu)
         except InputError as error:
             return f"{error.what[:1].upper()}{error.what[1:]}. {error.hint}, and start Scan4D again"
 
@@ -75,20 +87,20 @@ class Choosing:
     @property
     def is_due(self) -> bool:
         """Whether there is something to choose for what is shown, once it is at rest."""
-        is_wanted = self._session.document.goal is not None and not self.why_not
-        return is_wanted and self._viewport.is_there and (self.waits or not self._has_looked)
+        is_wanted = self.session.document.goal is not None and not self.why_not
+        return is_wanted and self.viewport.is_there and (self.waits or not self._has_looked)
 
     @property
     def _has_looked(self) -> bool:
         """Whether what is shown is what was looked at, but for how it is drawn."""
-        now, before = self._viewport.request, self._request
-        if now is None or before is None or self._size != self._viewport.size:
+        now, before = self.viewport.request, self._request
+        if now is None or before is None or self._size != self.viewport.size:
             return False
         return (now.pose, now.camera, now.layers) == (before.pose, before.camera, before.layers)
 
-    def advance(self, at_rest: bool, now: float) -> bool:
+    def advance(self, now: float) -> bool:
         """Look at the view, or choose; whether something else was chosen or is to be shown."""
-        document, viewport = self._session.document, self._viewport
+        document, viewport = self.session.document, self.viewport
         if document.goal is None or self.why_not:
             if self._compared is not None or self._request is not None:
                 self._forget()
@@ -100,14 +112,14 @@ class Choosing:
             seeing, self._seeing = self._seeing, None
             found = seeing.result()
             self._seen = found if self._has_looked else None
-        elif self._seeing is None and at_rest and is_whole and not self._has_looked:
+        elif self._seeing is None and self.activity.rests(now) and is_whole and not self._has_looked:
             self._look()
         is_known = self._seen is not None and self._has_looked
         return is_known and self._choose(document.goal)
 
     def _look(self) -> None:
         """Begin to find out what is known of the view, on a thread of its own."""
-        request, size = self._viewport.request, self._viewport.size
+        request, size = self.viewport.request, self.viewport.size
         assert request is not None
         self._request, self._size, self._seen = request, size, None
         view = view_of(request, size)
@@ -115,7 +127,7 @@ class Choosing:
 
     def _choose(self, goal: Goal) -> bool:
         """Choose by what is known of the view, unless that was done."""
-        unit, seen = self._playback.unit, self._seen
+        unit, seen = self.playback.unit, self._seen
         if (asked := (goal, unit, seen)) == self._compared:
             return self._apply()  # undo may bring back a document that another way draws
         is_same_goal = self._compared is None or self._compared[:2] == asked[:2]
@@ -131,21 +143,21 @@ class Choosing:
             self.problem = error.what
             return True
         self.problem = ""
-        present = self._session.document.way if is_same_goal else None
+        present = self.session.document.way if is_same_goal else None
         self.choice = self.comparison.settled(present)
         self._apply()
         return True
 
     def _apply(self) -> bool:
         """Have the document drawn as it was chosen; whether it is drawn otherwise so far."""
-        if self.choice is None or self.choice.way == self._session.document.way:
+        if self.choice is None or self.choice.way == self.session.document.way:
             return False
-        self._session.amend(way=self.choice.way)
+        self.session.amend(way=self.choice.way)
         return True
 
     def _note_time(self) -> None:
         """Take down what the last picture took, where it was drawn in full by a way."""
-        viewport, way = self._viewport, self._session.document.way
+        viewport, way = self.viewport, self.session.document.way
         surface, request = viewport.surface, viewport.request
         if viewport.number == self._timed or way is None or surface is None or request is None:
             return
@@ -165,7 +177,7 @@ class Choosing:
         busy = "This computer is busy, or slower than when it was measured (scan4d bench --calibrate)."
         self.overrun = f"Pictures take {ms:.0f} ms; the limit is {goal}. {busy}" if is_over else ""
         if self.overrun and not before:
-            self._note(self.overrun)
+            self.note_of_scan(self.overrun)
 
     @property
     def measured_ms(self) -> float | None:
@@ -177,7 +189,15 @@ class Choosing:
     def choice_of(self, request: Request) -> Choice | None:
         """The choice that the picture that is shown was drawn by; None where it was made for another view, or
         a user or the scan says how it is drawn."""
-        if self.choice is None or self._session.document.goal is None or not self._has_looked:
+        if self.choice is None or self.session.document.goal is None or not self._has_looked:
             return None
         way = self.choice.way
         return self.choice if (request.backend, request.params) == (way.backend, way.params) else None
+
+    COMMANDS = (
+        Command(
+            "automatic", "Automatic renderer", lambda choosing: choosing.rendering.switch_automatic(),
+            is_on=lambda choosing: choosing.session.document.goal is not None,
+            can=lambda choosing: not choosing.why_not or choosing.session.document.goal is not None,
+        ),
+    )  # fmt: skip

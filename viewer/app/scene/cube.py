@@ -6,7 +6,8 @@ letters are slanted rectangles of the font's picture.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -15,12 +16,13 @@ from numpy.typing import NDArray
 from ...camera import Camera
 from ...output.labels import CUBE_ROOM
 from .. import theme, widgets
+from ..commands import Command
+from ..part import WindowPart, remembered
+from ..session import Session
+from ..window_look import WindowLook
 from . import navigation, orientation
 from .orientation import Direction
-
-if TYPE_CHECKING:
-    from ...document.document import Document
-    from .steering import Steering
+from .steering import Steering
 
 _HALF = 1.55  # of an edge, in heights of the font
 _REACH = _HALF * 3**0.5  # of the corners from the centre
@@ -30,21 +32,74 @@ _READABLE = 0.3  # cosine between line of sight and face from which its label is
 SHADE = 0.24  # how much darker a face is that is seen from the side
 
 
-class OrientationCube:
-    """The state of the cube: what the mouse does with it.
+@dataclass(eq=False)
+class OrientationCube(WindowPart):
+    """The cube, and what the mouse does with it.
 
-    is_shown: by the user's choice. is_held: the button went down on it. is_dragged: the camera follows the
-    mouse. on_up: the mouse is on the button below it.
+    is_held: the button went down on it; while it is dragged, `steering.is_turned` is true. on_up: the mouse
+    is on the button below it. under_mouse: the part of the cube that is, None where none is.
     """
 
-    def __init__(self, is_shown: bool) -> None:
-        self.is_shown: bool = is_shown
-        self.is_held = self.is_dragged = self.on_up = False
-        self.under_mouse: Direction | None = None
+    name = "cube"
+    session: Session
+    steering: Steering
+    window_look: WindowLook
+    is_shown: bool = remembered(True)
+    is_held: bool = field(default=False, init=False)
+    on_up: bool = field(default=False, init=False)
+    under_mouse: Direction | None = field(default=None, init=False)
 
     def toggle(self) -> None:
         """Show it, or hide it."""
         self.is_shown = not self.is_shown
+
+    def take_mouse(self, seen: Camera | None, size: ImVec2, is_drawn: bool) -> None:
+        """Let the mouse click and drag the cube; declare this before the view, so that it comes first.
+
+        seen: the camera that the picture shows, which the document's may be ahead of; None before there is
+        one. size: of the view. is_drawn: whether the cube is.
+        """
+        document, steering = self.session.document, self.steering
+        where, camera = cube_place(size.x, size.y, imgui.get_font_size()), document.camera
+        self.under_mouse = None
+        if camera is None or seen is None or where is None or not is_drawn:
+            self.is_held = steering.is_turned = False
+            return
+        x, y, half = where
+        mouse = imgui.get_mouse_pos() - imgui.get_window_pos() - ImVec2(x, y)
+        turned = orientation.rotation(seen, document.look.up, document.front)
+        under = orientation.part_at(turned, mouse.x / half, -mouse.y / half)
+        if under is None and not self.is_held:
+            return
+        before, reach = imgui.get_cursor_pos(), half * 3**0.5
+        imgui.set_cursor_pos(ImVec2(x - reach, y - reach))
+        clicked = imgui.invisible_button("cube", ImVec2(2 * reach, 2 * reach))
+        imgui.set_cursor_pos(before)
+        self.is_held = imgui.is_item_active()
+        if imgui.is_item_hovered() or self.is_held:
+            self.under_mouse = under
+        if clicked and under is not None and not steering.is_turned:
+            steering.look_from(*orientation.angles(under))
+        steering.is_turned = self.is_held and (steering.is_turned or imgui.is_mouse_dragging(0))
+        if steering.is_turned:
+            steering.turntable.stop()
+            # The cube's surface follows the mouse.
+            delta = imgui.get_io().mouse_delta / (2 * reach)
+            steering.move("Turn view", navigation.orbit(camera, delta.x, -delta.y, document.pivot))
+        elif under is not None:
+            widgets.tooltip(f"Look from {orientation.name(under)}")
+
+    def draw(self, seen: Camera | None, size: ImVec2) -> None:
+        """Draw the cube over the view in the current ImGui window. seen, size: as for `take_mouse`."""
+        document, where = self.session.document, cube_place(size.x, size.y, imgui.get_font_size())
+        if seen is None or where is None:
+            return
+        x, y, half = where
+        turned = orientation.rotation(seen, document.look.up, document.front)
+        corner = imgui.get_window_pos() + ImVec2(x, y)
+        _Drawing(self, self.window_look.palette, turned, corner, half).draw()
+
+    COMMANDS = (Command("cube", "Orientation cube", toggle, is_on=lambda cube: cube.is_shown),)
 
 
 def cube_place(width: float, height: float, em: float) -> tuple[float, float, float] | None:
@@ -56,57 +111,6 @@ def cube_place(width: float, height: float, em: float) -> tuple[float, float, fl
         return None
     inset = (_REACH + _MARGIN) * em
     return width - inset, inset, _HALF * em
-
-
-def take_mouse(
-    steering: Steering, document: Document, seen: Camera | None, size: ImVec2, is_drawn: bool
-) -> None:
-    """Let the mouse click and drag the cube; declare this before the view, so that it comes first.
-
-    seen: the camera that the picture shows, which the document's may be ahead of; None before there is one.
-    size: of the view. is_drawn: whether the cube is.
-    """
-    cube, camera = steering.cube, document.camera
-    where = cube_place(size.x, size.y, imgui.get_font_size())
-    cube.under_mouse = None
-    if camera is None or seen is None or where is None or not is_drawn:
-        cube.is_held = cube.is_dragged = False
-        return
-    x, y, half = where
-    mouse = imgui.get_mouse_pos() - imgui.get_window_pos() - ImVec2(x, y)
-    turned = orientation.rotation(seen, document.look.up, document.front)
-    under = orientation.part_at(turned, mouse.x / half, -mouse.y / half)
-    if under is None and not cube.is_held:
-        return
-    before, reach = imgui.get_cursor_pos(), half * 3**0.5
-    imgui.set_cursor_pos(ImVec2(x - reach, y - reach))
-    clicked = imgui.invisible_button("cube", ImVec2(2 * reach, 2 * reach))
-    imgui.set_cursor_pos(before)
-    cube.is_held = imgui.is_item_active()
-    if imgui.is_item_hovered() or cube.is_held:
-        cube.under_mouse = under
-    if clicked and under is not None and not cube.is_dragged:
-        steering.look_from(*orientation.angles(under))
-    cube.is_dragged = cube.is_held and (cube.is_dragged or imgui.is_mouse_dragging(0))
-    if cube.is_dragged:
-        steering.turntable.stop()
-        # The cube's surface follows the mouse.
-        delta = imgui.get_io().mouse_delta / (2 * reach)
-        steering.move("Turn view", navigation.orbit(camera, delta.x, -delta.y, document.pivot))
-    elif under is not None:
-        widgets.tooltip(f"Look from {orientation.name(under)}")
-
-
-def draw(
-    cube: OrientationCube, document: Document, seen: Camera | None, palette: theme.Palette, size: ImVec2
-) -> None:
-    """Draw a cube over the view in the current ImGui window. seen, size: as for `take_mouse`."""
-    where = cube_place(size.x, size.y, imgui.get_font_size())
-    if seen is None or where is None:
-        return
-    x, y, half = where
-    turned = orientation.rotation(seen, document.look.up, document.front)
-    _Drawing(cube, palette, turned, imgui.get_window_pos() + ImVec2(x, y), half).draw()
 
 
 class _Drawing:

@@ -6,24 +6,31 @@ The document has the new camera from the beginning; only what is drawn lags behi
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...camera import Camera
 from ...geometry import vector
+from ...scan.timeline import Timeline
+from ..commands import Command
+from ..part import WindowPart, remembered
 
 SECONDS = 0.2
 _STEP = 1 / 60  # seconds between pictures at least
 _SAME = 1e-9  # of the distance to the target, and of a turn
 
 
-class Glide:
-    """Follows the document's camera. is_wanted: whether views glide, by the user's choice."""
+@dataclass(eq=False)
+class Glide(WindowPart):
+    """Follows the document's camera."""
 
-    def __init__(self, is_wanted: bool) -> None:
-        self.is_wanted: bool = is_wanted
+    name = "glide"
+    doing = "Gliding"
+    is_wanted: bool = remembered(True)  # whether views glide
+
+    def __post_init__(self) -> None:
         self._start: Camera | None = None  # None while nothing glides
         self._end: Camera | None = None
         self._shown: Camera | None = None
@@ -60,9 +67,15 @@ class Glide:
             self._shown = between(self._start, camera, share * share * (3 - 2 * share))
         return self._shown
 
-    def end(self) -> None:
-        """Show the next camera as it is, since another scan is shown."""
+    def advance(self, now: float) -> bool:
+        """Whether a view glides."""
+        return self.is_on
+
+    def begin_scan(self, timeline: Timeline) -> None:
+        """Show the next camera as it is."""
         self._start = self._end = self._shown = None
+
+    COMMANDS = (Command("glide", "Animate view changes", toggle, is_on=lambda glide: glide.is_wanted),)
 
 
 def _differ(one: Camera, other: Camera) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from ...output import marks
 from ...output.labels import Box
 from ...output.legend import Color, Legend, Marks
+from ..commands import Command
+from ..part import WindowPart, remembered
 from ..playing.playback import Playback
 from ..playing.ranging import Ranging
 from ..session import Session
@@ -28,28 +30,31 @@ _OF_TOOLS = (
 _STEPS = 32  # of a colour bar; colours between them are blended
 
 
-class ViewMarks:
+def _mark(name: str, title: str, key: str) -> Command:
+    """Shows one of the marks over the view."""
+    return Command(
+        name, title, lambda marks: marks.toggle(name), key, is_on=lambda marks: getattr(marks.shown, name)
+    )
+
+
+@dataclass(eq=False)
+class ViewMarks(WindowPart):
     """The marks over the view.
 
-    shown: which of them are, by the user's choice. in_files: whether saved pictures and recordings have them.
-    boxes: where they were drawn last, pixels from the view's upper left corner.
+    shown: those that the view has. boxes: where they were drawn last, pixels from the view's upper left
+    corner.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        viewport: Viewport,
-        steering: Steering,
-        ranging: Ranging,
-        shown: Marks,
-        in_files: bool,
-    ) -> None:
-        self._session, self._playback, self._viewport = session, playback, viewport
-        self._steering, self._ranging = steering, ranging
-        self.shown = shown
-        self.in_files: bool = in_files
-        self.boxes: list[Box] = []
+    name = "marks"
+    OFFERS = {"marks_of_files": "of_files"}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    steering: Steering
+    ranging: Ranging
+    shown: Marks = remembered(factory=lambda: SHOWN_FIRST)
+    in_files: bool = remembered(True)  # whether saved pictures and recordings have the marks
+    boxes: list[Box] = field(default_factory=list, init=False)
 
     @property
     def of_files(self) -> Marks:
@@ -67,22 +72,31 @@ class ViewMarks:
 
     def draw(self, size: ImVec2) -> None:
         """Draw the marks of the picture into the current ImGui window, the 3D view. size: of the view."""
-        request, surface = self._viewport.request, self._viewport.surface
-        camera, self.boxes = self._session.document.camera, []
-        if camera is None or request is None or surface is None or not self._viewport.is_there:
+        request, surface = self.viewport.request, self.viewport.surface
+        camera, self.boxes = self.session.document.camera, []
+        if camera is None or request is None or surface is None or not self.viewport.is_there:
             return
-        pose, scale, count = request.pose, self._playback.scale, len(self._playback.timeline)
+        pose, scale, count = request.pose, self.playback.scale, len(self.playback.timeline)
         told = Legend(
             self.shown, camera, surface.look, scale.unit, pose.index, count, float(pose.time),
-            self._ranging.words(), factor=scale.factor,
+            self.ranging.words(), factor=scale.factor,
         )  # fmt: skip
         corner = imgui.get_window_pos()
         canvas = _View(corner)
         self.boxes = marks.draw(canvas, (size.x, size.y), told, surface.color_range, surface.value_kind)
-        if self.shown.scale_bar and self._steering.gesture is None and imgui.is_window_hovered():
+        if self.shown.scale_bar and self.steering.gesture is None and imgui.is_window_hovered():
             left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
             if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):
-                imgui.set_tooltip(_scale_bar_help(self._steering.is_orthographic))
+                imgui.set_tooltip(_scale_bar_help(self.steering.is_orthographic))
+
+    COMMANDS = (
+        _mark("scale_bar", "Scale bar", "S"),
+        _mark("color_bar", "Colour bar", "C"),
+        Command(
+            "marks_in_files", "Include overlays in screenshots", toggle_in_files,
+            is_on=lambda marks: marks.in_files,
+        ),
+    )  # fmt: skip
 
 
 def _scale_bar_help(orthographic: bool) -> str:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
+from dataclasses import dataclass
 
 from ...analysis.pick import Picked
 from ...scan.times import frame_in_words
 from ...scan.units import Scale
+from ..commands import Command
+from ..part import WindowPart, remembered
 from ..playing.playback import Playback
 from .viewport import Viewport
 
@@ -16,16 +19,19 @@ log = logging.getLogger(__name__)
 _DIGITS = 4  # of positions, after the leading digit of the scan's radius
 
 
-class Pointer:
-    """The place of the picture that is under the mouse.
+@dataclass(eq=False)
+class Pointer(WindowPart):
+    """The position in the picture that is under the mouse.
 
-    picked: what is seen there, None where nothing is. words: the same for users. has_details: whether these
-    have all that is known of the point, by the user's choice.
+    picked: what is seen there, None where nothing is. words: the same for users.
     """
 
-    def __init__(self, viewport: Viewport, playback: Playback, has_details: bool = False) -> None:
-        self._viewport, self._playback = viewport, playback
-        self.has_details: bool = has_details
+    name = "pointer"
+    viewport: Viewport
+    playback: Playback
+    has_details: bool = remembered(False)  # whether the words have all that is known of the point
+
+    def __post_init__(self) -> None:
         self.picked: Picked | None = None
         self.words: list[str] = []
         self._told: tuple[Scale, bool] | None = None  # the unit of the words, and whether they have details
@@ -36,23 +42,30 @@ class Pointer:
 
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
-        picked = self._viewport.pick(pixel) if pixel else None
-        told = self._playback.scale, self.has_details
+        picked = self.viewport.pick(pixel) if pixel else None
+        told = self.playback.scale, self.has_details
         if picked is self.picked and told == self._told:
             return
         self.picked, self.words, self._told = picked, [], told
-        if picked is not None and (request := self._viewport.request) is not None:
+        if picked is not None and (request := self.viewport.request) is not None:
             pose = request.pose
-            frame = f"{frame_in_words(pose.index)}/{len(self._playback.timeline)}"
-            radius, shown = self._viewport.bounds(pose).radius, request.look.color_by
-            self.words = describe_pick(picked, frame, self._playback.scale, radius, shown)
+            frame = f"{frame_in_words(pose.index)}/{len(self.playback.timeline)}"
+            radius, shown = self.viewport.bounds(pose).radius, request.look.color_by
+            self.words = describe_pick(picked, frame, self.playback.scale, radius, shown)
             if self.has_details:
                 self.words += point_details(picked, shown)
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
         """The place under the mouse in the picture in full."""
-        return self._viewport.pick_in_full() or self.picked
+        return self.viewport.pick_in_full() or self.picked
+
+    COMMANDS = (
+        Command(
+            "point_details", "Point details in status bar", toggle_details,
+            is_on=lambda pointer: pointer.has_details,
+        ),
+    )  # fmt: skip
 
 
 def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown: str = "") -> list[str]:

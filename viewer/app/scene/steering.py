@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
+from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
 from ...bounds import Bounds
@@ -18,100 +20,132 @@ from ...scan.pods import first_camera, subject_of
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
 from ...scan.upright import Upright, upright_camera
-from ..playing.playback import Playback
+from ..commands import Command, Listing
+from ..part import WindowPart, remembered
+from ..playing.playback import FRAMES, Playback
 from ..session import Session
 from . import navigation, orientation
-from .cube import OrientationCube
 from .extent import Extent
 from .pointed import Pointer
-from .turntable import Turntable
+from .turntable import USUAL, Turntable, TurnTime
 from .viewport import Viewport
 
 _STEP = 1 / 12  # heights of the view that a key moves by: 15 degrees
+_SIDES = {"left": (-1, 0), "right": (1, 0), "up": (0, 1), "down": (0, -1)}
 _PAUSE = 0.5  # seconds without the wheel or a key that moves, after which these are another step
 
 
-class Steering:
+def _view(number: int, side: str) -> Command:
+    """Shows the subject from a side."""
+    return Command(
+        f"view_{side}", side.capitalize(), lambda steering: steering.look_from(*navigation.VIEWS[side]),
+        f"Ctrl+{number}", "view",
+    )  # fmt: skip
+
+
+def _nudge(gesture: str, title: str, side: str, key: str) -> Command:
+    """Moves the view as a short drag to a side does."""
+    return Command(
+        f"{gesture}_{side}", title, lambda steering: steering.nudge(gesture, *_SIDES[side]), key, "view",
+        repeats=True,
+    )  # fmt: skip
+
+
+@dataclass(eq=False)
+class Steering(WindowPart):
     """Moves the camera of the document.
 
-    gesture: what a drag in the view does, None without one. cube, turntable: how the view is turned, beside
-    drags in it. extent: what it is fitted to. follows: whether it goes with the subject from frame to frame.
+    up: the up axis of all scans that the command line states, None without one. gesture: what a drag in the
+    view does, None without one. is_turned: whether the cube is dragged. turntable: turns the view by itself.
+    extent: what the view is fitted to. follows: whether it goes with the subject from frame to frame.
     """
 
-    def __init__(
-        self,
-        session: Session,
-        playback: Playback,
-        viewport: Viewport,
-        pointer: Pointer,
-        cube: bool,
-        turn_seconds: float,
-        up_is_told: bool,
-        note: Callable[[str], None],
-    ) -> None:
-        """cube: whether it is shown. turn_seconds: that the turntable takes. up_is_told: whether the user
-        tells what is up in all scans. note: tells the user something."""
-        self._session, self._playback, self._viewport, self._pointer = session, playback, viewport, pointer
+    name = "steering"
+    doing = "Turning"
+    CONDITIONS = {"view": lambda steering: steering.session.document.camera is not None}
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    pointer: Pointer
+    up: str | None
+    note_of_scan: Callable[[str], None]
+    turn_seconds: TurnTime = remembered(USUAL)  # that the turntable takes
+
+    def __post_init__(self) -> None:
         self.gesture: str | None = None
-        self.cube: OrientationCube = OrientationCube(cube)
-        self.turntable: Turntable = Turntable(turn_seconds)
+        self.is_turned = False
+        self.turntable: Turntable = Turntable(self.turn_seconds)
         self.extent: Extent = Extent()
         self.follows: bool = False
         self._followed: Pose | None = None  # where the camera is with the subject
         self._first: Camera | None = None  # that a scan was first shown with
-        self._is_checked, self._up_is_told, self._note = False, up_is_told, note
+        self._is_checked = False
         self._stepped = -math.inf  # by the clock, when the wheel or a key moved it last
+
+    def remembered(self) -> dict[str, Any]:
+        """The values that come back at the next start."""
+        return {"turn_seconds": self.turntable.seconds}
+
+    def next_change(self, now: float) -> float:
+        """Seconds until the turntable turns on."""
+        return self.turntable.next_change(now)
+
+    def close(self) -> None:
+        """Visit no more frames."""
+        self.extent.close()
 
     @property
     def moves(self) -> bool:
         """Whether the camera is dragged or turns by itself."""
-        return self.gesture is not None or self.cube.is_dragged or self.turntable.is_on
+        return self.gesture is not None or self.is_turned or self.turntable.is_on
 
     @property
     def _up(self) -> str:
-        return self._session.document.look.up
+        return self.session.document.look.up
 
     @property
     def is_orthographic(self) -> bool:
         """Whether the camera's projection is."""
-        camera = self._session.document.camera
+        camera = self.session.document.camera
         return camera is not None and camera.projection == "orthographic"
 
     def bounds(self, pose: Pose) -> Bounds:
         """The robust bounds of a pose, where tools move it to."""
-        return self._session.laid.layers(pose).world_from_pose.bounds(self._viewport.bounds(pose))
+        return self.session.laid.layers(pose).world_from_pose.bounds(self.viewport.bounds(pose))
 
     def whole(self, pose: Pose) -> Bounds:
         """The bounds of all frames together, as far as they are known; of the pose alone where tools move it,
         or the view goes with the subject."""
-        is_moved = not self._session.laid.layers(pose).world_from_pose.is_identity
+        is_moved = not self.session.laid.layers(pose).world_from_pose.is_identity
         return self.bounds(pose) if is_moved or self.follows else self.extent.around(self.bounds(pose))
 
     def fit(self) -> None:
         """Show the subject from the same side: all of the scan, or of one depth camera's what it looks at."""
-        pose, camera = self._playback.pose, self._session.document.camera
+        pose, camera = self.playback.pose, self.session.document.camera
         if not (pose and camera):
             return
         framed = self._framing(camera, pose)
-        place = self._session.laid.layers(pose).world_from_pose
+        place = self.session.laid.layers(pose).world_from_pose
         places = np.abs(framed.places_in_picture(place.points(pose.sample + pose.origin)))
-        if self._subject(pose) is not None and not (places <= (self._viewport.aspect / 2, 0.5)).all():
-            self._note("The view shows what the depth camera looks at. Zoom out to see the rest of the scan.")
-        self._session.change("Fit", camera=framed, pivot=None)
+        if self._subject(pose) is not None and not (places <= (self.viewport.aspect / 2, 0.5)).all():
+            self.note_of_scan(
+                "The view shows what the depth camera looks at. Zoom out to see the rest of the scan."
+            )
+        self.session.change("Fit", camera=framed, pivot=None)
 
     def open_view(self) -> None:
         """Show the frame as a scan is first shown: as its pods see it, or from the front."""
-        if pose := self._playback.pose:
+        if pose := self.playback.pose:
             self._first = self._first_camera(pose)
-            self._session.change("Opening view", camera=self._first, pivot=None)
+            self.session.change("Opening view", camera=self._first, pivot=None)
 
     def _framing(self, camera: Camera, pose: Pose) -> Camera:
         """Move a camera, in the same direction, to where it shows the subject."""
         subject = self._subject(pose)
         if subject is None:
-            return camera.fit(self.whole(pose), self._viewport.aspect)
-        place = self._session.laid.layers(pose).world_from_pose
-        return camera.framing(place.points(subject), self._viewport.aspect)
+            return camera.fit(self.whole(pose), self.viewport.aspect)
+        place = self.session.laid.layers(pose).world_from_pose
+        return camera.framing(place.points(subject), self.viewport.aspect)
 
     def _subject(self, pose: Pose) -> NDArray[np.float64] | None:
         """The points of what one depth camera looks at, as of `subject_of`."""
@@ -119,26 +153,26 @@ class Steering:
 
     def look_from(self, azimuth: float, elevation: float) -> None:
         """Show the subject from a direction in degrees, such as those of `navigation.VIEWS`."""
-        pose, camera = self._playback.pose, self._session.document.camera
+        pose, camera = self.playback.pose, self.session.document.camera
         if pose and camera:
-            bounds, aspect = self.whole(pose), self._viewport.aspect
-            azimuth += self._session.document.front
+            bounds, aspect = self.whole(pose), self.viewport.aspect
+            azimuth += self.session.document.front
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
-            self._session.change("Look from side", camera=self._framing(turned, pose), pivot=None)
+            self.session.change("Look from side", camera=self._framing(turned, pose), pivot=None)
 
     def set_up(self, up: str) -> None:
         """Say what is up, as `up_vector` takes it, and show the subject upright, from the front."""
-        pose, camera = self._playback.pose, self._session.document.camera
-        look = replace(self._session.document.look, up=up)
+        pose, camera = self.playback.pose, self.session.document.camera
+        look = replace(self.session.document.look, up=up)
         if pose and camera:
-            turned = upright_camera(camera, self.whole(pose), self._viewport.aspect, up)
+            turned = upright_camera(camera, self.whole(pose), self.viewport.aspect, up)
             camera = self._framing(turned, pose)
-        self._session.change("Turn upright", look=look, camera=camera, pivot=None, front=0.0)
+        self.session.change("Turn upright", look=look, camera=camera, pivot=None, front=0.0)
 
     def set_front(self) -> None:
         """Say that the scan is seen from the front now."""
-        if camera := self._session.document.camera:
-            self._session.change("Set front", front=orientation.azimuth_of(camera, self._up))
+        if camera := self.session.document.camera:
+            self.session.change("Set front", front=orientation.azimuth_of(camera, self._up))
 
     def ups(self) -> Iterator[tuple[str, Callable[[], object], bool]]:
         """Axes to choose from which is up: title, what it does, whether it is the one."""
@@ -147,8 +181,8 @@ class Steering:
 
     def project(self, projection: str) -> None:
         """Show the same in a projection of `camera.PROJECTIONS`."""
-        if camera := self._session.document.camera:
-            self._session.change("Change projection", camera=camera.projected(projection))
+        if camera := self.session.document.camera:
+            self.session.change("Change projection", camera=camera.projected(projection))
 
     def switch_projection(self) -> None:
         """Perspective to orthographic and back."""
@@ -156,19 +190,19 @@ class Steering:
 
     def set_pivot(self) -> None:
         """Orbit about the surface under the mouse from now on; the picture stays as it is."""
-        camera, picked = self._session.document.camera, self._pointer.in_full()
+        camera, picked = self.session.document.camera, self.pointer.in_full()
         if picked and camera:
-            self._session.change("Set pivot", camera=camera.focused(picked.place), pivot=picked.place)
+            self.session.change("Set pivot", camera=camera.focused(picked.place), pivot=picked.place)
 
     def center(self) -> None:
         """Bring what is under the mouse to the middle of the view, and orbit about it from now on."""
-        camera, picked = self._session.document.camera, self._pointer.in_full()
+        camera, picked = self.session.document.camera, self.pointer.in_full()
         if picked and camera:
-            self._session.change("Centre on point", camera=camera.centered(picked.place), pivot=picked.place)
+            self.session.change("Centre on point", camera=camera.centered(picked.place), pivot=picked.place)
 
     def toggle_following(self) -> None:
         """Go with the subject from now on, or stay."""
-        self.follows, self._followed = not self.follows, self._playback.pose
+        self.follows, self._followed = not self.follows, self.playback.pose
 
     def toggle_turntable(self) -> None:
         """Turn the view round the subject from now on, or stop."""
@@ -180,32 +214,32 @@ class Steering:
     def advance(self, now: float) -> bool:
         """Turn the view as far as the turntable has, and show the scan whole once it is known how far it
         reaches, if the view is still the first; whether it has changed."""
-        pose, document = self._playback.pose, self._session.document
+        pose, document = self.playback.pose, self.session.document
         if document.camera is None:
             return False
         if self.extent.take_visited() and pose is not None and document.camera is self._first:
-            self._session.amend(camera=self._first_camera(pose))
+            self.session.amend(camera=self._first_camera(pose))
             return True
         turned = self.turntable.turned(document.camera, document.pivot, now)
-        self._session.change("Turntable", merge="turntable", camera=turned)
+        self.session.change("Turntable", merge="turntable", camera=turned)
         return turned is not document.camera
 
     def move(self, name: str, camera: Camera) -> None:
         """Follow the mouse; what it does without a pause is one step of the history. name: of that."""
-        self._session.change(name, merge=name, camera=camera)
+        self.session.change(name, merge=name, camera=camera)
 
     def drag(self, gesture: str, right: float, up: float, radius: float) -> None:
         """Follow a drag, see `navigation.drag`. right, up: in heights of the view. radius: of the scan."""
-        if camera := self._session.document.camera:
-            pivot = self._session.document.pivot
+        if camera := self.session.document.camera:
+            pivot = self.session.document.pivot
             self.move(gesture.capitalize(), navigation.drag(gesture, camera, right, up, radius, pivot))
 
     def nudge(self, gesture: str, right: float, up: float) -> None:
         """Move as a short drag does, without a mouse. right, up: in steps."""
-        if pose := self._playback.pose:
+        if pose := self.playback.pose:
             self.turntable.stop()
             self._stepped = time.monotonic()
-            self.drag(gesture, _STEP * right, _STEP * up, self._viewport.bounds(pose).radius)
+            self.drag(gesture, _STEP * right, _STEP * up, self.viewport.bounds(pose).radius)
 
     def zoom(self, camera: Camera) -> None:
         """Follow the wheel, in one step as well, though nothing tells when it comes to rest."""
@@ -223,48 +257,68 @@ class Steering:
         The latter is looked at once a scan: its file may have changed since it was left. Where there is none
         at first, what is up is guessed of the pose, unless the user told, and told where it is not the usual.
         """
-        camera = self._session.document.camera
+        camera = self.session.document.camera
         if not self._is_checked:
             self._is_checked = True
-            if camera is None and not self._up_is_told:
-                look = replace(self._session.document.look, up=pose.upright.up)
-                self._session.amend(look=look, front=pose.upright.front)
+            if camera is None and self.up is None:
+                look = replace(self.session.document.look, up=pose.upright.up)
+                self.session.amend(look=look, front=pose.upright.front)
                 if pose.upright.up != UP:
                     guess = f"{pose.upright.up} is up: {pose.upright.why}"
-                    self._note(f"Scan4D guesses that {guess}. Change it below the cube.")
-            if camera is not None and not navigation.shows(camera, self.bounds(pose), self._viewport.aspect):
+                    self.note_of_scan(f"Scan4D guesses that {guess}. Change it below the cube.")
+            if camera is not None and not navigation.shows(camera, self.bounds(pose), self.viewport.aspect):
                 camera = None
             self.extent.visit()
         if camera is None:
             self._first = self._first_camera(pose)
-            self._session.amend(camera=self._first)
+            self.session.amend(camera=self._first)
         elif self.follows and self._followed is not None and pose is not self._followed:
             self._go_with(camera, pose, self._followed)
         self._followed = pose
 
     def _first_camera(self, pose: Pose) -> Camera:
         """The camera that a scan is first shown with."""
-        is_moved = not self._session.laid.layers(pose).world_from_pose.is_identity
+        is_moved = not self.session.laid.layers(pose).world_from_pose.is_identity
         views = () if is_moved else pose.views
-        return first_camera(views, self.whole(pose), self._viewport.aspect, self._upright(pose))
+        return first_camera(views, self.whole(pose), self.viewport.aspect, self._upright(pose))
 
     def _upright(self, pose: Pose) -> Upright:
         """The up axis and the front that the user has chosen, or the scan itself tells."""
-        return replace(pose.upright, up=self._up, front=self._session.document.front)
+        return replace(pose.upright, up=self._up, front=self.session.document.front)
 
     def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
         """Move the camera, and what it turns about, as far as the subject has gone since another pose."""
         by = self._center(pose) - self._center(before)
-        pivot = self._session.document.pivot
-        self._session.amend(camera=camera.moved(by), pivot=pivot and vector(np.add(pivot, by)))
+        pivot = self.session.document.pivot
+        self.session.amend(camera=camera.moved(by), pivot=pivot and vector(np.add(pivot, by)))
 
     def _center(self, pose: Pose) -> NDArray[np.float64]:
         """The middle of a subject, (3,) in the world: far outliers do not move it."""
         middle = np.median(pose.sample, axis=0) + pose.origin
-        return self._session.laid.place(pose.index).points(middle)
+        return self.session.laid.place(pose.index).points(middle)
 
     def begin_scan(self, timeline: Timeline) -> None:
         """Take in that another scan is shown from now on."""
         self._is_checked = self.follows = False
         self._followed = self._first = None
         self.extent.begin(timeline)
+
+    COMMANDS = (
+        Command("fit", "Fit", fit, "F", "view", short="Fit", icon=icons.ICON_FA_EXPAND),
+        Command("opening_view", "Opening view", open_view, "Home", "view"),
+        Command("center", "Centre on the point under the mouse", center, "Z", "view"),
+        Command("follow", "Follow the subject", toggle_following, "Shift+F", FRAMES,
+            is_on=lambda steering: steering.follows),
+        *(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),
+        *(_nudge("orbit", f"Turn {side}", side, f"Ctrl+{side.capitalize()}") for side in _SIDES),
+        *(_nudge("pan", f"Shift {side}", side, f"Shift+{side.capitalize()}") for side in _SIDES),
+        _nudge("zoom", "Nearer", "up", "="),
+        _nudge("zoom", "Farther", "down", "-"),
+        Listing("Up", ups, "ups"),
+        Command("set_front", "Set current view as front", set_front, when="view"),
+        Command("orthographic", "Orthographic", switch_projection, "O", "view",
+            is_on=lambda steering: steering.is_orthographic),
+        Command("turntable", "Turn", toggle_turntable, "Y", "view",
+            is_on=lambda steering: steering.turntable.is_on),
+        Listing("Seconds per turn", lambda steering: steering.turntable.items(), "turntable_seconds"),
+    )  # fmt: skip

@@ -5,13 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from functools import partial
+from typing import Annotated
 
 from ...camera import Camera
+from ...document.schema import Kind
 from ...geometry import Vector
 
 SECONDS = (6.0, 12.0, 24.0, 60.0)  # for a turn, to choose from
 USUAL = 12.0
 _STEP = 1 / 60  # seconds between pictures at least
+
+
+TurnTime = Annotated[float, Kind("a time for a turn", SECONDS.__contains__)]
 
 
 class Turntable:

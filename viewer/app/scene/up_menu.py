@@ -4,24 +4,21 @@ ways while the mouse is on it."""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...geometry import AXES
 from .. import widgets
-from .cube import cube_place
-
-if TYPE_CHECKING:
-    from .steering import Steering
+from .cube import OrientationCube, cube_place
+from .steering import Steering
 
 _MENU = "turn upright"
 _ALSO_BELOW_LISTS = imgui.HoveredFlags_.allow_when_blocked_by_popup.value
 _BELOW = 2.02  # the button's top, in distances of the cube's centre from the edges of the view
 
 
-def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object]) -> bool:
+def declare(cube: OrientationCube, up: str, size: ImVec2, pick: Callable[[], object]) -> bool:
     """Declare the button in the current ImGui window, before the view; whether the mouse is on it.
 
     up: the scan's. size: of the view. pick: has the next click tell what is up.
@@ -37,14 +34,14 @@ def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object
     imgui.push_style_color(imgui.Col_.button, imgui.get_color_u32(imgui.Col_.button, 0.6))
     is_pressed = imgui.button(widgets.labelled(text, "up"))
     imgui.pop_style_color()
-    came, steering.cube.on_up = not steering.cube.on_up, imgui.is_item_hovered(_ALSO_BELOW_LISTS)
+    came, cube.on_up = not cube.on_up, imgui.is_item_hovered(_ALSO_BELOW_LISTS)
     if is_pressed or (imgui.is_item_hovered() and came):  # not again while the mouse rests there
         imgui.open_popup(_MENU)
     is_hovered, low, high = imgui.is_item_hovered(), imgui.get_item_rect_min(), imgui.get_item_rect_max()
     imgui.set_cursor_pos(before)
     imgui.set_next_window_pos(ImVec2(high.x, high.y), imgui.Cond_.always, ImVec2(1, 0))
     if imgui.begin_popup(_MENU):
-        _draw_ways(steering, pick)
+        _draw_choices(cube.steering, pick)
         corner, extent = imgui.get_window_pos(), imgui.get_window_size()
         near = ImVec2(min(low.x, corner.x) - em, low.y - em), corner + extent + ImVec2(em, em)
         # As it appears, its size is not known yet.
@@ -54,7 +51,7 @@ def declare(steering: Steering, up: str, size: ImVec2, pick: Callable[[], object
     return is_hovered
 
 
-def _draw_ways(steering: Steering, pick: Callable[[], object]) -> None:
+def _draw_choices(steering: Steering, pick: Callable[[], object]) -> None:
     for title, act, is_on in steering.ups():
         if imgui.menu_item(widgets.labelled(f"{title} is up", title), "", is_on)[0]:
             act()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 from imgui_bundle import ImVec2, imgui
 
@@ -13,11 +13,29 @@ from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
 from .. import notices, theme, widgets
-from . import cube, navigation, up_menu
+from ..failures import Failures
+from ..keys import Keys
+from ..menus import Commands
+from ..notices import Notices
+from ..output.capture import Capture
+from ..output.replaying import Replayer
+from ..part import WindowPart
+from ..playing.playback import Playback
+from ..session import Session
+from ..toolbox import Toolbox
+from ..window import Window
+from . import navigation, up_menu
 from .canvas import ViewPlace
-
-if TYPE_CHECKING:
-    from ..app import App
+from .counting import Counting
+from .cube import OrientationCube
+from .full_view import FullView
+from .glide import Glide
+from .legend import ViewMarks
+from .naming import Naming
+from .pointed import Pointer
+from .rendering import Rendering
+from .steering import Steering
+from .viewport import Viewport
 
 _PIVOT = 0xF0C24B
 
@@ -29,108 +47,157 @@ _BUTTONS = (
 _RED = 0xE0483E  # 0xRRGGBB
 
 
-def draw(app: App) -> None:
-    """Declare the view in the current ImGui window, which it fills."""
-    size, told = imgui.get_content_region_avail(), app.failures.told
-    the_cube, has_cube = app.steering.cube, app.steering.cube.is_shown and not app.full_view.is_on
-    camera = app.document.camera and app.glide.seen(app.document.camera)  # that the picture shows
-    cube.take_mouse(app.steering, app.document, camera, size, has_cube)
-    on_menu = (
-        has_cube
-        and app.document.camera is not None
-        and up_menu.declare(
-            app.steering, app.document.look.up, size, lambda: app.commands.of["pick_up"].act(app)
+@dataclass(eq=False)
+class SceneView(WindowPart):
+    """The 3D view, with what lies over the picture."""
+
+    name = "view"
+    window: Window
+    session: Session
+    playback: Playback
+    viewport: Viewport
+    failures: Failures
+    steering: Steering
+    cube: OrientationCube
+    glide: Glide
+    pointer: Pointer
+    tools: Toolbox
+    marks: ViewMarks
+    naming: Naming
+    rendering: Rendering
+    counting: Counting
+    capture: Capture
+    replayer: Replayer
+    full_view: FullView
+    notices: Notices
+    commands: Commands
+    keys: Keys
+
+    def draw(self) -> None:
+        """Declare the view in the current ImGui window, which it fills."""
+        size, told = imgui.get_content_region_avail(), self.failures.told
+        cube, has_cube = self.cube, self.cube.is_shown and not self.full_view.is_on
+        camera = self.session.document.camera and self.glide.seen(
+            self.session.document.camera
+        )  # that the picture shows
+        cube.take_mouse(camera, size, has_cube)
+        on_menu = (
+            has_cube
+            and self.session.document.camera is not None
+            and up_menu.declare(cube, self.session.document.look.up, size, self.commands.of["pick_up"].act)
         )
-    )
-    if the_cube.under_mouse is not None or on_menu:
-        imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
-    imgui.invisible_button("view", size, _BUTTONS)
-    with told("Finding what is under the mouse"):
-        app.pointer.point_at(_pixel(app) if imgui.is_item_hovered() else None)
-    if app.document.camera is not None and app.playback.pose is not None:
-        with told("Moving the view"):
-            _move(app, app.playback.pose, size)
-        with told("Tools"):
-            _serve_tools(app, size)
-    with told("The cube"):
-        if has_cube:
-            cube.draw(the_cube, app.document, camera, app.palette, size)
-    with told("Scale bar and colour bar"):
-        app.marks.draw(size)
-    text = printable(words_over(app) or "")
-    if app.naming.name is not None:
-        text = "\n".join(filter(None, (app.naming.name, text)))
-    if text:
-        _draw_note(text, size)
-    else:
-        _draw_prompt(app.tools.prompt, size)
-    app.notices.draw(size)
-    if app.capture.recorder is not None:
-        _draw_recording_mark()
+        if cube.under_mouse is not None or on_menu:
+            imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
+        imgui.invisible_button("view", size, _BUTTONS)
+        with told("Finding what is under the mouse"):
+            self.pointer.point_at(self._pixel() if imgui.is_item_hovered() else None)
+        if self.session.document.camera is not None and self.playback.pose is not None:
+            with told("Moving the view"):
+                self._move(self.playback.pose, size)
+            with told("Tools"):
+                self._serve_tools(size)
+        with told("The cube"):
+            if has_cube:
+                cube.draw(camera, size)
+        with told("Scale bar and colour bar"):
+            self.marks.draw(size)
+        text = printable(self.words_over() or "")
+        if self.naming.shown is not None:
+            text = "\n".join(filter(None, (self.naming.shown, text)))
+        if text:
+            _draw_note(text, size)
+        else:
+            _draw_prompt(self.tools.prompt, size)
+        self.notices.draw(size)
+        if self.capture.recorder is not None:
+            _draw_recording_mark()
 
+    def _move(self, pose: Pose, size: ImVec2) -> None:
+        """Take what the mouse does to the camera."""
+        sets_pivot = imgui.is_mouse_double_clicked(0) and not self.tools.takes_clicks
+        if imgui.is_item_hovered() and sets_pivot:
+            self.steering.set_pivot()
+        radius = self.viewport.bounds(pose).radius
+        self._take_drag(size, radius)
+        if imgui.is_item_hovered() and imgui.get_io().mouse_wheel:
+            self._take_wheel(size, radius)
+        camera, pivot = self.session.document.camera, self.session.document.pivot
+        if camera and pivot and imgui.is_item_hovered():
+            _draw_pivot(self.glide.seen(camera), pivot, size)
 
-def _move(app: App, pose: Pose, size: ImVec2) -> None:
-    """Take what the mouse does to the camera."""
-    sets_pivot = imgui.is_mouse_double_clicked(0) and not app.tools.takes_clicks
-    if imgui.is_item_hovered() and sets_pivot:
-        app.steering.set_pivot()
-    radius = app.viewport.bounds(pose).radius
-    _take_drag(app, size, radius)
-    if imgui.is_item_hovered() and imgui.get_io().mouse_wheel:
-        _take_wheel(app, size, radius)
-    camera, pivot = app.document.camera, app.document.pivot
-    if camera and pivot and imgui.is_item_hovered():
-        _draw_pivot(app.glide.seen(camera), pivot, size)
+    def _take_drag(self, size: ImVec2, radius: float) -> None:
+        io, camera, gesture = imgui.get_io(), self.session.document.camera, self.steering.gesture
+        assert camera is not None
+        if imgui.is_item_activated():
+            self.tools.is_dragging = False
+            if imgui.is_mouse_clicked(0) and not io.key_shift:
+                self.tools.press(imgui.get_mouse_pos())
+            self.steering.gesture = None if self.tools.is_dragging else _gesture(io)
+            self.steering.turntable.stop()
+        elif gesture == "orbit" and self.tools.clicking and widgets.is_click():
+            pass  # so that a click does not turn the view
+        elif gesture:
+            # The move that ends with the release counts as well, that of the press does not.
+            right, up = io.mouse_delta.x / size.y, -io.mouse_delta.y / size.y
+            self.steering.drag(gesture, right, up, radius)
+        if not imgui.is_item_active():
+            self.steering.gesture = None
 
+    def _serve_tools(self, size: ImVec2) -> None:
+        """Let tools have their clicks, and draw over the picture."""
+        is_hovered = imgui.is_item_hovered()
+        if self.tools.is_dragging and not widgets.is_click():
+            self.tools.drag(self._pixel(), ends=imgui.is_item_deactivated())
+        elif self.tools.clicking and is_hovered:
+            imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
+            is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
+            is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click
+            if is_released and is_first and widgets.is_click() and not imgui.get_io().key_shift:
+                self.tools.click(self._pixel())
+        if camera := self.session.document.camera:
+            place = ViewPlace(self.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered)
+            self.tools.draw_over(place, self.marks.boxes)
 
-def _take_drag(app: App, size: ImVec2, radius: float) -> None:
-    io, camera, gesture = imgui.get_io(), app.document.camera, app.steering.gesture
-    assert camera is not None
-    if imgui.is_item_activated():
-        app.tools.is_dragging = False
-        if imgui.is_mouse_clicked(0) and not io.key_shift:
-            app.tools.press(imgui.get_mouse_pos())
-        app.steering.gesture = None if app.tools.is_dragging else _gesture(io)
-        app.steering.turntable.stop()
-    elif gesture == "orbit" and app.tools.clicking and widgets.is_click():
-        pass  # so that a click does not turn the view
-    elif gesture:
-        # The move that ends with the release counts as well, that of the press does not.
-        right, up = io.mouse_delta.x / size.y, -io.mouse_delta.y / size.y
-        app.steering.drag(gesture, right, up, radius)
-    if not imgui.is_item_active():
-        app.steering.gesture = None
+    def _take_wheel(self, size: ImVec2, radius: float) -> None:
+        camera = self.session.document.camera
+        assert camera is not None
+        at = imgui.get_mouse_pos() - imgui.get_item_rect_min() - size * 0.5
+        seen = self.pointer.picked.place if self.pointer.picked else None
+        notches = imgui.get_io().mouse_wheel
+        self.steering.zoom(navigation.wheel(camera, notches, (at.x / size.y, -at.y / size.y), radius, seen))
 
+    def _pixel(self) -> tuple[int, int]:
+        """The picture's pixel under the mouse."""
+        at = (imgui.get_mouse_pos() - imgui.get_item_rect_min()) * self.window.pixel_ratio
+        return math.floor(at.x), math.floor(at.y)
 
-def _serve_tools(app: App, size: ImVec2) -> None:
-    """Let tools have their clicks, and draw over the picture."""
-    is_hovered = imgui.is_item_hovered()
-    if app.tools.is_dragging and not widgets.is_click():
-        app.tools.drag(_pixel(app), ends=imgui.is_item_deactivated())
-    elif app.tools.clicking and is_hovered:
-        imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
-        is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
-        is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click
-        if is_released and is_first and widgets.is_click() and not imgui.get_io().key_shift:
-            app.tools.click(_pixel(app))
-    if camera := app.document.camera:
-        place = ViewPlace(app.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered)
-        app.tools.draw_over(place, app.marks.boxes)
+    def words_over(self) -> str | None:
+        """The words over the picture: why it is not what was asked for."""
+        playback = self.playback
+        if self.viewport.problem:
+            return str(self.viewport.problem)
+        if self.replayer.replaying is not None:
+            return str(self.replayer.replaying)
+        if playback.pose is None:
+            return str(playback.problem) if playback.problem else None
+        if playback.player.playing or playback.pose.index == self.session.index:
+            return self._words_on_nothing()
+        return f"{playback.problem}\nYou see {playback.pose.label} instead." if playback.problem else None
 
-
-def _take_wheel(app: App, size: ImVec2, radius: float) -> None:
-    camera = app.document.camera
-    assert camera is not None
-    at = imgui.get_mouse_pos() - imgui.get_item_rect_min() - size * 0.5
-    seen = app.pointer.picked.place if app.pointer.picked else None
-    notches = imgui.get_io().mouse_wheel
-    app.steering.zoom(navigation.wheel(camera, notches, (at.x / size.y, -at.y / size.y), radius, seen))
-
-
-def _pixel(app: App) -> tuple[int, int]:
-    """The picture's pixel under the mouse."""
-    at = (imgui.get_mouse_pos() - imgui.get_item_rect_min()) * app.window.pixel_ratio
-    return math.floor(at.x), math.floor(at.y)
+    def _words_on_nothing(self) -> str | None:
+        """The words over a picture at rest that shows nothing: why, and which key helps."""
+        counts = self.counting.counts
+        if (
+            counts is None
+            or not self.counting.is_blank
+            or self.playback.pose is None
+            or not self.playback.pose.count
+        ):
+            return None
+        if counts["drawn"] + counts["hidden"] and not self.rendering.levels.get(0, True):
+            return words_on_levels(self.rendering.levels, self.keys.of["switch_level_0"])
+        key = self.keys.of["fit"]
+        return "Nothing is in view" + (f": press {key} to show all" if key else "")
 
 
 def _draw_pivot(camera: Camera, pivot: Vector, size: ImVec2) -> None:
@@ -150,36 +217,6 @@ def _gesture(io: imgui.IO) -> str:
     if io.mouse_down[1]:
         return "zoom"
     return "pan" if io.mouse_down[2] or io.key_shift else "orbit"
-
-
-def words_over(app: App) -> str | None:
-    """The words over the picture: why it is not what was asked for."""
-    playback = app.playback
-    if app.viewport.problem:
-        return str(app.viewport.problem)
-    if app.replayer.replaying is not None:
-        return str(app.replayer.replaying)
-    if playback.pose is None:
-        return str(playback.problem) if playback.problem else None
-    if playback.player.playing or playback.pose.index == app.session.index:
-        return _words_on_nothing(app)
-    return f"{playback.problem}\nYou see {playback.pose.label} instead." if playback.problem else None
-
-
-def _words_on_nothing(app: App) -> str | None:
-    """The words over a picture at rest that shows nothing: why, and which key helps."""
-    counts = app.counting.counts
-    if (
-        counts is None
-        or not app.counting.is_blank
-        or app.playback.pose is None
-        or not app.playback.pose.count
-    ):
-        return None
-    if counts["drawn"] + counts["hidden"] and not app.rendering.levels.get(0, True):
-        return words_on_levels(app.rendering.levels, app.keys.of["switch_level_0"])
-    key = app.keys.of["fit"]
-    return "Nothing is in view" + (f": press {key} to show all" if key else "")
 
 
 def words_on_levels(levels: Mapping[int, bool], key: str) -> str:

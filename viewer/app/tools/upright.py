@@ -53,7 +53,7 @@ class Tool:
         return True
 
 
-COMMANDS: dict[str, tuple[Command[Tool], ...]] = {
+COMMANDS: dict[str, tuple[Command, ...]] = {
     "View": (
         Command(
             "pick_up", "Set up from a surface...", lambda tool: tool.toggle(),

@@ -441,7 +441,7 @@ def _mirrored(target: Landmark, shown: ShownLandmarks, listed: Collection[str]) 
     return proposal_for(target.name, positions, partners)
 
 
-def _while_active(name: str, title: str, act: object, key: str) -> Command[Tool]:
+def _while_active(name: str, title: str, act: object, key: str) -> Command:
     """A command on the landmark that is selected or placed next."""
     return Command(name, title, act, key, can=lambda tool: tool.is_active)  # type: ignore[arg-type]
 

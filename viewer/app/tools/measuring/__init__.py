@@ -275,7 +275,7 @@ def _same(now: tuple[object, ...], before: tuple[object, ...]) -> bool:
     )
 
 
-def _at_all(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:
+def _at_all(name: str, title: str, act: Callable[[Tool], None]) -> Command:
     """A command that does something with all distances."""
     return Command(f"{name}_distances", title, act, can=lambda tool: bool(tool.made.distances))
 

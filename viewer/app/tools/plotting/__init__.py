@@ -298,7 +298,7 @@ class Tool:
         self.context.run(f"Saving {file.name}", save, lambda _: self.context.note(words))
 
 
-def _with_plot(name: str, title: str, act: Callable[[Tool], None]) -> Command[Tool]:
+def _with_plot(name: str, title: str, act: Callable[[Tool], None]) -> Command:
     """A command that does something with what is plotted."""
     return Command(name, title, act, can=lambda tool: tool.is_below() and tool.shown.plot is not None)
 

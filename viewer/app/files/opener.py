@@ -1,0 +1,184 @@
+"""Showing a scan: the first one, and each that is opened instead of it."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+from ...backends import backend
+from ...document.saved_session import SavedSession, kept
+from ...errors import Scan4DError
+from ...scan.open import DEMO, open_scan
+from ...scan.pose import Pose
+from ...task import Task, in_background
+from ..notices import Notices, Problem
+from ..part import Parts, WindowPart
+from ..playing.playback import Playback
+from ..session import Session, known_as
+from ..window import Window
+from .opening import Opened, Opening, find_facts
+from .same_content import offer_of_change, offer_of_kept
+from .scans import title
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class Opener(WindowPart):
+    """Opens scans, and has all parts begin with each.
+
+    opened: the first scan. unit, fps, up: what the command line states of all scans. job: what is being
+    opened.
+    """
+
+    name = "opener"
+    doing = "Opening"
+    turn = -4
+    OFFERS = {"open_scan": "open", "refuse": "refuse", "take_up": "take_up"}
+    window: Window
+    parts: Parts
+    session: Session
+    playback: Playback
+    notices: Notices
+    opened: Opened
+    unit: str | None
+    fps: float | None
+    up: str | None
+    tell_later: Callable[[Callable[[], str]], None]
+    open_with: Callable[..., None]
+    after: Callable[[str], str | None]
+    abandon: Callable[[], None]
+
+    def __post_init__(self) -> None:
+        self.job = Opening()
+        self._reported: set[str] = set()  # what could not be read of documents
+        self._has_begun = self._looks_further = False  # whether a frame of any scan was shown, or looked for
+        self._messages_read = 0
+
+    def open(self, scan: str, session: SavedSession | None = None) -> None:
+        """Open another scan on a worker, instead of one that is being opened; the current one stays
+        until a pose of it is there.
+
+        session: to open it with; None: as it was left.
+        """
+        self.notices.end("opening")
+        left = self.session.left(scan)
+        find = (lambda: find_kept(scan, self.up)) if left is None else lambda: left
+        self.job.start(scan, title(scan), find, lambda: open_scan(scan, self.unit, self.fps), session)
+
+    def advance(self, now: float) -> None:
+        """Show the scan that has been opened, where one has, and pass on what the timeline reports."""
+        self._take_opened()
+        self._pass_on_messages()
+
+    def _take_opened(self) -> None:
+        asked = self.job.scan
+        try:
+            opened = self.job.take()
+        except Scan4DError as error:
+            if not self._has_begun and asked is not None:  # else nothing would be shown
+                self.open(self.after(asked) or DEMO)
+            self.refuse(f"Cannot open: {error}")
+            return
+        if opened is not None:
+            scan, begun = opened
+            # It may wait for a pose that is being read.
+            in_background(Task("Closing"), self.playback.timeline.close)
+            for part in self.parts:
+                part.leave_scan()
+            self.session.turn_to(scan, begun.left, self.up)
+            self.playback.begin(begun.timeline, begun.first)
+            self.begin(begun)
+            log.debug("opened %s", scan)
+
+    def begin(self, opened: Opened) -> None:
+        """Have all parts begin with a scan, whose session and playback have."""
+        timeline, self.session.hash_found, _, left, problem, session = opened
+        timeline.finish = self._find_facts
+        if session is not None:
+            self.session.take_up(session)
+        if self.unit:
+            self.session.amend(unit=self.unit)
+        for part in self.parts:
+            part.begin_scan(timeline)
+        if problem:
+            self.notices.tell_of_scan(problem)
+        self._check(session or left)
+        if session is None and not (left and left.document.made):
+            self._look_for_kept()
+        self._messages_read = 0
+        self.window.title = f"{timeline.name} - Scan4D"
+
+    def _find_facts(self, pose: Pose) -> None:
+        """Find what drawing as it is chosen asks of a pose, on the thread that has read it."""
+        name, params = self.session.document.chosen(pose)
+        find_facts(pose, of_points=not backend(name).draws_samples(pose, params))
+
+    def take_up(self, session: SavedSession) -> None:
+        """Show the open scan as a session has it."""
+        self.abandon()
+        self.session.take_up(session)
+        self.playback.seek(min(session.pose, len(self.playback.timeline) - 1), time.monotonic())
+        self._check(session)
+        self.window.touch()
+
+    def _check(self, saved: SavedSession | None) -> None:
+        """Report what could not be read of what was saved, once, and find out beside the window whether the
+        scan is the one that it was saved of."""
+        problem = saved and saved.problem
+        if problem and problem not in self._reported:
+            self._reported.add(problem)
+            self.notices.tell_of_scan(problem)
+        if saved is not None and saved.hash is not None:
+            scan, found = self.session.scan, self.session.hash_found
+            self.tell_later(partial(offer_of_change, saved, found, partial(self._begin_anew, scan)))
+
+    def _look_for_kept(self) -> None:
+        """Offer what is kept of the open scan's files under another name, as soon as it is found."""
+        scan = known_as(self.session.scan)
+        use = partial(self.open_with, scan=self.session.scan)
+        self.tell_later(partial(offer_of_kept, scan, self.session.hash_found, use))
+
+    def _begin_anew(self, scan: str) -> None:
+        """Leave aside what the user made on other files than those of a scan, where it is still open."""
+        if scan != self.session.scan:
+            return
+        self.abandon()
+        self.session.change("Start without the saved changes", bookmarks=(), parts={}, unread={})
+        self._look_for_kept()
+
+    def _pass_on_messages(self) -> None:
+        """Report what the timeline has to say.
+
+        Where the frame that the window began with cannot be read, another one is looked for, as where any
+        other scan is opened.
+        """
+        messages = self.playback.timeline.messages[self._messages_read :]
+        self._messages_read += len(messages)
+        self._has_begun = self._has_begun or self.playback.pose is not None
+        if not self._has_begun and not self._looks_further and self.playback.problem is not None:
+            self._looks_further = True
+            self.open(self.session.scan)
+            self._messages_read = len(self.playback.timeline.messages)
+            return
+        for message in messages:
+            self.notices.tell_of_scan(message.text)
+
+    def refuse(self, problem: str) -> None:
+        """Show why what the user asked for was not opened: in the dialog, where that waits for it."""
+        if not any([part.refused(problem) for part in self.parts]):
+            self.notices.tell_of_opening(Problem(problem))
+
+    def close(self) -> None:
+        """Give up what is being opened."""
+        self.job.cancel()
+
+
+def find_kept(scan: str, up: str | None) -> SavedSession | None:
+    """Find what is kept of a scan. up: the up axis that the command line states. Raises InputError where that
+    is damaged."""
+    found = kept(known_as(scan))
+    return found if found is None or up is None else replace(found, document=found.document.with_up(up))
