@@ -286,7 +286,7 @@ def test_an_export_never_replaces_the_scan(tmp_path: Path, tmp_path_factory: pyt
     write_views(scan, [sphere_view((0, 0, 4))])
     config.mkdir(parents=True)
     export = {"format": "exr", "folder": str(tmp_path)}
-    (config / "settings.json").write_text(json.dumps({"format": 1, "export": export}))
+    (config / "settings.json").write_text(json.dumps({"format": 1, "exporting": {"choices": export}}))
     before = scan.read_bytes()
     with (
         virtual_screen(tmp_path_factory.mktemp("screen"), SIZE) as screen,

@@ -100,12 +100,14 @@ def fail(name):
     setattr(owner, name, failing)
 """
 PARTS = [
-    "viewer.app.panel.appearance.draw", "viewer.app.playing.timeline_bar._draw_track",
-    "viewer.app.scene.cube.draw", "viewer.app.scene.view._take_drag", "viewer.app.menu.draw_toolbar",
+    "viewer.app.panel.appearance._draw", "viewer.app.playing.timeline_bar.TimelineBar._draw_track",
+    "viewer.app.scene.cube.OrientationCube.draw", "viewer.app.scene.view.SceneView._take_drag",
+    "viewer.app.menu.MenuBar.draw_toolbar",
     "viewer.app.scene.viewport.render_frame", "viewer.app.scene.viewport.Viewport.present",
     "viewer.app.scene.viewport.Viewport.pick", "viewer.app.playing.playback.Playback.advance",
-    "viewer.app.app.App.remembered", "viewer.app.app.App.pass_on_messages", "viewer.app.loop.Loop._patience",
-    "viewer.app.window.Window.begin", "viewer.app.window.Window.end", "viewer.app.keys.Keys.handle",
+    "viewer.app.part.Parts.remembered", "viewer.app.files.opener.Opener._pass_on_messages",
+    "viewer.app.app.App.patience", "viewer.app.window.Window.begin", "viewer.app.window.Window.end",
+    "viewer.app.shortcuts.Shortcuts.handle",
 ]  # fmt: skip
 
 
@@ -137,7 +139,7 @@ def test_whatever_fails_in_each_frame_is_told_once_and_the_window_goes_on(
     assert app.log().count("Traceback") <= 2
     assert len(list(tmp_path.glob("*.json"))) == 1, "what was recorded is saved"
     if not name.endswith("remembered"):
-        assert json.loads((tmp_path / "config" / "scan4d" / "settings.json").read_text())["window"]
+        assert json.loads((tmp_path / "config" / "scan4d" / "settings.json").read_text())["window_look"]
 
 
 @pytest.mark.slow
@@ -178,7 +180,7 @@ def test_folders_and_files_that_are_no_utf_8(screen: Screen, tmp_path: Path) -> 
     ]  # fmt: skip
     assert [entry.scan for entry in Recording.load(folder / "scan4d_0001.json").entries] == [str(scan)] * 2
     kept = json.loads((tmp_path / "config" / "scan4d" / "settings.json").read_text())
-    assert kept["recent"] == [str(scan)]
+    assert kept["scans"]["recent"] == [str(scan)]
     with running_app(screen, folder, scan, home=tmp_path) as app:
         assert app.state.frame == 1, "it was left there"
         close(app)

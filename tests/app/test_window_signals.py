@@ -81,7 +81,7 @@ def test_a_signal_closes_the_window_and_saves_all(
     assert "Traceback" not in app.log()
     check_recording(path)
     kept = settings(tmp_path)
-    assert kept["theme"] == "light"
+    assert kept["window_look"]["theme"] == "light"
     assert kept_of(tmp_path, scan).document.camera is not None
     assert journals(tmp_path) == []
     left = {entry.name for entry in tmp_path.iterdir()}
@@ -93,7 +93,7 @@ def test_settings_are_kept_while_a_scan_plays(screen: Screen, tmp_path: Path, sc
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "space", "key", "t")
         file = tmp_path / "config" / "scan4d" / "settings.json"
-        wait_until(lambda: file.exists() and settings(tmp_path)["theme"] == "light")
+        wait_until(lambda: file.exists() and settings(tmp_path)["window_look"]["theme"] == "light")
         before = app.state.pictures
         app.see(lambda state: state.pictures > before + 1)
 
@@ -106,7 +106,7 @@ def test_that_software_draws_is_told_once(screen: Screen, tmp_path: Path, scan: 
             screen.do("key", "ctrl+q")
             assert app.process.wait(PATIENCE) == 0
             told.append([note for note in app.notes if "Drawn in software" in note])
-    devices = settings(tmp_path)["slow_devices"]
+    devices = settings(tmp_path).get("drawing", {}).get("slow_devices", [])
     assert [len(notes) for notes in told] == [len(devices), 0], "nothing is told of a graphics card"
 
 

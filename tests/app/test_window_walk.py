@@ -18,15 +18,15 @@ from viewer.scan.range_view import merge
 BARS = ("toolbar", "##MainMenuBar")
 # Two buttons of one name at the start of the toolbar, where there is room for them.
 TWINS = """
-import viewer.app.menu as menu
 from imgui_bundle import imgui
-draw = menu.draw_toolbar
-def draw_twins(app):
+from viewer.app.menu import MenuBar
+draw = MenuBar.draw_toolbar
+def draw_twins(bar):
     for _ in range(2):
         imgui.button("twin")
         imgui.same_line()
-    draw(app)
-menu.draw_toolbar = draw_twins
+    draw(bar)
+MenuBar.draw_toolbar = draw_twins
 """
 # No frame of any scan comes.
 STUCK = """
@@ -97,6 +97,6 @@ def test_all_widgets_while_no_frame_is_there(screen: Screen, tmp_path: Path, bal
 def test_all_widgets_in_large_text(screen: Screen, tmp_path: Path, ball: Path, part: int) -> None:
     folder = tmp_path / "config" / "scan4d"
     folder.mkdir(parents=True)
-    (folder / "settings.json").write_text(json.dumps({"format": 1, "text_scale": 2.0}))
+    (folder / "settings.json").write_text(json.dumps({"format": 1, "window_look": {"text_scale": 2.0}}))
     with running_app(screen, tmp_path, ball) as app:
         check(app, app.walk(part=(part, PARTS)), 10)
