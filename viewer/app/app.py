@@ -32,7 +32,7 @@ log = logging.getLogger(__name__)
 
 
 class Stated(NamedTuple):
-    """What the command line states of all scans, None where it states nothing. up: the up axis."""
+    """The unit, rate and up axis that the command line states for all scans; None: it states none."""
 
     unit: str | None = None
     fps: float | None = None

@@ -13,7 +13,7 @@ from ..files import parsed_toml, read_text, whole_file
 from .commands import Command
 
 
-class Commands(Protocol):
+class CommandTable(Protocol):
     """The table of commands, see `menus.Commands`."""
 
     of: Mapping[str, Command]
@@ -73,7 +73,7 @@ class Keys:
     chord of keys that it has.
     """
 
-    def __init__(self, commands: Commands, changes: Mapping[str, str] | None = None) -> None:
+    def __init__(self, commands: CommandTable, changes: Mapping[str, str] | None = None) -> None:
         """changes: command's name -> its keys, where they are not the usual ones."""
         self._titles = {name: command.title for name, command in commands.of.items()}
         self.of: dict[str, str] = {name: command.key for name, command in commands.of.items()} | dict(
@@ -97,7 +97,7 @@ class Keys:
         return any(imgui.is_key_down(KEYS[name]) for name in ARROWS)
 
 
-def load_keys(path: Path, commands: Commands) -> tuple[Keys, list[str]]:
+def load_keys(path: Path, commands: CommandTable) -> tuple[Keys, list[str]]:
     """The keys that a TOML file gives, and what is wrong in it; the usual keys where there is no file.
 
     What is wrong is left out: the usual keys hold for it. Of two commands whose usual keys are the same, as
@@ -125,7 +125,7 @@ def _read(path: Path) -> tuple[dict[str, Any], list[InputError]]:
         return {}, [InputError(f"cannot be read ({what})", hint="Scan4D uses the default keys")]
 
 
-def _checked(given: Mapping[str, Any], commands: Commands, problems: list[InputError]) -> dict[str, str]:
+def _checked(given: Mapping[str, Any], commands: CommandTable, problems: list[InputError]) -> dict[str, str]:
     """The keys of a file that can be used; what cannot is added to the problems."""
     problems += [unknown_name("table", name, ["keys"]) for name in given if name != "keys"]
     table = given.get("keys", {})
@@ -148,7 +148,7 @@ def _checked(given: Mapping[str, Any], commands: Commands, problems: list[InputE
 
 
 def _without_clashes(
-    changes: dict[str, str], commands: Commands, problems: list[InputError]
+    changes: dict[str, str], commands: CommandTable, problems: list[InputError]
 ) -> dict[str, str]:
     """Leave out changes, last first, until no keys do two things."""
     usual = {name: command.key for name, command in commands.of.items()}
@@ -174,7 +174,7 @@ def _without_clashes(
             return {name: text for name, text in (usual | changes).items() if text != commands.of[name].key}
 
 
-def write_template(path: Path, commands: Commands) -> None:
+def write_template(path: Path, commands: CommandTable) -> None:
     """Write a file that names every command and its usual keys. Raises InputError where it cannot."""
     named = " ".join(_NAMED)
     lines = [f"# {name} = {_quoted(command.key)}  # {command.title}" for name, command in commands.of.items()]

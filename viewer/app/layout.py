@@ -33,7 +33,7 @@ _STILL = (
 
 
 @dataclass(eq=False)
-class Layout(WindowPart):
+class WindowLayout(WindowPart):
     """Declares all parts where they stand."""
 
     name = "layout"

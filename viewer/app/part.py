@@ -115,7 +115,7 @@ class WindowPart:
         return False
 
     def enders(self) -> Iterable[tuple[int, Callable[[], bool]]]:
-        """What Escape asks, and the layer of each: the highest is asked first."""
+        """Functions that Escape asks, and the layer of each: the highest is asked first."""
         return ((self.layer, self.on_escape),)
 
     # --- the end ----------------------------------------------------------------------

@@ -78,7 +78,7 @@ class WindowLook(WindowPart):
 
 
 def stored_placement(stored: Mapping[str, Any]) -> Place | None:
-    """Where the window was, among the values of all parts that come back; None where it was never open."""
+    """The placement of the window among the values of all parts that come back; None: it was never open."""
     values: Any = stored.get(WindowLook.name)
     with suppress(InputError, RecursionError):
         return structured(Place, values.get("window")) if is_object(values) else None
