@@ -26,7 +26,19 @@ def compiled(function: F) -> F:
     Numba stores the result beside the source, or in the user's cache folder if it cannot write there. If it
     can write neither, or the disk is full, each process compiles for itself. A task announces either.
     """
-    dispatcher: Any = njit(nogil=True)(function)
+    return _cached(function, njit(nogil=True)(function))
+
+
+def inlined(function: F) -> F:
+    """Compile a function as `compiled` does, and put its code into each compiled function that calls it.
+
+    For small pieces of inner loops: a call would pass each array of a NamedTuple as seven numbers.
+    """
+    return _cached(function, njit(nogil=True, forceinline=True)(function))
+
+
+def _cached(function: F, dispatcher: Any) -> F:
+    """A compiled function with its cache on disk, or with none."""
     try:
         dispatcher._cache = _DiskCache(function)
     except RuntimeError:  # of numba, where no folder can be written

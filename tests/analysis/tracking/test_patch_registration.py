@@ -99,3 +99,86 @@ def test_colors_tell_the_place_on_a_plane() -> None:
     assert found is not None
     assert np.linalg.norm(found.place[:2] - place[:2]) < 0.1
     assert np.sqrt(np.diag(found.covariance))[:2].max() < 0.2
+
+
+def test_tukey_weights_fall_to_zero() -> None:
+    from viewer.analysis.tracking.robust_kernels import tukey_weight
+
+    weights = [tukey_weight(residual, 2.0) for residual in (0.0, 1.0, -1.0, 4.685 * 1.99, 4.685 * 2.01)]
+    assert weights[0] == 1
+    assert weights[1] == weights[2] == pytest.approx((1 - (1 / 9.37) ** 2) ** 2)
+    assert 0 < weights[3] < 1e-3
+    assert weights[4] == 0
+
+
+def test_the_robust_scale_ignores_outliers() -> None:
+    from viewer.analysis.tracking.robust_kernels import robust_scale
+
+    chance = np.random.default_rng(3)
+    residuals = 5 + 0.3 * chance.standard_normal(4001)
+    residuals[:800] = 1e3
+    assert robust_scale(residuals, 5.0) == pytest.approx(0.3, rel=0.4)
+
+
+def test_registration_stops_at_a_hundredth_of_the_spacing() -> None:
+    from viewer.analysis.tracking.register_kernels import has_converged
+
+    assert has_converged(0.0049**2, 0.5)
+    assert not has_converged(0.0051**2, 0.5)
+
+
+def test_correspondences_are_signed_distances_to_the_surface() -> None:
+    from viewer.analysis.tracking.correspondence_kernels import (
+        MovedPatch,
+        find_correspondences,
+        no_correspondences,
+    )
+
+    flat = surface(0, is_colored=False, is_flat=True)
+    patch = patch_of(flat, np.zeros(3), 6.0, 200)
+    assert patch is not None
+    matches = no_correspondences(len(patch.local), 0)
+    moved = MovedPatch(np.array([0.0, 0.0, 0.4]), np.eye(3), np.zeros(12))
+    found, reach = find_correspondences(patch, flat.held, moved, 3 * SPACING, matches)
+    assert found == matches.is_matched.sum() > 0.9 * len(patch.local)
+    assert reach > 0
+    distances = matches.distances[matches.is_matched] * np.sign(matches.normals[matches.is_matched, 2])
+    assert np.abs(distances - 0.4).max() < 0.1
+    none, _ = find_correspondences(
+        patch, flat.held, MovedPatch(np.array([0.0, 0.0, 90.0]), np.eye(3), np.zeros(12)), 1.0, matches
+    )
+    assert none == 0
+
+
+@pytest.mark.parametrize("free", [0, 3, 12])
+def test_factors_are_derivatives_of_the_residuals(free: int) -> None:
+    """The side of the normal equations is the gradient of half the weighted squares."""
+    from viewer.analysis.tracking.correspondence_kernels import (
+        MovedPatch,
+        find_correspondences,
+        no_correspondences,
+    )
+    from viewer.analysis.tracking.factor_kernels import RIGID, add_factors, factor, unknowns
+    from viewer.analysis.tracking.robust_kernels import weigh
+
+    before, after = surface(0), surface(1)
+    path = truth(3.0, -2.0, 5)
+    patch = patch_of(before, path[0], 8.0, 150)
+    assert patch is not None
+    moved = MovedPatch(path[1] + 0.1, np.eye(3), np.zeros(12))
+    matches = no_correspondences(len(patch.local), 3)
+    find_correspondences(patch, after.held, moved, 4 * SPACING, matches)
+    weigh(matches, np.full(4, 1e-3))
+    is_free = np.arange(12) < free
+    count = unknowns(is_free)
+    assert count == RIGID + free
+    system, side = np.zeros((count, count)), np.zeros((count, 1))
+    add_factors(patch, moved, matches, is_free, system, side)
+    expected = np.zeros(3)
+    for i in np.flatnonzero(matches.is_matched):
+        for term in range(4):
+            weight, residual, there, own = factor(patch, matches, i, term)
+            if matches.weights[i, 0] > 0:
+                expected -= weight * residual * 0.5 * (np.array(there) + own)
+    np.testing.assert_allclose(side[:3, 0], expected, rtol=1e-9)
+    assert np.linalg.eigvalsh(np.tril(system) + np.tril(system, -1).T).min() > -1e-9 * np.abs(system).max()

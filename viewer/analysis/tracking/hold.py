@@ -12,7 +12,7 @@ from .body import BodyPose, DeformableBody, Grip
 from .registration import Placement, placed_points
 
 if TYPE_CHECKING:
-    from .register_kernels import SurfacePatch
+    from .patch_kernels import SurfacePatch
 
 Float = NDArray[np.float64]
 

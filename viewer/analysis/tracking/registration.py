@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from .surface import MomentSurface
 
 if TYPE_CHECKING:
-    from .register_kernels import SurfacePatch
+    from .patch_kernels import SurfacePatch
 
 Float = NDArray[np.float64]
 
@@ -78,7 +78,8 @@ def rotations(matrices: Float) -> Float:
 def patch_of(surface: MomentSurface, place: Float, radius: float, points: int) -> SurfacePatch | None:
     """The patch of a surface around a place, of so many points at most; None where it has no surface
     there."""
-    from .register_kernels import RIGID, cut_patch
+    from .factor_kernels import RIGID
+    from .patch_kernels import cut_patch
 
     axes = surface.axes_at(place, radius)
     if axes is None:
@@ -86,15 +87,15 @@ def patch_of(surface: MomentSurface, place: Float, radius: float, points: int) -
     rows = surface.rows_around(place, radius)
     if len(rows) > points:
         rows = rows[np.linspace(0, len(rows) - 1, points).astype(np.int64)]
-    patch = cut_patch(surface.held, place, axes, radius, rows, len(rows))
+    patch = cut_patch(surface.held, place, axes, radius, rows)
     return patch if len(patch.local) > 3 * RIGID else None
 
 
 def placed_points(patch: SurfacePatch, placement: Placement) -> Float:
     """The points of a patch as it is placed, (n, 3)."""
-    from .register_kernels import bent_by
+    from .patch_kernels import deformed_points
 
-    return placement.place + bent_by(patch, placement.bent) @ patch.axes @ placement.turn.T
+    return placement.place + deformed_points(patch, placement.bent) @ patch.axes @ placement.turn.T
 
 
 def registered(
@@ -104,33 +105,25 @@ def registered(
 
     slack: (3, 3), the covariance of the place from where it begins.
     """
-    from .register_kernels import register_patch
+    from .correspondence_kernels import MovedPatch
+    from .register_kernels import RegistrationPrior, RegistrationRules, register_patch
 
-    place, turn, bent = start.place.copy(), start.turn.copy(), start.bent.copy()
-    if not level.bending:
-        bent[:] = 0.0
-    covariance, told = np.empty((3, 3)), np.empty(3)
-    least = np.array([_LEAST_DISTANCE * surface.spacing, *[_LEAST_COLOR] * patch.colors.shape[1]])
-    rounds = register_patch(
-        patch,
-        surface.held,
-        place,
-        turn,
-        bent,
-        np.full(WAYS, level.bending),
-        np.linalg.inv(slack).astype(np.float64),
-        level.turn,
-        level.search * surface.spacing,
-        level.rounds,
-        level.uses_color and surface.held.colors.shape[1] == patch.colors.shape[1],
-        level.bends_alike,
-        least,
-        covariance,
-        told,
+    bent = start.bent.copy() if level.bending else np.zeros(WAYS)
+    moved = MovedPatch(start.place.copy(), start.turn.copy(), bent)
+    prior = RegistrationPrior(
+        np.linalg.inv(slack).astype(np.float64), level.turn, np.full(WAYS, level.bending)
     )
-    if not rounds or not np.isfinite(place).all():
+    channels = patch.colors.shape[1]
+    has_color = level.uses_color and surface.held.colors.shape[1] == channels
+    least = [_LEAST_DISTANCE * surface.spacing, *[_LEAST_COLOR] * (channels if has_color else 0)]
+    rules = RegistrationRules(
+        level.search * surface.spacing, level.rounds, level.bends_alike, np.array(least)
+    )
+    found = register_patch(patch, surface.held, moved, prior, rules)
+    if not found.rounds or not np.isfinite(moved.position).all():
         return None
-    return Placement(place, turn, bent, covariance, *(float(value) for value in told))
+    _, covariance, kept, middle, deviation = found
+    return Placement(*moved, covariance, kept, middle, deviation)
 
 
 def best_registered(

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...compiled import compiled
+from ...compiled import compiled, inlined
 from ...scan.plane_kernels import fit_plane
 
 NEAREST = 20  # points that a parabola is fitted to
@@ -21,6 +21,7 @@ _TERMS = 6  # of a parabola: 1, u, v, u^2, uv, v^2
 _SOFT = 1e-3  # of the weights' sum: holds curvature where points leave it open
 _RINGS = 3  # times that the reach is doubled where points are few
 _MOST = 512  # points that are looked at for one fit
+OWN_SPACING = 0.396  # of the reach of 20 points in a circle
 
 Float = NDArray[np.float64]
 
@@ -272,6 +273,20 @@ def fit_at(
     reaches[row] = reach
     state[row] = 1
     return True
+
+
+@inlined
+def parabola_height(parabola: NDArray[np.float32], u: float, v: float) -> float:
+    """The value of a parabola (6,) at (u, v) of its tangent plane."""
+    p = parabola
+    return p[0] + (p[1] + p[3] * u + p[4] * v) * u + (p[2] + p[5] * v) * v
+
+
+@inlined
+def parabola_slopes(parabola: NDArray[np.float32], u: float, v: float) -> tuple[float, float]:
+    """How a parabola (6,) grows along u and along v at (u, v)."""
+    p = parabola
+    return p[1] + 2.0 * p[3] * u + p[4] * v, p[2] + p[4] * u + 2.0 * p[5] * v
 
 
 @compiled
