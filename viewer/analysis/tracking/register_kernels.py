@@ -27,7 +27,7 @@ Float = NDArray[np.float64]
 
 
 class RegistrationPrior(NamedTuple):
-    """What is likely of a patch's motion and deformation beforehand."""
+    """Prior knowledge of how a patch moves and deforms."""
 
     position: Float  # (3, 3), the inverse of the covariance of the position
     rotation: float  # standard deviation of the turn, radians
