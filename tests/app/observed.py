@@ -230,14 +230,17 @@ def distances(app: App) -> list[dict[str, Any]]:
     tool = app.tools._slots["measuring"].tool
     return [] if tool is None else [
         {
-            "name": one.measure.name,
-            "ends": [asdict(end) for end in one.ends],
-            "positions": one.positions.tolist(),
-            "distance": one.value,
-            "uncertainty": SURE * one.sigma,
-            "state": one.state,
+            "name": row.measure.name,
+            "ends": [asdict(end) for end in row.ends],
+            "positions": [
+                app.tools.followed.tracks[name].positions[app.playback.pose.index].tolist()
+                for name in row.measure.landmarks
+            ],
+            "distance": row.value,
+            "uncertainty": SURE * row.sigma,
+            "state": row.state,
         }
-        for one in tool.shown
+        for row in tool.rows()
     ]  # fmt: skip
 
 

@@ -20,7 +20,7 @@ def count(module, owner, name):
         logging.getLogger("viewer.counted").debug("call of %s", name)
         return function(*arguments, **named)
     setattr(holder, name, staticmethod(counted) if name == "of" else counted)
-count("viewer.app.tools.plotting.seen", "", "are_seen")
+count("viewer.app.tools._seen", "", "are_seen")
 count("viewer.app.tools.landmarks", "", "are_seen")
 count("viewer.app.tools.plotting.lines", "", "lines_of")
 count("viewer.app.tools.plotting.ways", "Ways", "_speed_colors")

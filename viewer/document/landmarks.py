@@ -51,6 +51,10 @@ class Landmarks(Part, name="landmarks"):
         owned = {name for measure in self.distances for name in measure.landmarks}
         return tuple(one for one in self.all if one.name not in owned) if owned else self.all
 
+    def owned_by(self, measure: Measure) -> list[Landmark]:
+        """The landmarks of a measure, in its order."""
+        return [one for name in measure.landmarks if (one := self.named(name))]
+
     def with_distance(self, first: Iterable[Spot], second: Iterable[Spot], name: str = "") -> Landmarks:
         """Add a distance between two landmarks of its own, where these are placed. name: that it has unless
         it is taken; "" for the next number."""

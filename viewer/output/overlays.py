@@ -69,7 +69,7 @@ class DrawnLandmark:
 class DrawnPath:
     """A line through places without a gap. places: scan units, at least one. colors: 0xRRGGBB, of the line
     from each place on, or one for all. has_dots: whether there is a dot at each place where there is room.
-    name, value: that stand beside it, "" for nothing. has_ends: whether each place has a larger dot, and all
+    name, value: that stand beside it, "" for nothing. has_ends: whether both ends have a larger dot, and all
     of the line is faint while one of them is hidden. slack: how far before a place the surface may be that
     is its own, scan units; 0: `LINE_SLACK` of the scan's radius."""
 
@@ -267,7 +267,7 @@ def draw_overlay(
         part = slice(start, start + len(path.places))
         start = part.stop
         seen = overlay.seen[part]
-        opacities = np.where(seen.all() if path.has_ends else seen, np.ones(len(seen)), DIM_LINE)
+        opacities = np.where(seen[0] & seen[-1] if path.has_ends else seen, np.ones(len(seen)), DIM_LINE)
         _draw_path(painter, path, pixels[part], opacities)
         words = ": ".join(text for text in (path.name, path.value) if text)
         if words and np.isfinite(pixels[part]).all():
@@ -307,10 +307,11 @@ def _draw_path(
 ) -> None:
     em, count = painter.em, len(pixels)
     colors = path.colors if len(path.colors) == count else path.colors[:1] * count
-    dots, radius = np.full(count, path.has_ends), END_RADIUS if path.has_ends else 0.0
+    dots, radius = np.zeros(count, bool), END_RADIUS
+    dots[[0, -1]] = path.has_ends
     if path.has_dots:
         dots, radius = dotted(pixels, DOT_ROOM * em), DOT_RADIUS
-    draw_line(painter, pixels, colors, opacities, dots, 2 * radius * em)
+    draw_line(painter, pixels, colors, opacities, dots, 2 * radius * em if dots.any() else 0.0)
 
 
 def _draw_landmarks(

@@ -1,4 +1,4 @@
-"""Distances in words, and in a table that reads back into the places of their ends."""
+"""Distances, and a table of them that reads back into the places of their ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import pytest
 from viewer.analysis.measures.distances import (
     COLUMNS,
     Ends,
-    distance_in_words,
     distance_of,
     distance_rows,
     is_distance_table,
@@ -66,26 +65,6 @@ def test_the_uncertainty_covers_what_ends_that_err_give() -> None:
     off = np.linalg.norm(drawn[1] - drawn[0], axis=1) - math.dist(*places)
     _, sigma = distance_of(*ends)
     assert np.mean(np.abs(off) <= 1.96 * sigma) == pytest.approx(0.95, abs=0.003)
-
-
-@pytest.mark.parametrize(
-    ("distance", "uncertainty", "text"),
-    [
-        (12.3456, 0.4, "12.3 ± 0.4 mm (95 %)"),
-        (12.3456, 0.04, "12.35 ± 0.04 mm (95 %)"),
-        (12.3456, 0.149, "12.35 ± 0.15 mm (95 %)"),
-        (12.3456, 0.196, "12.3 ± 0.2 mm (95 %)"),
-        (12.3456, 0.97, "12.3 ± 1.0 mm (95 %)"),
-        (1234.56, 30.0, "1230 ± 30 mm (95 %)"),
-        (1234.56, 12.3, "1235 ± 12 mm (95 %)"),
-        (0.000123456, 2e-6, "0.000123 ± 0.000002 mm (95 %)"),
-        (1e-15, 2e-17, "1e-15 ± 2e-17 mm (95 %)"),
-        (12.3456, math.nan, "12.3456 mm"),
-        (12.3456, 0.0, "12.3456 mm"),
-    ],
-)
-def test_digits_follow_the_uncertainty(distance: float, uncertainty: float, text: str) -> None:
-    assert distance_in_words(distance, uncertainty / 1.96, "mm") == text
 
 
 # --- as a table -----------------------------------------------------------------------------

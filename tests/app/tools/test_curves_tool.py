@@ -15,7 +15,7 @@ from viewer.analysis.measures.curves import NUMBER_COLUMNS, number_rows, numbers
 from viewer.app.tools.plotting.choices import AGAINST, REPEATS, CurveChoices, Settings
 from viewer.app.tools.plotting.lines import value_in_words
 from viewer.app.tools.plotting.shown import Shown
-from viewer.app.tools.plotting.words import numbers_in_words, with_spread
+from viewer.app.tools.plotting.words import numbers_in_words
 from viewer.scan.units import Scale
 
 TIMES = np.arange(240) / 30
@@ -147,10 +147,6 @@ def test_numbers_are_told_with_how_sure_they_are() -> None:
     told = dict(zip(NUMBER_COLUMNS, row, strict=True))
     assert told["duration [s]"] == pytest.approx(0.6 * math.sqrt(2 * math.log(10)), abs=5e-3)
     assert told["fastest per s"] == pytest.approx(10 / 0.3 * math.exp(-0.5), rel=0.02)
-    assert with_spread(12.3456, 0.1) == "12.35 ± 0.20"
-    assert with_spread(1234.5, 30, "mm") == "1234 ± 60 mm"
-    assert with_spread(12.3456, math.nan, "mm") == "12.35 mm"
-    assert with_spread(math.nan, 0.1) == "-"
 
 
 def test_what_is_missing_is_told_with_values_and_warns_of_numbers(tmp_path: Path) -> None:
@@ -163,8 +159,8 @@ def test_what_is_missing_is_told_with_values_and_warns_of_numbers(tmp_path: Path
     shown = taken(lips, replace(whole, name="other"))
     first, second = shown.curves
     assert value_in_words(lips, 100, MM) == f"- ({why})"
-    assert value_in_words(lips, 30, MM).endswith("mm² (surface fills 70 % of the outline)")
-    assert value_in_words(whole, 30, MM).endswith("mm²")
+    assert value_in_words(lips, 30, MM).endswith(" mm² (95 %) (surface fills 70 % of the outline)")
+    assert value_in_words(whole, 30, MM).endswith("mm² (95 %)")
     assert numbers_in_words(first)[0].startswith("(!) ")
     assert not numbers_in_words(second)[0].startswith("(!)")
     assert first.warning.startswith(f"no value in 4 of 240 frames: {why}; openings in 2 of 240 frames")

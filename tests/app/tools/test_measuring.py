@@ -16,7 +16,7 @@ from viewer.app.scene.canvas import ViewPlace
 from viewer.app.session import Session
 from viewer.app.tool_context import ToolContext
 from viewer.app.tools.measuring import Tool
-from viewer.app.tools.measuring.distances import snap_words
+from viewer.app.tools.measuring.panel import snap_words
 from viewer.camera import Camera
 from viewer.document.landmarks import Landmarks
 

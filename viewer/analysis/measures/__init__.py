@@ -29,6 +29,11 @@ class Measure:
     options: Mapping[str, str] = field(default_factory=dict)
     owns_landmarks: bool = False
 
+    @property
+    def label(self) -> str:
+        """The name over pictures: of "Distance 1" that owns its landmarks, the number alone."""
+        return self.name.removeprefix("Distance ") if self.owns_landmarks else self.name
+
 
 @dataclass(frozen=True, eq=False)
 class Series:

@@ -1,4 +1,4 @@
-"""Distances between two landmarks: their wording, and the table that they are exported to and imported from.
+"""Distances between two landmarks, and the table that they are exported to and imported from.
 
 A table has what a person needs, not all that a key of a landmark holds. Reading it finds the points that an
 end follows again, and takes its covariance to be as wide in all directions as it was in the widest. So ± may
@@ -29,8 +29,6 @@ from ..track import STATES, Known, Track
 from . import Measure, Series
 from .series import series_of
 
-_DECIMALS = (-6, 12)  # that a number is written out with
-_COVERED = "(95 %)"  # of cases in which the true distance is within what ± says
 _MOST_BYTES = 16 * 2**20  # of a table
 _HINT = "Use a table that 'Export distances...' has written, unchanged"
 _OF_END = ("state", "point", "x", "y", "z", "uncertainty", "spacing", "level")
@@ -47,25 +45,6 @@ def distance_of(one: Spot, other: Spot) -> tuple[float, float]:
     measure = Measure("", "distance", ("1", "2"))
     series = series_of(measure, {"1": Track.of(one), "2": Track.of(other)})
     return float(series.values[0]), float(series.sigmas[0])
-
-
-def distance_in_words(distance: float, sigma: float, unit: str, factor: float = 1.0) -> str:
-    """A distance with the digits that its uncertainty leaves it, such as "12.3 ± 0.4 mm (95 %)".
-
-    sigma: its standard deviation, NaN or 0 where unknown. unit, factor: that it is shown in, and how many of
-    it one unit of the scan is.
-    """
-    distance, uncertainty = factor * distance, factor * SURE * sigma
-    if not uncertainty > 0:
-        return f"{distance:.6g} {unit}"
-    power = math.floor(math.log10(uncertainty))
-    decimals = (
-        -power if float(f"{uncertainty:.0e}") >= 2 * 10.0**power else 1 - power
-    )  # two digits from 1.0 to 1.9
-    if not _DECIMALS[0] <= decimals <= _DECIMALS[1]:
-        return f"{distance:.6g} ± {uncertainty:.1g} {unit} {_COVERED}"
-    shown = (f"{round(value, decimals):.{max(decimals, 0)}f}" for value in (distance, uncertainty))
-    return f"{' ± '.join(shown)} {unit} {_COVERED}"
 
 
 # --- as a table -----------------------------------------------------------------------------

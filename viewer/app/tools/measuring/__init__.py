@@ -7,33 +7,51 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
-from numpy.typing import NDArray
 
+from ....analysis.measures import Measure
 from ....analysis.measures.distances import Ends, distance_rows, is_distance_table, read_distances
+from ....analysis.measures.words import measured_in_words
 from ....analysis.spot import Spot
+from ....analysis.track import KNOWN_WORDS, Known
 from ....csv_text import save_rows, to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....files import working_folder
-from ....output.overlays import DrawnMarks
-from ....rigid import STILL, Rigid
+from ....geometry import vector
+from ....output.overlays import LINE_COLOR
 from ....scan.inputs import refuse_input
+from ....scan.units import Scale
 from ...commands import Command, Menu
 from ...read_dialog import ReadDialog
 from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
-from .._seen import seen_in_view
-from . import overlay, panel
-from .distances import Distance, distances_in
+from . import panel
 
 log = logging.getLogger(__name__)
 TITLE = "Distances"
+
+
+class DistanceRow(NamedTuple):
+    """A distance in a frame. value, sigma: scan units, NaN where not known. state: whether its ends were
+    placed or tracked there, in words, or why they are not known. ends: their keys there, or else first."""
+
+    measure: Measure
+    value: float
+    sigma: float
+    state: str
+    ends: tuple[Spot, ...]
+
+    def words(self, scale: Scale) -> str:
+        """The label and the distance, or why it is not known."""
+        words = measured_in_words(scale.factor * self.value, scale.factor * self.sigma, scale.unit)
+        return f"{self.measure.label}: {self.state if math.isnan(self.value) else words}"
 
 
 class Tool:
@@ -51,9 +69,6 @@ class Tool:
         about = "A table that 'Export distances...' has written of this scan"
         self.reading = ReadDialog("Import distances", about, ".csv", self._read, context.redraw)
         self.begun: Spot | None = None
-        self._shown: tuple[tuple[object, ...], list[Distance]] = (), []
-        self._seen: tuple[tuple[object, ...], NDArray[np.bool_]] = (), np.empty(0, bool)
-        self._logged = ""
 
     @property
     def made(self) -> Landmarks:
@@ -129,37 +144,23 @@ class Tool:
 
     # --- in the window ----------------------------------------------------------------
 
-    @property
-    def motion(self) -> Rigid:
-        """The motion of the pose that is shown."""
-        return STILL if self.context.pose is None else self.context.motion(self.context.pose)
-
-    @property
-    def shown(self) -> list[Distance]:
+    def rows(self) -> list[DistanceRow]:
         """The distances in the frame that is shown; none before the first."""
-        pose, followed = self.context.pose, self.context.followed
-        if pose is None:
-            return []
-        of = self.made, followed.tracks, followed.series, pose.index
-        if not _same(of, self._shown[0]):
-            self._shown = of, list(distances_in(self.context, pose.index))
-        return self._shown[1]
-
-    def seen(self, distances: Sequence[Distance]) -> NDArray[np.bool_]:
-        """(N,): of which distances both ends are in the picture and not behind it; found once a picture."""
-        viewport, pose = self.context.viewport, self.context.pose
-        of = viewport.request, viewport.surface, distances
-        if not _same(of, self._seen[0]):
-            found = np.ones(len(distances), bool)
-            if distances and pose is not None:
-                radius = viewport.bounds(pose).radius
-                slacks = np.repeat([one.slack(radius) for one in distances], 2)
-                places = self.motion.points(np.concatenate([one.positions for one in distances]))
-                found = np.logical_and.reduce(
-                    seen_in_view(self.context, places, slacks).reshape(-1, 2), axis=1
-                )
-            self._seen = of, found
-        return self._seen[1]
+        pose, followed, found = self.context.pose, self.context.followed, []
+        for measure in self.made.distances if pose is not None else ():
+            ends = self.made.owned_by(measure)
+            tracks = [followed.tracks.get(end.name) for end in ends]
+            series = followed.series.get(measure.name)
+            if pose is None or series is None or pose.index >= len(series.times):
+                continue
+            known = Known(int(series.known[pose.index]))
+            reasons = [track.reasons.get(pose.index, "") for track in tracks if track is not None]
+            reason = next(filter(None, reasons), "") if known is Known.GAP else ""
+            state = f"{KNOWN_WORDS[known]}: {reason}" if reason else KNOWN_WORDS[known]
+            keys = tuple(end.key_at(pose.index) or end.keys[0] for end in ends)
+            value, sigma = float(series.values[pose.index]), float(series.sigmas[pose.index])
+            found.append(DistanceRow(measure, value, sigma, state, keys))
+        return found
 
     def panel(self, ui: Ui) -> None:
         """Declare the section of the panel."""
@@ -171,20 +172,15 @@ class Tool:
         self.reading.draw()
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
-        """Draw the distances, and note in the log what they read."""
-        words = "; ".join(f"{one.label}: {one.words(self.context.scale)}, {one.state}" for one in self.shown)
-        if words != self._logged:
-            self._logged = words
-            log.debug("distances: %s", words or "none")
-        known = [one for one in self.shown if np.isfinite(one.value)]
-        overlay.draw(self, known if len(known) < len(self.shown) else self.shown, canvas, view)
-
-    def drawn(self, frame: int) -> DrawnMarks:
-        """The distances over a frame of pictures that are saved."""
+        """Draw the distance that was begun; others are drawn as all measures are."""
         pose = self.context.pose
-        radius = 0.0 if pose is None else self.context.viewport.bounds(pose).radius
-        found = (one for one in distances_in(self.context, frame) if np.isfinite(one.value))
-        return DrawnMarks(measure_lines=tuple(one.drawn(self.context.scale, radius) for one in found))
+        if self.begun is None or pose is None:
+            return
+        position = self.context.motion(pose).points(np.array(self.begun.position))
+        if (start := view.on_screen(vector(position))) is not None:
+            if view.is_hovered and self.is_active:
+                canvas.line(start, imgui.get_mouse_pos(), LINE_COLOR, 0.7)
+            canvas.point(start, LINE_COLOR)
 
     # --- out of the window ------------------------------------------------------------
 
@@ -242,7 +238,7 @@ class Tool:
 
     def _add(self, read: Mapping[str, Ends]) -> None:
         made = self.made
-        known = {_places(self._keys(measure.landmarks)) for measure in made.distances}
+        known = {_places([end.keys for end in made.owned_by(measure)]) for measure in made.distances}
         new = {name: ends for name, ends in read.items() if _places(ends) not in known}
         for name, ends in new.items():
             made = made.with_distance(*ends, name)
@@ -252,26 +248,14 @@ class Tool:
         there = f", {len(read) - len(new)} exist already" if len(new) < len(read) else ""
         self.context.note(f"Imported {len(new)} distances{there}.")
 
-    def _keys(self, names: Iterable[str]) -> Ends:
-        first, second = (found.keys for name in names if (found := self.made.named(name)))
-        return first, second
 
-
-def _places(ends: Ends) -> tuple[object, ...]:
+def _places(ends: Sequence[Sequence[Spot]]) -> tuple[object, ...]:
     """The frames and places of the ends, to a millionth of their distance: what tells it from others."""
     digits = 6 - math.floor(math.log10(math.dist(ends[0][0].position, ends[1][0].position) or 1))
     return tuple(
         (number, end.frame, *(round(x, digits) for x in end.position))
         for number, own in enumerate(ends)
         for end in own
-    )
-
-
-def _same(now: tuple[object, ...], before: tuple[object, ...]) -> bool:
-    """Whether each is the very object that it was before, or an equal number."""
-    return len(now) == len(before) and all(
-        one is other or (isinstance(one, int) and one == other)
-        for one, other in zip(now, before, strict=True)
     )
 
 

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ....analysis.spot import Spot
+from ....scan.times import frame_in_words
+from ....scan.units import Scale
 from ... import widgets
 from ...ui import Ui
-from .distances import Distance, end_words, snap_words
 
 if TYPE_CHECKING:
-    from . import Tool
+    from . import DistanceRow, Tool
 
 
 def draw(tool: Tool, ui: Ui) -> None:
@@ -26,10 +29,10 @@ def draw(tool: Tool, ui: Ui) -> None:
     if not tool.made.distances:
         widgets.faint("No distances yet. Press Measure distance, then click two points on the surface.")
         return
-    for one in tool.shown:
-        imgui.push_id(one.measure.name)
-        if _draw_row(tool, one):
-            tool.delete(one.measure.name)
+    for row_of in tool.rows():
+        imgui.push_id(row_of.measure.name)
+        if _draw_row(tool, row_of):
+            tool.delete(row_of.measure.name)
         imgui.pop_id()
     row = ui.row("Copy", "Export CSV...", "Clear")
     if row.button():
@@ -43,19 +46,38 @@ def draw(tool: Tool, ui: Ui) -> None:
     widgets.tooltip("Delete all distances. Undo restores them")
 
 
-def _draw_row(tool: Tool, one: Distance) -> bool:
+def _draw_row(tool: Tool, one: DistanceRow) -> bool:
     """Name and value, and below it what the ends are at; whether it is to be deleted."""
     right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
     scale, button = tool.context.scale, right - 1.3 * imgui.get_frame_height()
     imgui.align_text_to_frame_padding()
-    text = f"{one.label}: {one.words(scale)}"
+    text = one.words(scale)
     imgui.text(widgets.fitted(text, button - imgui.get_cursor_pos_x()))
     about = "± covers the true distance in 95 % of cases. It includes point spacing, pixel size and tracking"
     if any(end.covariance is None for end in one.ends):
         about = "Its uncertainty is not known: measure it again"
-    widgets.tooltip("\n".join([text, *(end_words(end, scale) for end in one.ends), about]))
+    widgets.tooltip("\n".join([text, *(_end_words(end, scale) for end in one.ends), about]))
     imgui.same_line(button)
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
     words = snap_words(one.ends) + (f", {one.state}" if len(tool.context.timeline) > 1 else "")
     imgui.text_disabled(widgets.fitted(words, imgui.get_content_region_avail().x))
     return is_deleted
+
+
+def snap_words(ends: Sequence[Spot]) -> str:
+    """The points that the ends are at, or the surface, such as "at points 12 and 345"."""
+    ids = [end.id for end in ends if end.id is not None]
+    if len(ids) == 2:
+        return f"at points {ids[0]} and {ids[1]}"
+    return f"at point {ids[0]} and on the surface" if ids else "on the surface"
+
+
+def _end_words(end: Spot, scale: Scale) -> str:
+    """The key of an end, in full."""
+    what = "surface" if end.id is None else f"at point {end.id}"
+    place = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
+    spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"
+    seen = f", filled from level {end.level}" if end.level else ""
+    seen += ", at an outline: it may lie on the surface in front or behind" if end.at_outline else ""
+    sure = "" if end.uncertainty is None else f" ± {scale.factor * end.uncertainty:.2g}"
+    return f"{what}, {frame_in_words(end.frame)}: {place}{sure} {scale.unit}, spacing {spacing}{seen}"

@@ -96,6 +96,18 @@ class Tool:
         return [landmark.name for landmark in self.landmarks.listed if landmark.state == "placed"]
 
     @property
+    def unseen(self) -> tuple[str, ...]:
+        """The measures whose lines the view does not show: it always shows distances that own their ends."""
+        measures, hidden, is_shown = self.landmarks.measures, self.choices.hidden, self.settings.lines
+
+        def find() -> tuple[str, ...]:
+            unseen = (one.name for one in measures if not is_shown or one.name in hidden)
+            return tuple(set(unseen) - {one.name for one in self.landmarks.distances})
+
+        found: tuple[str, ...] = self._words.of("unseen", (measures, hidden, is_shown), find)
+        return found
+
+    @property
     def times(self) -> NDArray[np.float64]:
         """(T,) seconds, of the scan's frames."""
         return self.context.timeline.times
@@ -220,8 +232,7 @@ class Tool:
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
         """Draw the ways of landmarks, what is measured in the frame, and the region that is being drawn."""
         self.ways.draw(self.settings, self.choices, canvas, view)
-        if self.settings.lines:
-            self.lines.draw(self.landmarks.measures, self.choices.hidden, self.pointed, canvas, view)
+        self.lines.draw(self.landmarks, self.unseen, self.pointed, canvas, view)
         self.lasso.draw(canvas, view)
 
     def drawn(self, frame: int) -> DrawnMarks:
@@ -233,9 +244,7 @@ class Tool:
         found = self.ways.drawn(self.settings, self.choices, frame, radius)
         if self.is_below() and self.shown.plot is not None:
             found = replace(found, plot=self.shown.plot.drawn_below())
-        if not self.settings.lines:
-            return found
-        lines = self.lines.drawn(self.landmarks.measures, self.choices.hidden, frame, radius)
+        lines = self.lines.drawn(self.landmarks, self.unseen, frame, radius)
         return replace(found, measure_lines=lines)
 
     def advance(self, budget: float) -> bool:

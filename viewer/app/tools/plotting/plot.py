@@ -12,13 +12,14 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ....analysis.measures.curves import correlations
+from ....analysis.measures.words import with_note, with_uncertainty
 from ....output.overlays import BAND_OPACITY
 from ....output.plots import CurvePlot, PlotLine
 from ... import widgets
 from ...ui import Ui
 from .choices import AGAINST, MODE_WORDS, ORDER_WORDS, REPEATS, TIME
 from .shown import Curve, chosen_of
-from .words import NUMBERS_HELP, WARNING, with_note, with_spread
+from .words import NUMBERS_HELP, WARNING
 
 if TYPE_CHECKING:
     from . import Tool
@@ -301,7 +302,7 @@ def _draw_table(tool: Tool, frame: int, size: ImVec2) -> None:
     for curve in curves:
         imgui.table_next_row()
         _draw_name(tool, curve)
-        now = with_spread(float(curve.values[frame]), float(curve.sigmas[frame]), curve.unit)
+        now = with_uncertainty(float(curve.values[frame]), float(curve.sigmas[frame]), curve.unit)
         now = with_note(now, curve.notes.get(frame, ""))
         told = (f"{related[curve.name]:.3f}" if curve.name in related else "",)
         for words in (now, *(told if is_against else tool.words_of(curve))):

@@ -1,12 +1,13 @@
-"""What is said of curves: values with how sure they are, and the numbers of a movement."""
+"""The numbers of a movement in words."""
 
 from __future__ import annotations
 
 import math
 
-from ....analysis.measures.curves import BAND_SIGMAS, MeasureCurve
+from ....analysis.measures.curves import MeasureCurve
+from ....analysis.measures.words import UNKNOWN, with_uncertainty
+from ....analysis.pick import SURE
 
-UNKNOWN = "-"
 WARNING = "(!)"  # before numbers of a movement that the user should know more about
 NUMBERS_HELP = {
     "Amplitude": "Distance from rest (the mean of the first frames) to the peak. ± covers 95 %",
@@ -15,22 +16,6 @@ NUMBERS_HELP = {
     "Duration": "From onset until the curve returns to within 10 % of the amplitude from rest",
     "Fastest": "Largest speed in either direction",
 }
-
-
-def with_spread(value: float, sigma: float, unit: str = "") -> str:
-    """A value and twice its standard deviation, in as many digits as that tells; a dash where not known."""
-    if math.isnan(value):
-        return UNKNOWN
-    spread = BAND_SIGMAS * sigma
-    if not spread > 0:
-        return f"{value:.4g} {unit}".rstrip()
-    decimals = max(0, 1 - math.floor(math.log10(spread)))
-    return f"{value:.{decimals}f} ± {spread:.{decimals}f} {unit}".rstrip()
-
-
-def with_note(words: str, note: str) -> str:
-    """A value in words, with what to know about it."""
-    return f"{words} ({note})" if note else words
 
 
 def numbers_in_words(curve: MeasureCurve) -> tuple[str, ...]:
@@ -44,11 +29,11 @@ def numbers_in_words(curve: MeasureCurve) -> tuple[str, ...]:
         (movement.peak, 0.0),
         (movement.duration, movement.duration_sigma),
     )
-    amplitude = with_spread(movement.amplitude, movement.amplitude_sigma, curve.unit)
+    amplitude = with_uncertainty(movement.amplitude, movement.amplitude_sigma, curve.unit)
     if curve.warning:
         amplitude = f"{WARNING} {amplitude}"
     return amplitude, *(_seconds(*time) for time in times), fastest
 
 
 def _seconds(time: float, sigma: float) -> str:
-    return UNKNOWN if math.isnan(time) else f"{time:.2f} s" + (f" ± {2 * sigma:.2f}" if sigma > 0 else "")
+    return UNKNOWN if math.isnan(time) else f"{time:.2f} s" + (f" ± {SURE * sigma:.2f}" if sigma > 0 else "")
