@@ -97,7 +97,7 @@ def data_dir() -> Path:
 @pytest.fixture(scope="session")
 def renderer() -> Renderer:
     """A headless renderer on whatever OpenGL there is; all GPU tests share it."""
-    from viewer.drawing.frame import shared_renderer
+    from viewer.drawing.renderer import shared_renderer
 
     return shared_renderer()
 

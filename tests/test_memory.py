@@ -13,7 +13,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 PLAY = """
 import sys, viewer
-from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
 

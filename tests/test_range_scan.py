@@ -15,7 +15,8 @@ from viewer import cli
 from viewer.camera import Camera
 from viewer.commands import render as render_command
 from viewer.commands._scans import read_poses
-from viewer.drawing.frame import bring, is_prepared, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.plan import Effort, Ready, Waiting, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -120,11 +121,11 @@ def test_a_window_has_points_merged_by_a_worker(scan: Path, renderer: Renderer) 
     with open_scan(scan) as timeline:
         pose = timeline.pose(0)
     own, request = Renderer(renderer.gpu), Request(pose, Camera.orbit(pose.bounds), "points")
-    assert not is_prepared(own, request, (64, 48))
-    while not bring(own, request, (64, 48), budget_ms=1000):
-        assert own.preparing is None or own.preparing.name == "Merging range views"
+    assert isinstance(make_plan(own, request, (64, 48), Effort.NONE), Waiting)
+    while not isinstance(make_plan(own, request, (64, 48), Effort.BEGIN, upload_ms=1000), Ready):
+        assert own.work.preparing is None or own.work.preparing.name == "Merging range views"
     assert pose.is_merged
-    assert is_prepared(own, request, (64, 48))
+    assert isinstance(make_plan(own, request, (64, 48), Effort.NONE), Ready)
     assert own.resident(pose).stored is pose.cloud
     assert own.bytes_of(pose) == 12 * len(pose.cloud)
     own.release()

@@ -119,9 +119,10 @@ class Job:
         return not (self.future.running() or self.future.done())
 
     @property
-    def has_failed(self) -> bool:
-        """Whether its result is an error, and not since it was cancelled."""
-        return self.future.done() and not self.task.cancelled and self.future.exception() is not None
+    def error(self) -> BaseException | None:
+        """The error that it ended with; None if there is none, and for a job that was cancelled."""
+        is_over = self.future.done() and not self.task.cancelled
+        return self.future.exception() if is_over else None
 
     def failed(self, error: Exception) -> Job:
         """Make a job of it that has ended with an error."""

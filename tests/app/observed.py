@@ -167,7 +167,7 @@ def shown(app: App) -> dict[str, Any]:
         "size": app.window.buffer_size,
         "windows": imgui.get_frame_count(),
         "pictures": viewport.number,
-        "jobs": app.renderer.unfinished,
+        "jobs": app.renderer.work.unfinished,
         "held_bytes": app.renderer.held_bytes,
         "ready_ahead": app.ahead.ready,
         "is_preview": viewport.is_preview,

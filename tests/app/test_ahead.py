@@ -16,8 +16,8 @@ from viewer.app.playing.player import Pace
 from viewer.app.session import Session
 from viewer.camera import Camera
 from viewer.document.document import Document
-from viewer.drawing.frame import prepare_ahead
 from viewer.drawing.renderer import Renderer
+from viewer.drawing.work import BackgroundWork
 from viewer.rigid import STILL
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -42,11 +42,11 @@ class Spheres:
         return PointCloud.from_arrays(sphere(300 + index).positions)
 
 
-class Noting(Renderer):
-    """A renderer that notes what it is asked for, and takes as long as it is told."""
+class NotingWork(BackgroundWork):
+    """Work that notes what it is asked for, and takes as long as a test says."""
 
-    def __init__(self, gpu: Any) -> None:
-        super().__init__(gpu)
+    def __init__(self, renderer: Renderer) -> None:
+        super().__init__(renderer)
         self.asked: list[list[int]] = []
         self.afresh: list[bool] = []
         self.seconds = 0.0
@@ -60,6 +60,14 @@ class Noting(Renderer):
     @property
     def latency(self) -> float:
         return self.seconds
+
+
+class Noting(Renderer):
+    """A renderer that notes what it is asked for, and takes as long as a test says."""
+
+    def __init__(self, gpu: Any) -> None:
+        super().__init__(gpu)
+        self.work: NotingWork = NotingWork(self)
 
 
 @pytest.fixture
@@ -100,30 +108,30 @@ def until(condition: Callable[[], object]) -> None:
 def test_frames_are_asked_for_as_they_are_due_and_none_at_rest(renderer: Noting, start: Callable) -> None:
     playback, ahead = start()
     ahead.advance(0.0)
-    assert set(renderer.asked[-1]) == {0}, "at rest the one that is shown"
+    assert set(renderer.work.asked[-1]) == {0}, "at rest the one that is shown"
     playback.toggle(0.0)
     ahead.advance(0.0)
-    assert list(dict.fromkeys(renderer.asked[-1])) == [*range(COUNT)]
+    assert list(dict.fromkeys(renderer.work.asked[-1])) == [*range(COUNT)]
     playback.change(0.0, reverse=True)
     ahead.advance(0.0)
-    assert list(dict.fromkeys(renderer.asked[-1])) == [0, *reversed(range(1, COUNT))]
+    assert list(dict.fromkeys(renderer.work.asked[-1])) == [0, *reversed(range(1, COUNT))]
     playback.change(0.0, reverse=False, loop=False)
     playback.seek(9, 0.0)
     ahead.advance(0.0)
-    assert [index for index in renderer.asked[-1] if index] == [9, 10, 11]
+    assert [index for index in renderer.work.asked[-1] if index] == [9, 10, 11]
 
 
 def test_what_would_be_late_comes_last_but_for_every_frame(renderer: Noting, start: Callable) -> None:
     playback, ahead = start()
-    renderer.seconds = 0.25
+    renderer.work.seconds = 0.25
     playback.toggle(0.0)
     ahead.advance(0.0)
-    shown, *asked = renderer.asked[-1]
+    shown, *asked = renderer.work.asked[-1]
     assert shown == 0
     assert asked == [*range(3, COUNT), 2, 1, 0]
     playback.change(0.0, every_frame=True)
     ahead.advance(0.0)
-    assert renderer.asked[-1][1:] == [*range(COUNT)]
+    assert renderer.work.asked[-1][1:] == [*range(COUNT)]
 
 
 def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Callable) -> None:
@@ -131,7 +139,7 @@ def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Calla
 
     def is_afresh() -> bool:
         ahead.advance(0.0)
-        return renderer.afresh[-1]
+        return renderer.work.afresh[-1]
 
     assert is_afresh()
     playback.toggle(0.0)
@@ -152,12 +160,12 @@ def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Calla
 def test_a_second_lap_needs_no_work(renderer: Noting, start: Callable, backend: str) -> None:
     playback, ahead = start(backend)
     playback.toggle(0.0)
-    until(lambda: (ahead.advance(0.0), ahead.ready == COUNT - 1 and renderer.unfinished == 0)[1])
+    until(lambda: (ahead.advance(0.0), ahead.ready == COUNT - 1 and renderer.work.unfinished == 0)[1])
     shown = []
     for frame in range(1, 2 * COUNT):
         now = frame / 10 + 0.01
         ahead.advance(0.0)
-        assert renderer.unfinished == 0
+        assert renderer.work.unfinished == 0
         playback.advance(now)
         assert playback.pose is not None
         shown.append(playback.pose.index)
@@ -179,7 +187,7 @@ def test_a_frame_that_is_not_prepared_leaves_the_one_before_and_counts_as_droppe
     third = session.document.request(timeline.ready(3))
 
     def third_is_there() -> bool:
-        prepare_ahead(renderer, [third])
+        renderer.work.prepare_ahead([third])
         return ahead.is_prepared(third.pose)
 
     until(third_is_there)
@@ -242,5 +250,5 @@ def test_nothing_is_asked_for_before_there_is_a_camera(renderer: Noting, start: 
     playback.session.amend(camera=None)
     playback.toggle(0.0)
     ahead.advance(0.0)
-    assert renderer.asked[-1] == []
+    assert renderer.work.asked[-1] == []
     assert ahead.is_prepared(playback.pose)

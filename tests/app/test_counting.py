@@ -14,7 +14,7 @@ from viewer.app.scene.counting import Counting, words
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
-from viewer.drawing.frame import shared_renderer
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.scan.pose import Pose
 

@@ -20,7 +20,7 @@ from viewer.app.scene.viewport import Viewport
 from viewer.app.session import Session
 from viewer.backends import Backend
 from viewer.camera import Camera
-from viewer.drawing.frame import shared_renderer
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.scan import formats
@@ -103,7 +103,7 @@ def test_points_of_a_sequence_are_merged_where_it_is_read(timeline: Timeline, vi
     timeline.finish = lambda pose: find_facts(pose, of_points=True)
     shown = play(timeline, viewport, "points")
     assert all(pose.is_merged for pose in shown)
-    assert viewport.renderer.preparing is None
+    assert viewport.renderer.work.preparing is None
     assert timeline.pose(0).nbytes > timeline.pose(0).cloud.nbytes
 
 

@@ -170,7 +170,7 @@ def test_a_frame_without_the_chosen_scalar_is_drawn_in_other_colours_and_the_cho
 def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> None:
     document = Document(camera=Camera(), backend="gone", params={"gone": {"size": 3}})
     assert document.defaults(BARE) == Document().defaults(BARE)
-    assert document.request(BARE).backend == "points"
+    assert document.request(BARE).backend.name == "points"
     told: list[str] = []
     session = Session("one", document)
     with closing(open_scan("demo")) as timeline:

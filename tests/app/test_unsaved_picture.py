@@ -9,7 +9,7 @@ from scenes import sphere
 import viewer
 from viewer.app.output.unsaved_picture import UnsavedPicture
 from viewer.camera import Camera
-from viewer.drawing.frame import shared_renderer
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
 from viewer.look import SAMPLES, Look

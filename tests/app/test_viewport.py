@@ -17,8 +17,7 @@ from viewer.app.scene import viewport as viewport_module
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import Backend, FrameView
 from viewer.camera import Camera
-from viewer.drawing.frame import shared_renderer
-from viewer.drawing.renderer import Renderer
+from viewer.drawing.renderer import Renderer, shared_renderer
 from viewer.drawing.request import Request
 from viewer.gpu.pose import GpuPose
 from viewer.look import Look
@@ -162,7 +161,7 @@ def test_a_backend_that_draws_more_simply_in_motion_is_called_again_at_rest(view
             surface.stats.simplified = frame.moving
             return False
 
-    request = replace(REQUEST, backend=Simple("simple"))
+    request = replace(REQUEST, backend=Simple("simple"), params=None)
     viewport.draw(request)
     assert (told, viewport.is_complete) == ([False], True)
     dragged = turned(request)
@@ -264,7 +263,7 @@ def turned(request: Request) -> Request:
     return replace(request, camera=request.camera.orbited(10, 0))
 
 
-@pytest.mark.parametrize("step", ["bring", "render_frame"])
+@pytest.mark.parametrize("step", ["make_plan", "draw_plan"])
 def test_whatever_fails_is_a_problem_and_the_image_before_stays(
     viewport: Viewport, step: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -287,7 +286,7 @@ def test_a_surface_that_nothing_was_drawn_into_is_not_shown(
     viewport: Viewport, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     viewport.draw(REQUEST)
-    monkeypatch.setattr(viewport_module, "render_frame", failing)
+    monkeypatch.setattr(viewport_module, "draw_plan", failing)
     viewport.place = (0, 0, 30, 20)
     viewport.draw(REQUEST)
     assert not viewport.is_visible

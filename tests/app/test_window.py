@@ -26,7 +26,8 @@ from viewer.app.loop import _WATCH
 from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.document.recording import Recording
-from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import shared_renderer
 from viewer.picture.surface import Surface
 from viewer.scan import formats
 from viewer.scan.open import open_scan

@@ -24,7 +24,7 @@ from viewer.choice.goal import Goal
 from viewer.choice.model import ERROR_TERMS, TIME_TERMS, Law
 from viewer.choice.ways import DrawingWay
 from viewer.document.document import Document
-from viewer.drawing.frame import shared_renderer
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import view_of
 from viewer.look import Look
 from viewer.scan.open import open_scan
@@ -178,7 +178,7 @@ def test_it_is_what_a_command_chooses_for_the_same_picture(shown: Shown) -> None
     assert expected is not None
     assert way == expected.way
     assert shown.choosing.choice_of(request) == expected
-    assert shown.choosing.choice_of(replace(request, backend="points")) is None
+    assert shown.choosing.choice_of(replace(request, backend="points", params=None)) is None
 
 
 def test_pictures_that_take_far_longer_than_the_limit_are_told_once(shown: Shown) -> None:

@@ -12,8 +12,9 @@ from scenes import every_backend, of_variant
 import viewer
 from viewer.analysis.pick import is_seen, pick
 from viewer.camera import Camera
-from viewer.drawing.frame import bring, render_frame, shared_renderer
-from viewer.drawing.renderer import Renderer
+from viewer.drawing.frame import render_frame
+from viewer.drawing.plan import Effort, Waiting, make_plan
+from viewer.drawing.renderer import Renderer, shared_renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
 from viewer.look import Look
@@ -165,7 +166,7 @@ def test_a_window_brings_positions_that_count_from_the_view() -> None:
     own, cloud, camera = Renderer(shared_renderer().gpu), of_all_scales(1.0), at(PART, 1.0)
     pose = Pose(0, 0.0, "x", cloud)
     request = Request(pose, camera, "points")
-    while not bring(own, request, SIZE, budget_ms=0.01):
+    while isinstance(make_plan(own, request, SIZE, Effort.BEGIN, upload_ms=0.01), Waiting):
         pass
     resident = own.resident(pose)
     assert (resident.origin == origin_near(camera, SIZE, cloud.origin)).all()

@@ -11,6 +11,7 @@ from scenes import NOTHING, sphere
 from viewer.backends import SHARES, backend, surfels
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame, reshade, supersample
+from viewer.drawing.plan import Ready, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -102,7 +103,9 @@ def test_it_is_shaded_anew_and_has_samples_as_others_have(renderer: Renderer) ->
     asked = request("touching", share=0.25)
     render_frame(renderer, asked, surface)
     other = replace(asked, look=Look(color_by="depth", quality="balanced"))
-    assert reshade(renderer, other, surface)
+    ready = make_plan(renderer, other, SIZE)
+    assert isinstance(ready, Ready)
+    assert reshade(ready, surface)
     while supersample(renderer, other, surface):
         pass
     assert surface.stats.samples > 1

@@ -12,9 +12,11 @@ import viewer
 from viewer.backends import CHANGES, Backend, Derives, FrameView
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
-from viewer.drawing.frame import bring, is_prepared, render_frame
-from viewer.drawing.renderer import Renderer, Want
-from viewer.drawing.request import Request, backend_for, fallback
+from viewer.drawing.frame import render_frame
+from viewer.drawing.jobs import Stage
+from viewer.drawing.plan import Effort, Ready, Waiting, make_plan
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request, backend_for, fallback, view_of
 from viewer.errors import InputError
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
@@ -118,11 +120,19 @@ def _of(cloud: PointCloud) -> Pose:
     return Pose(0, 0.0, "x", cloud)
 
 
-def _view(azimuth: float = 0.0, size: tuple[int, int] = SIZE) -> View:
-    return View.of(Camera.orbit(BARE.bounds(), azimuth), size, BARE.origin, BARE.bounds())
+def asked(pose: Pose, backend: Backend, azimuth: float = 0.0, **params: int) -> Request:
+    return Request(pose, Camera.orbit(BARE.bounds(), azimuth), backend, _Params(**params))
 
 
-VIEW = _view()
+def derived_of(own: Renderer, request: Request, effort: Effort = Effort.WAIT) -> _Uploaded | None:
+    """What was derived for a picture; None while it is not there."""
+    planned = make_plan(own, request, SIZE, effort)
+    assert isinstance(planned, Ready | Waiting)
+    return planned.derived if isinstance(planned, Ready) else None  # type: ignore[return-value]
+
+
+def is_ready(own: Renderer, request: Request, size: tuple[int, int] = SIZE) -> bool:
+    return isinstance(make_plan(own, request, size, Effort.NONE), Ready)
 
 
 class Deriving(Backend):
@@ -150,32 +160,31 @@ def deriving() -> Backend:
 
 def test_a_pose_at_another_time_keeps_what_was_made_of_it(renderer: Renderer, deriving: Backend) -> None:
     own, poses = Renderer(renderer.gpu), [Pose(0, 0.0, "x", sphere(1000))]
-    first = own.prepare(own.resident(poses[0]), deriving, _Params(), Look(), wait=True, view=VIEW)
+    first = derived_of(own, asked(poses[0], deriving))
     poses[0] = poses[0].at(2.0)
     own.resident(Pose(1, 0.0, "y", sphere(10)))
-    again = own.prepare(own.resident(poses[0]), deriving, _Params(), Look(), wait=True, view=VIEW)
+    again = derived_of(own, asked(poses[0], deriving))
     assert again is first
     del poses[0]
     own.resident(Pose(1, 0.0, "y", sphere(10)))
-    assert own.nbytes < first.derived.nbytes, "it goes with the pose"
+    assert own.nbytes < first.nbytes, "it goes with the pose"
     own.release()
 
 
 def test_derived_data_is_made_once_counted_and_evicted(renderer: Renderer, deriving: Backend) -> None:
     own = Renderer(renderer.gpu, budget_bytes=1)
     pose = Pose(0, 0.0, "x", sphere(1000))
-    resident = own.resident(pose)
-    first = own.prepare(resident, deriving, _Params(), Look(), wait=True, view=VIEW)
+    first = derived_of(own, asked(pose, deriving))
     assert first is not None
-    drawn_alike = own.prepare(resident, deriving, _Params(shade=5), Look(), wait=True, view=VIEW)
+    drawn_alike = derived_of(own, asked(pose, deriving, shade=5))
     assert drawn_alike is first
-    other = own.prepare(resident, deriving, _Params(step=5), Look(), wait=True, view=VIEW)
+    other = derived_of(own, asked(pose, deriving, step=5))
     assert other is not None
-    assert first.derived.process == other.derived.process == os.getpid()
-    assert own.nbytes == first.derived.nbytes + other.derived.nbytes == 12 * (500 + 200)
+    assert first.process == other.process == os.getpid()
+    assert own.nbytes == first.nbytes + other.nbytes == 12 * (500 + 200)
     own.resident(replace(pose, index=1))
     assert own.nbytes == 0
-    assert first.derived.released
+    assert first.released
     own.release()
 
 
@@ -189,23 +198,22 @@ def test_what_is_derived_by_camera_is_kept_for_the_last_views(renderer: Renderer
     deriving.derived_by_camera = True
     deriving.derive = nearer_half  # type: ignore[method-assign]
     own, pose = Renderer(renderer.gpu), _of(sphere(1000))
-    resident, views = own.resident(pose), [_view(azimuth) for azimuth in range(0, 60, 10)]
+    azimuths = range(0, 60, 10)
 
-    def derived(view: View, **params: int) -> _Uploaded:
-        prepared = own.prepare(resident, deriving, _Params(**params), Look(), wait=True, view=view)
-        assert prepared is not None
-        assert isinstance(prepared.derived, _Uploaded)
-        return prepared.derived
+    def derived(azimuth: float, **params: int) -> _Uploaded:
+        found = derived_of(own, asked(pose, deriving, azimuth, **params))
+        assert isinstance(found, _Uploaded)
+        return found
 
-    first = [derived(view) for view in views[:4]]
+    first = [derived(azimuth) for azimuth in azimuths[:4]]
     assert len({one.array.tobytes() for one in first}) == 4
-    assert derived(_view(0)) is first[0], "an equal view"
+    assert derived(0) is first[0], "an equal view"
     assert own.nbytes == 4 * 12 * 500
-    assert own.is_prepared(Want(pose, deriving, _Params(), Look(), views[1]))
-    assert not own.is_prepared(Want(pose, deriving, _Params(), Look(), _view(0, size=(65, 48))))
-    derived(views[4])
+    assert is_ready(own, asked(pose, deriving, azimuths[1]))
+    assert not is_ready(own, asked(pose, deriving), size=(65, 48))
+    derived(azimuths[4])
     assert [one.released for one in first] == [False, True, False, False], "the one that was used longest ago"
-    other = derived(views[0], step=5)
+    other = derived(0, step=5)
     assert not any(one.released for one in (first[0], other)), "others are kept for other parameters"
     assert own.nbytes == 5 * 12 * 500
     own.release()
@@ -231,14 +239,13 @@ def test_jobs_of_views_that_were_passed_are_dropped(renderer: Renderer, deriving
     deriving.derived_by_camera = True
     deriving.derive = nearer_half  # type: ignore[method-assign]
     own, pose = Renderer(renderer.gpu), _of(sphere(1000))
-    resident = own.resident(pose)
-    entry = own._entry(resident)
+    entry = own.draw(pose)
     for azimuth in range(6):
-        assert own.prepare(resident, deriving, _Params(), Look(), False, _view(azimuth)) is None
-        while own.preparing is not None:
+        assert derived_of(own, asked(pose, deriving, azimuth), Effort.BEGIN) is None
+        while own.work.preparing is not None:
             time.sleep(0.001)
         assert len(entry.jobs) == 1, "what is found for views that nobody looks at any more is not held"
-    last = own.prepare(resident, deriving, _Params(), Look(), False, _view(5))
+    last = derived_of(own, asked(pose, deriving, 5), Effort.BEGIN)
     assert last is not None
     assert not entry.jobs
     own.release()
@@ -258,13 +265,13 @@ def test_a_job_of_a_view_that_was_passed_is_cancelled(renderer: Renderer, derivi
     deriving.derives = Derives.ON_THREAD
     deriving.derive = derive  # type: ignore[method-assign]
     own, pose = Renderer(renderer.gpu), _of(sphere(1000))
-    resident = own.resident(pose)
-    assert own.prepare(resident, deriving, _Params(), Look(), False, _view(0)) is None
+    assert derived_of(own, asked(pose, deriving, 0), Effort.BEGIN) is None
     deadline = time.monotonic() + 20
-    while own.prepare(resident, deriving, _Params(), Look(), False, _view(1)) is None:
+    while derived_of(own, asked(pose, deriving, 1), Effort.BEGIN) is None:
         assert time.monotonic() < deadline
         time.sleep(0.001)
-    assert [view.key for view in began] == [_view(0).key, _view(1).key]
+    keys = [view_of(asked(pose, deriving, azimuth), SIZE).key for azimuth in (0, 1)]
+    assert [view.key for view in began] == keys
     own.release()
 
 
@@ -329,21 +336,20 @@ def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancell
 ) -> None:
     own = Renderer(renderer.gpu)
     pose = Pose(0, 0.0, "x", sphere(1000))
-    resident = own.resident(pose)
-    assert not own.is_prepared(Want(pose, deriving, _Params(), Look(), VIEW))
-    assert own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW) is None
-    task = own.preparing
+    assert not is_ready(own, asked(pose, deriving))
+    assert derived_of(own, asked(pose, deriving), Effort.BEGIN) is None
+    task = own.work.preparing
     assert task is not None
     assert task.name == "Preparing Deriving"
     task.cancel()
-    assert own.preparing is None
-    while (prepared := own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)) is None:
-        assert own.preparing is not task, "what was cancelled begins anew"
+    assert own.work.preparing is None
+    while (prepared := derived_of(own, asked(pose, deriving), Effort.BEGIN)) is None:
+        assert own.work.preparing is not task, "what was cancelled begins anew"
         time.sleep(0.001)
-    assert prepared.derived.process != os.getpid()
-    np.testing.assert_array_equal(prepared.derived.array, pose.cloud.positions[::2])
-    assert own.is_prepared(Want(pose, deriving, _Params(), Look(), VIEW))
-    assert own.preparing is None
+    assert prepared.process != os.getpid()
+    np.testing.assert_array_equal(prepared.array, pose.cloud.positions[::2])
+    assert is_ready(own, asked(pose, deriving))
+    assert own.work.preparing is None
     own.release()
 
 
@@ -352,12 +358,12 @@ def test_what_a_thread_does_is_prepared_there_and_may_be_done_in_time(
 ) -> None:
     deriving.derives = Derives.ON_THREAD
     own = Renderer(renderer.gpu)
-    resident = own.resident(pose := Pose(0, 0.0, "x", sphere(1000)))
-    prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
+    pose = Pose(0, 0.0, "x", sphere(1000))
+    prepared = derived_of(own, asked(pose, deriving), Effort.BEGIN)
     while prepared is None:  # a busy machine
-        prepared = own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
-    assert prepared.derived.process == os.getpid()
-    assert own.is_prepared(Want(pose, deriving, _Params(), Look(), VIEW))
+        prepared = derived_of(own, asked(pose, deriving), Effort.BEGIN)
+    assert prepared.process == os.getpid()
+    assert is_ready(own, asked(pose, deriving))
     own.release()
 
 
@@ -369,9 +375,9 @@ def test_work_on_a_thread_can_be_cancelled(renderer: Renderer, deriving: Backend
     deriving.derives = Derives.ON_THREAD
     deriving.derive = until_told  # type: ignore[method-assign]
     own = Renderer(renderer.gpu)
-    resident = own.resident(Pose(0, 0.0, "x", sphere(1000)))
-    assert own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW) is None
-    task = own.preparing
+    pose = Pose(0, 0.0, "x", sphere(1000))
+    assert derived_of(own, asked(pose, deriving), Effort.BEGIN) is None
+    task = own.work.preparing
     assert task is not None
     task.cancel()
     own.release()  # waits for the thread
@@ -388,9 +394,8 @@ def test_releasing_ends_what_is_being_prepared(renderer: Renderer, deriving: Bac
     own = Renderer(renderer.gpu)
     deriving.derive = for_ever  # type: ignore[method-assign]
     pose = Pose(0, 0.0, "x", sphere(1000))
-    resident = own.resident(pose)
-    own.prepare(resident, deriving, _Params(), Look(), wait=False, view=VIEW)
-    task = own.preparing
+    derived_of(own, asked(pose, deriving), Effort.BEGIN)
+    task = own.work.preparing
     assert task is not None
     while task.progress is None:
         time.sleep(0.001)
@@ -426,12 +431,13 @@ def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> N
     own = Renderer(renderer.gpu)
     pose = Pose(0, 0.0, "x", sphere(1000))
     request = Request(pose, Camera.orbit(pose.cloud.bounds()), "surfels")
-    assert bring(own, request, SIZE, budget_ms=1000)
+    assert isinstance(make_plan(own, request, SIZE, Effort.BEGIN, upload_ms=1000), Ready)
     assert own.bytes_of(pose) == 1000 * (12 + 12), "positions and normals"
     bare = Request(Pose(0, 0.0, "x", BARE), request.camera, "surfels", look=Look(color_by="normal"))
-    assert bring(own, bare, SIZE, budget_ms=1000)
-    assert not is_prepared(own, bare, SIZE)
-    assert is_prepared(own, fallback(bare), SIZE)
+    waiting = make_plan(own, bare, SIZE, Effort.BEGIN, upload_ms=1000)
+    assert isinstance(waiting, Waiting)
+    assert (waiting.stage, waiting.why) == (Stage.ESTIMATE, "Estimating normals")
+    assert isinstance(make_plan(own, fallback(bare), SIZE, Effort.NONE), Ready)
     assert fallback(bare).params.point_size == 0, "which touch: no dust in between"
     own.release()
 
@@ -440,12 +446,12 @@ def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> N
 def test_estimates_are_the_same_whoever_makes_them(renderer: Renderer) -> None:
     pose, surfels = Pose(0, 0.0, "x", BARE), find_backend("surfels")
     clouds = []
-    for wait in (True, False):
+    for effort in (Effort.WAIT, Effort.BEGIN):
         own = Renderer(renderer.gpu)
-        resident = own.resident(pose)
-        while own.prepare(resident, surfels, surfels.params({"radius": "own"}), Look(), wait, VIEW) is None:
+        request = Request(pose, Camera.orbit(BARE.bounds()), surfels, surfels.params({"radius": "own"}))
+        while not isinstance(planned := make_plan(own, request, SIZE, effort), Ready):
             time.sleep(0.01)
-        clouds.append(resident.cloud)
+        clouds.append(planned.pose.cloud)
         own.release()
     np.testing.assert_array_equal(clouds[0].normals, clouds[1].normals)
     np.testing.assert_array_equal(clouds[0].radii, clouds[1].radii)

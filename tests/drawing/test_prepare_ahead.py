@@ -13,11 +13,13 @@ from scenes import sphere
 
 from viewer.backends import Backend, Derives, FrameView
 from viewer.backends import backend as find_backend
-from viewer.drawing.renderer import Renderer, Want
+from viewer.camera import Camera
+from viewer.drawing.plan import Effort, Waiting, make_plan
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.errors import InputError
 from viewer.gpu.context import Gpu
 from viewer.gpu.pose import GpuPose
-from viewer.look import Look
 from viewer.params import param
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
@@ -27,6 +29,7 @@ from viewer.view import View
 
 BYTES = 12_000  # of what is derived of a pose
 BARE = PointCloud.from_arrays(sphere(1500).positions)
+CAMERA = Camera.orbit(BARE.bounds())
 
 
 @dataclass(frozen=True)
@@ -82,8 +85,13 @@ def deriving(derive: Callable, on_thread: bool = True) -> Backend:
     return backend
 
 
-def want(pose: Pose, backend: Backend, **params: int) -> Want:
-    return Want(pose, backend, backend.params(params), Look(), None)
+def want(pose: Pose, backend: Backend, **params: int) -> Request:
+    return Request(pose, CAMERA, backend, backend.params(params))
+
+
+def is_prepared(own: Renderer, request: Request) -> bool:
+    """Whether nothing is missing but what depends on the view, or drawing reports an error."""
+    return not isinstance(make_plan(own, request, None, Effort.NONE), Waiting)
 
 
 @pytest.fixture
@@ -98,14 +106,14 @@ def poses() -> list[Pose]:
     return [Pose(number, float(number), f"frame {number}", sphere(1000)) for number in range(20)]
 
 
-def prepare_all(own: Renderer, wants: list[Want], goal: Callable[[], bool], afresh: bool = False) -> None:
+def prepare_all(own: Renderer, wants: list[Request], goal: Callable[[], bool], afresh: bool = False) -> None:
     """As a window does, until something has come about."""
     deadline = time.monotonic() + 60
-    own.prepare_ahead(wants, afresh)
+    own.work.prepare_ahead(wants, afresh)
     while not goal():
         assert time.monotonic() < deadline
         time.sleep(0.002)
-        own.prepare_ahead(wants)
+        own.work.prepare_ahead(wants)
 
 
 def test_poses_are_prepared_a_few_at_a_time_and_kept(own: Renderer, poses: list[Pose]) -> None:
@@ -114,24 +122,24 @@ def test_poses_are_prepared_a_few_at_a_time_and_kept(own: Renderer, poses: list[
 
     def all_there() -> bool:
         nonlocal most
-        most = max(most, own.unfinished)
-        return all(own.is_prepared(one) for one in wants)
+        most = max(most, own.work.unfinished)
+        return all(is_prepared(own, one) for one in wants)
 
     prepare_all(own, wants, all_there)
     assert 1 <= most <= 3 * (os.cpu_count() or 1)
-    assert own.unfinished == 0
+    assert own.work.unfinished == 0
     assert own.nbytes == len(poses) * BYTES
-    own.prepare_ahead([])
-    assert all(own.is_prepared(one) for one in wants), "they are kept though nobody wants them now"
-    assert own.latency > 0
+    own.work.prepare_ahead([])
+    assert all(is_prepared(own, one) for one in wants), "they are kept though nobody wants them now"
+    assert own.work.latency > 0
 
 
 @pytest.mark.slow
 def test_estimates_come_first_and_what_is_derived_goes_by_them(own: Renderer) -> None:
     voxels, pose = find_backend("voxels"), Pose(0, 0.0, "x", BARE)
     wanted = want(pose, voxels)
-    prepare_all(own, [wanted], lambda: own.is_prepared(wanted))
-    assert own.is_prepared(want(pose, find_backend("surfels"), radius="uniform"))  # type: ignore[arg-type]
+    prepare_all(own, [wanted], lambda: is_prepared(own, wanted))
+    assert is_prepared(own, want(pose, find_backend("surfels"), radius="uniform"))  # type: ignore[arg-type]
     assert pose.cloud.normals is None, "the scan itself is left as it was"
     assert own.resident(pose).cloud.normals is not None
 
@@ -139,21 +147,21 @@ def test_estimates_come_first_and_what_is_derived_goes_by_them(own: Renderer) ->
 def test_what_waits_is_dropped_when_other_poses_are_wanted(own: Renderer, poses: list[Pose]) -> None:
     backend = deriving(slowly)
     slow, quick = ([want(pose, backend) for pose in poses if pose.index % 2 == odd] for odd in (0, 1))
-    own.prepare_ahead(slow)
-    assert own.unfinished > 1
-    prepare_all(own, quick[:1], lambda: own.is_prepared(quick[0]), afresh=True)
-    assert not any(own.is_prepared(one) for one in slow)
+    own.work.prepare_ahead(slow)
+    assert own.work.unfinished > 1
+    prepare_all(own, quick[:1], lambda: is_prepared(own, quick[0]), afresh=True)
+    assert not any(is_prepared(own, one) for one in slow)
 
 
 @pytest.mark.slow
 def test_work_in_processes_is_ended_where_it_keeps_others_waiting(own: Renderer, poses: list[Pose]) -> None:
     backend = deriving(slowly, on_thread=False)
     slow, quick = ([want(pose, backend) for pose in poses if pose.index % 2 == odd] for odd in (0, 1))
-    prepare_all(own, slow, lambda: own.preparing is not None and own.preparing.progress is not None)
-    process = own.preparing.progress if own.preparing else None
+    prepare_all(own, slow, lambda: own.work.preparing is not None and own.work.preparing.progress is not None)
+    process = own.work.preparing.progress if own.work.preparing else None
     assert process is not None
-    prepare_all(own, quick[:4], lambda: all(own.is_prepared(one) for one in quick[:4]), afresh=True)
-    assert not any(own.is_prepared(one) for one in slow)
+    prepare_all(own, quick[:4], lambda: all(is_prepared(own, one) for one in quick[:4]), afresh=True)
+    assert not any(is_prepared(own, one) for one in slow)
 
 
 def test_what_a_worker_is_at_is_let_finish_while_playing_goes_on(own: Renderer, poses: list[Pose]) -> None:
@@ -167,7 +175,7 @@ def test_what_a_worker_is_at_is_let_finish_while_playing_goes_on(own: Renderer, 
     backend = deriving(derive)
     first, *later = (want(pose, backend) for pose in poses[:6])
     prepare_all(own, [first], lambda: bool(began))
-    prepare_all(own, later, lambda: own.is_prepared(first))
+    prepare_all(own, later, lambda: is_prepared(own, first))
     assert began.count(0) == 1
 
 
@@ -179,9 +187,9 @@ def test_the_budget_holds_what_is_drawn_soonest(own: Renderer, poses: list[Pose]
     def step_to(playhead: int) -> list[int]:
         own.steps_to = lambda pose: (pose.index - playhead) % len(poses)
         ahead = wants[playhead:] + wants[:playhead]
-        prepare_all(own, ahead, lambda: own.is_prepared(ahead[3]) and own.unfinished == 0)
+        prepare_all(own, ahead, lambda: is_prepared(own, ahead[3]) and own.work.unfinished == 0)
         assert own.held_bytes <= own.budget_bytes
-        return [number for number, one in enumerate(wants) if own.is_prepared(one)]
+        return [number for number, one in enumerate(wants) if is_prepared(own, one)]
 
     assert step_to(0) == [0, 1, 2, 3, 4]
     assert step_to(3) == [3, 4, 5, 6, 7]
@@ -190,11 +198,11 @@ def test_the_budget_holds_what_is_drawn_soonest(own: Renderer, poses: list[Pose]
 
 def test_a_failure_is_told_when_it_is_drawn_and_holds_up_nothing(own: Renderer, poses: list[Pose]) -> None:
     one, other = (want(pose, deriving(failing)) for pose in poses[:2])
-    prepare_all(own, [one, other], lambda: own.is_prepared(one) and own.is_prepared(other))
+    prepare_all(own, [one, other], lambda: is_prepared(own, one) and is_prepared(own, other))
     good = want(poses[2], deriving(every_nth))
-    prepare_all(own, [one, good], lambda: own.is_prepared(good))
+    prepare_all(own, [one, good], lambda: is_prepared(own, good))
     with pytest.raises(InputError, match="frame 0: is no good"):
-        own.prepare(own.resident(poses[0]), one.backend, one.params, Look(), False, None)  # type: ignore[arg-type]
+        raise make_plan(own, one, None, Effort.BEGIN).error  # type: ignore[union-attr]
 
 
 def test_an_upload_that_fails_is_tried_once_and_told_when_it_is_drawn(
@@ -209,35 +217,34 @@ def test_an_upload_that_fails_is_tried_once_and_told_when_it_is_drawn(
     backend = deriving(every_nth)
     backend.upload = upload  # type: ignore[method-assign,assignment]
     bad, good = want(poses[0], backend), want(poses[1], deriving(every_nth))
-    prepare_all(own, [bad, good], lambda: own.is_prepared(bad) and own.is_prepared(good))
-    own.prepare_ahead([bad])
+    prepare_all(own, [bad, good], lambda: is_prepared(own, bad) and is_prepared(own, good))
+    own.work.prepare_ahead([bad])
     assert len(tried) == 1
     with pytest.raises(InputError, match="does not fit"):
-        own.prepare(own.resident(poses[0]), backend, bad.params, Look(), False, None)  # type: ignore[arg-type]
+        raise make_plan(own, bad, None, Effort.BEGIN).error  # type: ignore[union-attr]
 
 
 def test_what_cannot_be_drawn_is_passed_over(own: Renderer, poses: list[Pose]) -> None:
-    pyramidal = find_backend("pyramidal")
-    refused = Want(poses[0], pyramidal, pyramidal.params(), Look(), None)
+    refused = Request(poses[0], CAMERA, "laplacian")
     good = want(poses[1], deriving(every_nth))
-    prepare_all(own, [refused, good], lambda: own.is_prepared(good))
-    assert own.is_prepared(refused), "drawing it tells why"
+    prepare_all(own, [refused, good], lambda: is_prepared(own, good))
+    assert is_prepared(own, refused), "drawing it tells why"
 
 
 def test_the_last_few_ways_of_drawing_a_pose_are_kept(own: Renderer, poses: list[Pose]) -> None:
     backend = deriving(every_nth)
     ways = [want(poses[0], backend, step=step) for step in range(1, 8)]
     for way in ways:
-        prepare_all(own, [way], lambda way=way: own.is_prepared(way))  # type: ignore[misc]
-    assert [own.is_prepared(way) for way in ways] == [False] * 3 + [True] * 4
+        prepare_all(own, [way], lambda way=way: is_prepared(own, way))  # type: ignore[misc]
+    assert [is_prepared(own, way) for way in ways] == [False] * 3 + [True] * 4
 
 
 def test_releasing_ends_all_processes_at_work(renderer: Renderer, poses: list[Pose]) -> None:
     own = Renderer(renderer.gpu)
     slow = [want(pose, deriving(slowly, on_thread=False)) for pose in poses if pose.index % 2 == 0]
-    own.prepare_ahead(slow)
-    tasks = [job.task for job in own._unfinished]
-    while own.preparing is None or own.preparing.progress is None:
+    own.work.prepare_ahead(slow)
+    tasks = [job.task for job in own.work._unfinished]
+    while own.work.preparing is None or own.work.preparing.progress is None:
         time.sleep(0.002)
     own.release()
     for process in {int(task.progress) for task in tasks if task.progress}:

@@ -11,7 +11,9 @@ from scenes import sphere
 
 from viewer.backends import backend, backends
 from viewer.camera import Camera
-from viewer.drawing.frame import render_frame, reshade
+from viewer.drawing.frame import render_frame
+from viewer.drawing.frame import reshade as reshade_plan
+from viewer.drawing.plan import Ready, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -43,6 +45,12 @@ def pose() -> Pose:
     cloud = sphere(1500)
     assert cloud.normals is not None
     return Pose(0, 0.0, "", replace(cloud, scalars={"height_of": cloud.normals[:, 1]}))
+
+
+def reshade(renderer: Renderer, request: Request, surface: Surface) -> bool:
+    ready = make_plan(renderer, request, surface.size)
+    assert isinstance(ready, Ready)
+    return reshade_plan(ready, surface)
 
 
 def whole(renderer: Renderer, request: Request, surface: Surface) -> None:
@@ -91,6 +99,6 @@ def test_what_shows_something_else_is_not_shaded(renderer: Renderer, pose: Pose)
     assert reshade(renderer, relit, surface)
     with pytest.raises(InputError):
         render_frame(renderer, replace(request, look=Look(color_by="missing")), surface)
-    assert not reshade(renderer, request, surface), "it was not drawn"
+    assert reshade(renderer, request, surface), "a plan that failed leaves the picture as it is"
     render_frame(renderer, request, surface, share=0.9)
     assert not reshade(renderer, request, surface), "it shows a part of the points"

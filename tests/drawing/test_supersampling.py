@@ -12,7 +12,8 @@ from scenes import every_backend, of_variant, sphere
 
 from viewer.backends import backend
 from viewer.camera import Camera
-from viewer.drawing.frame import render_frame, sample_shifts, supersample
+from viewer.drawing.frame import draw_plan, render_frame, sample_shifts, supersample
+from viewer.drawing.plan import make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.look import SAMPLES, Look
@@ -40,7 +41,7 @@ def of_sphere(name: str, projection: str = "perspective", **look: object) -> Req
 def drawn(renderer: Renderer, request: Request, shift: Shift = (0.0, 0.0)) -> Surface:
     """One sample of each pixel."""
     surface = Surface(renderer.gpu, SIZE)
-    while render_frame(renderer, request, surface, shift=shift):
+    while draw_plan(make_plan(renderer, request, SIZE), surface, budget_ms=None, shift=shift):  # type: ignore[arg-type]
         pass
     return surface
 

@@ -34,7 +34,8 @@ from viewer.document.landmarks import Landmarks
 from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
 from viewer.document.schema import usable
-from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
 from viewer.look import Look

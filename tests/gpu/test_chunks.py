@@ -51,7 +51,7 @@ def camera_in(cloud: PointCloud, azimuth: float = 0.0) -> Camera:
 
 def drawn(renderer: Renderer, request: Request, share: float = 1.0) -> tuple[Any, ...]:
     """What a picture shows. That of auto splats is larger than the margin of points that take part."""
-    surface = Surface(renderer.gpu, (720, 480) if request.backend == "auto_splats" else SIZE)
+    surface = Surface(renderer.gpu, (720, 480) if request.backend.name == "auto_splats" else SIZE)
     while render_frame(renderer, request, surface, share=share) and share == 1:
         pass
     found = surface.image(), surface.id, surface.depth, surface.stats.skipped.get("points")

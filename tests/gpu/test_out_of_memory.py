@@ -18,7 +18,8 @@ import resource, sys
 from pathlib import Path
 from viewer.camera import Camera
 from viewer.errors import Scan4DError
-from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan

@@ -18,7 +18,8 @@ from viewer.analysis.spot import Spot
 from viewer.backends import Backend
 from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_request
-from viewer.drawing.frame import bring, is_prepared, render_frame
+from viewer.drawing.frame import render_frame
+from viewer.drawing.plan import Effort, Ready, Waiting, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -229,7 +230,7 @@ def test_counts_are_those_of_the_points(renderer: Renderer, scene: str, share: f
     assert not pose.is_merged
     if share == 1:
         other = Surface(renderer.gpu, SIZE)
-        render_frame(renderer, replace(request, backend="points"), other)
+        render_frame(renderer, replace(request, backend="points", params=None), other)
         assert other.point_counts() == counts
 
 
@@ -297,11 +298,11 @@ def test_a_sequence_is_drawn_without_merging_anything(renderer: Renderer, backen
     for pose in poses:
         for look in (FLAT, Look(), Look(light="head"), replace(FLAT, color_by="height")):
             request = Request(pose, camera, backend, look=look)
-            while not bring(own, request, SIZE, budget_ms=5):
+            while isinstance(make_plan(own, request, SIZE, Effort.BEGIN, upload_ms=5), Waiting):
                 pass
             while render_frame(own, request, surface, wait=False, moving=True):
                 time.sleep(0.001)
-            assert is_prepared(own, request, SIZE)
+            assert isinstance(make_plan(own, request, SIZE, Effort.NONE), Ready)
             assert surface.stats.backend == str(backend)
             assert (surface.row != NOTHING).sum() > 500
     assert not any(pose.is_merged for pose in poses)

@@ -19,7 +19,8 @@ from endurance import CACHE_MB, FRAMES, POINTS, endure, own_megabytes, playing_a
 
 from viewer.backends import backends
 from viewer.camera import Camera
-from viewer.drawing.frame import render_frame, shared_renderer
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan

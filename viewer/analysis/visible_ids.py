@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing.frame import shared_renderer
+from ..drawing.renderer import shared_renderer
 from ..drawing.request import Request
 from ..gpu.pose import drawn_bounds
 from ..view import View

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..backends.auto_splats.neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from ..camera import Camera
-from ..drawing.frame import shared_renderer
+from ..drawing.renderer import shared_renderer
 from ..errors import InputError
 from ..gpu.constants import UNKNOWN
 from ..picture.surface import Surface

@@ -55,7 +55,7 @@ class Tasks(WindowPart):
     @property
     def all(self) -> list[Task]:
         """All of the work, the latest last."""
-        preparing = self.viewport.renderer.preparing
+        preparing = self.viewport.renderer.work.preparing
         tasks = [self.exporting.task, self.capture.task, preparing, self.opener.job.task, *self.tools.tasks]
         if self.playback.pose is None:
             tasks.append(self.playback.timeline.reading)
@@ -64,7 +64,7 @@ class Tasks(WindowPart):
     @property
     def shown(self) -> list[Task]:
         """The work to show, the latest last."""
-        patience = {self.viewport.renderer.preparing: _PLAYING_PATIENCE} if self._is_playing else {}
+        patience = {self.viewport.renderer.work.preparing: _PLAYING_PATIENCE} if self._is_playing else {}
         return [task for task in self.all if task.seconds > patience.get(task, _PATIENCE)]
 
     @property
@@ -96,7 +96,7 @@ class Tasks(WindowPart):
         is_told = task is self.playback.timeline.reading  # by what the timeline says of the frame
         if task is self.opener.job.task:
             self.opener.job.cancel()
-        elif task is self.viewport.renderer.preparing:
+        elif task is self.viewport.renderer.work.preparing:
             self._choose_prepared()
         task.cancel()
         if not is_told:

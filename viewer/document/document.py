@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, Any, TypeVar, get_type_hints
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from ..errors import InputError, shortened
 from ..geometry import UP, Vector, up_vector
 from ..look import Look
 from ..scan.layers import NO_LAYERS, Layers
-from ..scan.pose import Pose
+from ..scan.pose import Life, Pose
 from ..scan.units import usable_unit
 from .part import Part
 from .schema import (
@@ -241,17 +243,33 @@ class Document:
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and the parameters that it begins with; the pose's
-        default where the one that was chosen is not there or cannot draw it."""
-        name, defaults = backend_for(pose)
-        wanted = self.backend if self._automatic is None else self._automatic.backend
-        is_own = wanted != name and wanted in backends() and backends()[wanted].draws(pose)
-        return backend_for(pose, wanted) if is_own else (name, defaults)
+        default if the chosen backend does not exist or cannot draw it. Found once for a pose."""
+        return self._resolved(pose)[0]
 
     def chosen(self, pose: Pose) -> tuple[str, Any]:
-        """The backend that draws this pose, by name, and its parameters."""
+        """The backend that draws this pose, by name, and its parameters. Found once for a pose."""
+        return self._resolved(pose)[1]
+
+    def _resolved(self, pose: Pose) -> tuple[tuple[str, Any], tuple[str, Any]]:
+        """The results of `defaults` and of `chosen`."""
+        if pose.life not in self._known:
+            defaults = self._find_defaults(pose)
+            self._known[pose.life] = defaults, self._find_chosen(*defaults)
+        return self._known[pose.life]
+
+    @cached_property
+    def _known(self) -> WeakKeyDictionary[Life, tuple[tuple[str, Any], tuple[str, Any]]]:
+        return WeakKeyDictionary()
+
+    def _find_defaults(self, pose: Pose) -> tuple[str, Any]:
+        own, automatic = backend_for(pose), self._automatic
+        wanted = self.backend if automatic is None else automatic.backend
+        is_other = wanted != own[0] and wanted in backends() and backends()[wanted].draws(pose)
+        return backend_for(pose, wanted) if is_other else own
+
+    def _find_chosen(self, name: str, defaults: Any) -> tuple[str, Any]:
         if self._automatic is not None:
             return self._automatic.backend, self._automatic.params
-        name, defaults = self.defaults(pose)
         params = self.params.get(name, defaults)
         return name, params if isinstance(params, type(defaults)) else usable(defaults, params)
 

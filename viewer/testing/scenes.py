@@ -9,7 +9,8 @@ import numpy as np
 
 from ..backends import Backend, backend
 from ..camera import Camera
-from ..drawing.frame import render_frame, shared_renderer
+from ..drawing.frame import render_frame
+from ..drawing.renderer import shared_renderer
 from ..drawing.request import Request
 from ..look import Look
 from ..picture.surface import Surface

@@ -13,7 +13,8 @@ from scenes import rarely, sphere
 
 from viewer.backends.hpr import Params
 from viewer.camera import Camera
-from viewer.drawing.frame import render_frame
+from viewer.drawing.frame import draw_plan
+from viewer.drawing.plan import make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -178,7 +179,8 @@ class DrawnMarks:
     ) -> Surface:
         surface = surface or self.surface
         request = Request(self.pose, camera, "hpr", self.params, look or Look(light="flat"))
-        while render_frame(self.renderer, request, surface, **how):  # type: ignore[arg-type]
+        planned = make_plan(self.renderer, request, SIZE)
+        while draw_plan(planned, surface, budget_ms=None, **how):  # type: ignore[arg-type]
             pass
         return surface
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ...drawing.frame import bring, prepare, render_frame, supersample
+from ...drawing.frame import draw_plan, supersample
+from ...drawing.plan import Effort, Failed, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request
 from ...look import SAMPLES
@@ -28,15 +29,18 @@ class UnsavedPicture:
     def advance(self) -> Surface | None:
         """Draw a slice, which takes about as long as one picture; what it is drawn on, once it is complete.
         Raises what drawing does."""
-        if not bring(self._renderer, self.request, self._size, _UPLOAD_MS):
-            return None
-        if not prepare(self._renderer, self.request, self._size):
+        planned = make_plan(self._renderer, self.request, self._size, Effort.BEGIN, _UPLOAD_MS)
+        if isinstance(planned, Failed):
+            raise planned.error
+        if isinstance(planned, Waiting):
             return None
         if self._surface is None:
             self._surface = Surface(self._renderer.gpu, self._size)
         surface = self._surface
-        draw = supersample if self._slices else render_frame
-        is_rough = draw(self._renderer, self.request, surface, wait=False)
+        if self._slices:
+            is_rough = supersample(self._renderer, self.request, surface, wait=False)
+        else:
+            is_rough = draw_plan(planned, surface)
         self._renderer.gpu.ctx.finish()  # so that a turn of the window's loop takes no more than this
         if self._slices or not is_rough:  # the first one may take several calls
             self._slices += 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...document.document import Document
-from ...drawing.frame import is_prepared, prepare_ahead
+from ...drawing.plan import Effort, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request
 from ...scan.pose import Pose
@@ -37,7 +37,9 @@ class Ahead(WindowPart):
     def is_prepared(self, pose: Pose) -> bool:
         """Whether a pose can be drawn as the document has it, but for what its view alone needs."""
         request = self._request(pose)
-        return request is None or is_prepared(self.renderer, request)
+        if request is None:
+            return True
+        return not isinstance(make_plan(self.renderer, request, None, Effort.NONE), Waiting)
 
     def advance(self, now: float) -> None:
         """Take in what was prepared, and ask for what is shown next; what is not any more is dropped."""
@@ -45,7 +47,8 @@ class Ahead(WindowPart):
         asked = (playback.jumps, playback.timeline, *_how(document))
         ahead = [playback.timeline.ready(index) for index in reversed(self._next())]  # the next one used last
         requests = [self._request(pose) for pose in (playback.pose, *reversed(ahead)) if pose is not None]
-        prepare_ahead(self.renderer, [r for r in requests if r is not None], afresh=asked != self._asked)
+        wanted = [request for request in requests if request is not None]
+        self.renderer.work.prepare_ahead(wanted, afresh=asked != self._asked)
         self._asked = asked
 
     def _next(self) -> list[int]:
@@ -57,7 +60,7 @@ class Ahead(WindowPart):
             return [index]
         late = 0
         if not (session.pace.every_frame or playback.is_held):
-            late = min(math.ceil(self.renderer.latency * player.rate), count - 1)
+            late = min(math.ceil(self.renderer.work.latency * player.rate), count - 1)
         steps = [*range(late, min(late + _REACH, count)), *reversed(range(late))]
         frames = [playback.after(index, step) for step in steps]
         return [frame for frame in frames if frame is not None]

@@ -163,7 +163,7 @@ class Choosing(WindowPart):
             return
         self._timed = viewport.number
         is_in_full = viewport.is_complete and not viewport.is_preview and "draw" not in surface.stats.skipped
-        if is_in_full and (request.backend, request.params) == (way.backend, way.params):
+        if is_in_full and (request.backend.name, request.params) == (way.backend, way.params):
             times = self._times.get(way.key)
             if times is None:  # the first one takes what is made once
                 self._times[way.key] = deque(maxlen=_LAST)
@@ -192,7 +192,7 @@ class Choosing(WindowPart):
         if self.choice is None or self.session.document.goal is None or not self._has_looked:
             return None
         way = self.choice.way
-        return self.choice if (request.backend, request.params) == (way.backend, way.params) else None
+        return self.choice if (request.backend.name, request.params) == (way.backend, way.params) else None
 
     COMMANDS = (
         Command(

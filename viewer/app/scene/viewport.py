@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.pick import Picked, before_gap, pick
-from ...backends import backends
 from ...bounds import Bounds
-from ...drawing.frame import bring, is_prepared, prepare, render_frame, reshade, supersample
+from ...drawing.frame import draw_plan, reshade, scaled_size, supersample
+from ...drawing.jobs import Stage
+from ...drawing.plan import Effort, Failed, Plan, Ready, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request, colorable, fallback
 from ...errors import Scan4DError
@@ -94,20 +95,22 @@ class Viewport:
             request.pose, request.camera, request.backend, request.params, request.look, request.layers, size,
             self.renderer.gpu.timers.enabled,
         )  # fmt: skip
-        now, before = time.monotonic(), self.surface
-        if wanted != self._drawn:
+        now, before, is_new = time.monotonic(), self.surface, wanted != self._drawn
+        if is_new:
             self._motion.change(now, playing or held)
         elif now < self.better_at(playing):
             return False
+        moving = playing or now < self._motion.ends
+        detail = self._budget(request).detail if moving else Detail()
         try:
-            if not bring(self.renderer, request, size, _UPLOAD_MS):
-                later = 0.0 if self.renderer.preparing is None else _PREPARED_LATER
-                self._prepared_at = now + later  # until then the picture before stays
-                return False
-            drawn = self._to_draw(request, size)
-            is_there = drawn is request and is_prepared(self.renderer, request, size)
-            if drawn is None or not (is_there or wanted != self._drawn or self.is_preview):
-                self._prepared_at = now + _PREPARED_LATER  # the same again would be the same
+            asked = make_plan(
+                self.renderer, request, scaled_size(size, detail.scale), Effort.BEGIN, _UPLOAD_MS
+            )
+            planned = self._drawable(asked)
+            would_be_same = not (is_new or self.is_preview or isinstance(asked, Ready))
+            if planned is None or would_be_same:
+                is_uploading = isinstance(asked, Waiting) and asked.stage is Stage.UPLOAD
+                self._prepared_at = now + (0.0 if is_uploading else _PREPARED_LATER)
                 return False
             self._drawn, self.request, self._picked = wanted, request, None
             self._is_rough = False
@@ -115,44 +118,47 @@ class Viewport:
             if size != self.size:  # what was drawn for the other goes with whoever has it still
                 self._surfaces.clear()
             self.size = size
-            moving = playing or now < self._motion.ends
-            full = self._surfaces.get("full")
-            is_kept = full is not None and full.size == size and drawn is request
-            if full is not None and is_kept and reshade(self.renderer, request, full):
-                self._detail, self.surface = Detail(), full
-                self._note_drawn(request, full, as_asked=True, refinable=False)
-                return True
-            self._detail = self._budget(request).detail if moving else Detail()
-            self.surface = surface = self._surface_of(self._detail)
-            share = self._detail.share
-            refinable = render_frame(
-                self.renderer, drawn, surface, wait=False, share=share, moving=moving, before=before
-            )
-            if self._detail.scale < 1:
-                soften(surface)
+            self._draw_plan(planned, planned is asked, detail, moving)
         except Exception as error:  # whatever a scan brings, the window stays
             self._drawn, self.request, self.problem = wanted, request, _problem(request, error)
             self._is_rough = False
             self.surface, self._prepared_at = before if before in self._surfaces.values() else None, math.inf
-            return True
-        if moving:
-            self._simplifies[surface.stats.backend] = surface.stats.simplified
-        self._note_drawn(request, surface, drawn is request, refinable)
         return True
 
-    def _to_draw(self, request: Request, size: tuple[int, int]) -> Request | None:
-        """The request, where all is there but what its view alone needs. Else, for as long as workers are at
-        it, the pose as the one before was drawn, or None where that needs work too and the picture before
-        stays; plain points where there is none."""
-        if is_prepared(self.renderer, request) or prepare(self.renderer, request, size):
-            return request
-        before = self._as_before(request)
-        is_other = self.is_there and self.request is not None and self.request.pose is not request.pose
-        return None if before is None and is_other else before or fallback(request)
+    def _drawable(self, asked: Plan) -> Ready | Waiting | None:
+        """The plan to draw now; None: the picture before stays.
+
+        While workers prepare the pose, that is the pose drawn as the last one was. If that needs work too,
+        the picture before stays if it shows another pose; else plain points stand in. Raises the error of a
+        plan that failed.
+        """
+        if isinstance(asked, Failed):
+            raise asked.error
+        if isinstance(asked, Ready) or asked.stage is Stage.DERIVE_VIEW:
+            return asked
+        if asked.stage in (Stage.MERGE, Stage.UPLOAD):
+            return None
+        is_other = self.is_there and self.request is not None and self.request.pose is not asked.request.pose
+        return self._as_before(asked.request, asked.size) or (None if is_other else asked)
+
+    def _draw_plan(self, planned: Ready | Waiting, as_asked: bool, detail: Detail, moving: bool) -> None:
+        """Draw a plan at a detail. as_asked: whether it is of the last request."""
+        request, before, full = planned.request, self.surface, self._surfaces.get("full")
+        ready = planned if as_asked and isinstance(planned, Ready) else None
+        if ready is not None and full is not None and reshade(ready, full):
+            self._detail, self.surface = Detail(), full
+            self._note_drawn(request, full, as_asked=True, refinable=False)
+            return
+        self._detail, self.surface = detail, self._surface_of(detail)
+        surface = self.surface
+        refinable = draw_plan(planned, surface, share=detail.share, moving=moving, before=before)
+        if detail.scale < 1:
+            soften(surface)
+        if moving:
+            self._simplifies[surface.stats.backend] = surface.stats.simplified
+        self._note_drawn(request, surface, ready is not None, refinable)
 
     def _note_drawn(self, request: Request, surface: Surface, as_asked: bool, refinable: bool) -> None:
-        drew, count = surface.stats.backend, request.pose.count - surface.stats.left_out
-        as_asked &= drew == str(request.backend)
         if as_asked:
             self._asked_for = request
         now = self.shown_at = time.monotonic()
@@ -165,20 +171,23 @@ class Viewport:
             self._prepared_at = now
         has_samples = SAMPLES[request.look.quality] > 1
         self._is_rough = has_samples and as_asked and not (refinable or self.is_preview)
+        count, drew = request.pose.count - surface.stats.left_out, surface.stats.backend
         pixels = surface.size
         log.debug("drew frame %d with %s, %dx%d pixels, %d points", request.pose.index, drew, *pixels, count)
 
     def without_preparing(self, request: Request) -> Request:
         """A request to show instead, for which nothing has to be prepared: as before, or plain points."""
-        return self._as_before(request) or fallback(request)
+        before = self._as_before(request, self.size)
+        return fallback(request) if before is None else before.request
 
-    def _as_before(self, request: Request) -> Request | None:
-        """The request, drawn as the last one was that got what it asked for; None where that needs work."""
+    def _as_before(self, request: Request, size: tuple[int, int]) -> Ready | None:
+        """The plan of the pose, drawn as the last one was that got what it asked for; None if that needs
+        work."""
         if self._asked_for is None:
             return None
         before = replace(self._asked_for, pose=request.pose, camera=request.camera, layers=request.layers)
-        before = colorable(before)
-        return before if is_prepared(self.renderer, before, self.size) else None
+        found = make_plan(self.renderer, colorable(before), size, Effort.NONE)
+        return found if isinstance(found, Ready) else None
 
     def refine(self) -> bool:
         """Draw one more sample of each pixel (see `frame.supersample`), or go on with one; whether the
@@ -239,25 +248,25 @@ class Viewport:
         surface, request = self.surface, self.request
         if self.problem is not None or surface is None or request is None or "draw" in surface.stats.skipped:
             return
-        is_typical = surface.stats.simplified or not self._simplifies[str(request.backend)]  # of motion
-        if surface.stats.backend == str(request.backend) and is_typical:
+        is_typical = surface.stats.simplified or not self._simplifies[request.backend.name]  # of motion
+        if surface.stats.backend == request.backend.name and is_typical:
             pixels = math.prod(self.size)
             self._budget(request).note(ms, self._detail, goal_ms, request.pose.count, pixels)
 
     def _budget(self, request: Request) -> Budget:
-        name = str(request.backend)
-        if name not in self._budgets:
-            self._budgets[name] = Budget(name in backends() and backends()[name].accumulates)
-        return self._budgets[name]
+        backend = request.backend
+        if backend.name not in self._budgets:
+            self._budgets[backend.name] = Budget(backend.accumulates)
+        return self._budgets[backend.name]
 
     def _surface_of(self, detail: Detail) -> Surface:
         """The surface for a detail; one in full and one for previews are kept."""
-        width, height = (max(1, round(pixels * detail.scale)) for pixels in self.size)
+        size = scaled_size(self.size, detail.scale)
         kind = "full" if detail.scale == 1 else "preview"
         surface = self._surfaces.get(kind)
-        if surface is None or surface.size != (width, height):
+        if surface is None or surface.size != size:
             # The one before may be what the next picture goes on from: it goes with whoever has it still.
-            surface = self._surfaces[kind] = Surface(self.renderer.gpu, (width, height))
+            surface = self._surfaces[kind] = Surface(self.renderer.gpu, size)
         return surface
 
     @property
