@@ -79,19 +79,29 @@ class Actor:
                 self._walked.begin()
             else:
                 if self._window == PANEL:
-                    arguments = [_found(context, one) for one in arguments]
+                    arguments = [_reached(context, one) for one in arguments]
                 getattr(context, name)(*arguments)
 
 
 def _found(context: engine.TestContext, argument: Any) -> Any:
-    """The argument of an action; a path of a widget begins with the section of the panel that has it."""
+    """The argument of an action; a path of a widget begins with the section of the panel that has it. None
+    for a path of which no widget is there."""
     if not isinstance(argument, str) or not argument or argument.startswith(("//", "**")):
         return argument
     there = engine.TestItemList()
     context.gather_items(there, "", 99)
     ids = {there.get_by_index(number).id_ for number in range(there.get_size())}
     paths = (argument, *(f"{section}/{argument}" for section in SECTIONS))
-    return next((path for path in paths if context.get_id(path) in ids), argument)
+    return next((path for path in paths if context.get_id(path) in ids), None)
+
+
+def _reached(context: engine.TestContext, argument: Any) -> Any:
+    """The same, once all sections of the panel are open where they hide it; that takes tens of frames."""
+    found = _found(context, argument)
+    if found is None:
+        context.item_open_all("")
+        found = _found(context, argument)
+    return argument if found is None else found
 
 
 def _let_go_of_the_lock() -> Any:

@@ -221,10 +221,9 @@ class RunningApp:
 
         window: its name; a part of it that scrolls by itself has its own below that. actions: methods of
         TestContext of ImGui's test engine and their arguments, as ("item_click", "Time each pass"). Sections
-        of the panel are opened before. ends: whether the app ends by that, which is not waited for.
+        of the panel are opened where they hide a widget. ends: whether the app ends by that, which is not
+        waited for.
         """
-        if window == PANEL:
-            actions = (("item_open_all", ""), *actions)
         if ends:
             self._send(window, *actions)
             return
