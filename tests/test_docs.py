@@ -8,7 +8,6 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -18,21 +17,16 @@ from viewer.app import tools
 from viewer.app.commands import Command, Menu
 from viewer.app.menus import Commands
 from viewer.backends import backends
-from viewer.bench import measuring
-from viewer.bench.papers.farooq_2013 import farooq, laplacian
-from viewer.bench.papers.machado_2014 import hpr
-from viewer.bench.papers.marsik_2010 import codeword
-from viewer.bench.papers.preiner_2012 import preiner
-from viewer.bench.papers.slomp_2014 import octree_tables, table_two
-from viewer.bench.report import choices, defaults_page, scene_table
-from viewer.bench.report.measurement import put_tables
 from viewer.look import Look, ValueKind
 from viewer.params import Parameter, describe
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
-SOURCES = [*(ROOT / "viewer").rglob("*.py"), *(p for p in (ROOT / "shaders").rglob("*") if p.is_file())]
-_PATH = re.compile(r"(?<![\w/.-])(?:viewer|shaders|tests|docs|assets)/[\w/.-]*\w")
+SOURCES = [
+    *(path for folder in ("viewer", "tools") for path in (ROOT / folder).rglob("*.py")),
+    *(path for path in (ROOT / "shaders").rglob("*") if path.is_file()),
+]
+_PATH = re.compile(r"(?<![\w/.-])(?:viewer|shaders|tests|docs|assets|tools)/[\w/.-]*\w")
 # A file whose text a page gives, to be written by the reader: its name, and then a block of code.
 _GIVEN = re.compile(r"`([\w/]+\.\w+)`:?\n\n```")
 # These set up, open a window or run all tests; they have tests of their own.
@@ -168,57 +162,6 @@ def test_the_page_of_parameters_is_up_to_date(bless: bool) -> None:
     if bless:
         page.write_text(backends_page(), encoding="utf-8")
     assert page.read_text(encoding="utf-8") == backends_page()
-
-
-@pytest.mark.parametrize(
-    "tables", [table_two, octree_tables, farooq, preiner], ids=lambda tables: tables.NAME
-)
-def test_the_pages_of_measurements_are_up_to_date(tables: ModuleType, bless: bool) -> None:
-    page = page_named(f"{tables.NAME}.md")
-    files = sorted((ROOT / "docs" / "data").glob(f"{tables.NAME}*.json"))
-    assert files
-    made = tables.page([tables.read_measurement(file) for file in files])
-    if bless:
-        page.write_text(made, encoding="utf-8")
-    assert page.read_text(encoding="utf-8") == made
-
-
-@pytest.mark.parametrize(
-    "made",
-    [scene_table, defaults_page, measuring, choices, hpr, laplacian, codeword],
-    ids=lambda made: made.NAME,
-)
-def test_the_tables_of_measurements_are_up_to_date(made: ModuleType, bless: bool) -> None:
-    page = page_named(made.PAGE)
-    files = sorted((ROOT / "docs" / "data").glob(f"{made.NAME}*.json"))
-    assert files
-    text = page.read_text(encoding="utf-8")
-    filled = put_tables(text, made.tables([made.read_measurement(file) for file in files]))
-    if bless:
-        page.write_text(filled, encoding="utf-8")
-    assert page.read_text(encoding="utf-8") == filled
-
-
-def test_each_place_of_a_table_has_what_makes_it() -> None:
-    """A suite of the benchmark, or a script of docs/tables; and none of them makes one without a place."""
-    made = [
-        (suite.PAGE, key)
-        for suite in (scene_table, defaults_page, measuring, choices, hpr, laplacian, codeword)
-        for key in suite.tables(
-            [suite.read_measurement(next((ROOT / "docs" / "data").glob(f"{suite.NAME}*")))]
-        )
-    ]
-    for script in (ROOT / "docs" / "tables").glob("*.py"):
-        text = script.read_text(encoding="utf-8")
-        for tables in re.findall(r"remeasure_tables\(PAGE, (.*)\)", text):
-            (page,) = re.findall(r'^PAGE = .*"([\w-]+\.md)"$', text, re.M)
-            made += [(page, key) for key in tables.split(", ")]
-    places = [
-        (page.name, key)
-        for page in DOCS
-        for key in re.findall(r"^<!-- (\w+) -->$", page.read_text(encoding="utf-8"), re.M)
-    ]
-    assert sorted(made) == sorted(places)
 
 
 def commands(text: str) -> list[str]:

@@ -20,10 +20,9 @@ BY_PROTOCOL = {"Params", "Tool", "Settings"}  # each backend, and each tool, dec
 # Functions that modules of a kind have under one name, or that do the work of one of that name.
 FUNCTIONS_BY_PROTOCOL = {
     "add_arguments", "find", "run", "draw", "check", "frame_count", "read", "read_faces",
-    "read_times", "read_unit", "write", "write_poses", "render", "digest", "read_measurement", "tables",
+    "read_times", "read_unit", "write", "write_poses", "render",
     "lacks", "owns",
 }  # fmt: skip
-PAPERS = "bench/papers/"  # whose modules are made alike, each with the same few functions
 
 # A docstring begins with a noun or a verb that names its subject. These begin without one.
 RIDDLES = re.compile(
@@ -72,8 +71,7 @@ def test_no_two_public_classes_share_a_name(modules: list[tuple[str, ast.Module]
 
 
 def test_no_two_public_functions_share_a_name(modules: list[tuple[str, ast.Module]]) -> None:
-    others = [(path, syntax) for path, syntax in modules if not path.startswith(PAPERS)]
-    shared = shared_names(ast.FunctionDef, others)
+    shared = shared_names(ast.FunctionDef, modules)
     assert shared.keys() <= FUNCTIONS_BY_PROTOCOL, shared
 
 

@@ -1,6 +1,5 @@
 #!/usr/bin/env bash
-# What this machine's GPU does: tests of backends and numerics, tests/speed, the benchmark and the tables of
-# papers, through EGL. Each step has a limit of time, writes a log, and may fail; the others go on.
+# What this machine's GPU does: tests of backends and numerics, experiments and the benchmark, through EGL. Each step has a limit of time, writes a log, and may fail; the others go on.
 #
 #     tools/on_gpu.sh [--quick] [--environment ARCHIVE] OUT
 #     tools/on_gpu.sh --pack DIR [--all] [--python 3.12]
@@ -11,7 +10,7 @@
 # the folder of real scans for the tables. Needs bash, coreutils, tar with xz, and python3; no network.
 #
 # The second form makes the archive for such machines, DIR/environment.tar.xz, where there is a network: what
-# drawing, the tests and tests/speed need, less than 60 MB. --all: what the benchmark needs too, several times
+# drawing, the tests and the experiments of speed need, less than 60 MB. --all: what the benchmark needs too, several times
 # that: without it the benchmark and the tables are left out. --python: the machine's version; else that of python3 here.
 set -uo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
@@ -113,21 +112,22 @@ has() { # LIBRARY...
     "$python" -c 'import sys; from importlib.util import find_spec; sys.exit(not all(map(find_spec, sys.argv[1:])))' "$@"
 }
 
-table() { # NAME SECONDS PAGE ARGUMENTS OF scan4d bench...
-    local name=$1 limit=$2 page=$3
-    shift 3
+suite() { # NAME SECONDS ARGUMENTS...: the benchmark, or an experiment that stores its rows
+    local name=$1 limit=$2
+    shift 2
     if ! has open3d numba jinja2 matplotlib scipy skimage; then
         tell "$name: left out: it needs the packages of --pack --all"
         return
     fi
-    step "$name" "$limit" "$python" -m viewer bench "$@" --force -o "$out/$name" || return
-    [ ! -f "$out/$name/$page.json" ] || cp "$out/$name/$page.json" "$out/data/$page-$device.json"
+    local program=(tools/experiment.py "$name")
+    [ "$name" != benchmark ] || program=(-m viewer bench)
+    step "$name" "$limit" "$python" "${program[@]}" "$@" --force -o "$out/$name" || return
+    [ ! -f "$out/$name/$name.json" ] || cp "$out/$name/$name.json" "$out/data/$name-$device.json"
 }
 
 # A context, or nothing else will work; and what the files are called by.
 step device 60 "$python" -c '
-import sys; sys.path.insert(0, "tests/speed")
-from device import slug
+from viewer.bench.run import slug
 from viewer.gpu.context import headless
 gpu = headless()
 print(gpu.device, gpu.driver, sep="\n")
@@ -142,27 +142,25 @@ if [ $quick = yes ]; then
 fi
 pytest=("$python" -m pytest -q -rs -p no:cacheprovider -p no:benchmark -p left_out -m "not slow")
 ! has xdist || pytest+=(-n "$(nproc)" --dist worksteal)
-speed() { step "$1" "$2" "$python" "tests/speed/$1.py" "${@:3}"; }
+speed() { step "$1" "$2" "$python" tools/experiment.py "$1" --store "$out/data" "${@:3}"; }
 if [ $quick = yes ]; then
     step tests 900 "${pytest[@]}" "${tested[@]}"
     speed points 120 --counts 10000 --size 320x240 --rounds 1
-    speed splats 300 --counts 2000 --size 320x240 --rounds 1
-    speed range_samples 300 --size 300x200 --rounds 1
-    speed instancing 300 --counts 20000 --size 640x480 --rounds 3 --data "$out/data"
-    speed bandwidth 120 --counts 10000 100000 --size 320x240 --rounds 1 --megabytes 16 --data "$out/data"
-    table benchmark 300 none --quick --scene torus --backend points --views 1 --size 96x64
-    table table-two 600 table-two --suite slomp --quick --views 1 --size 96x64
-    table octree-tables 600 octree-tables --suite octrees --quick --views 1 --size 96x64
+    speed range_samples 300 --size 300x200
+    speed splats 300 --counts 20000 --size 640x480 --rounds 3
+    speed bandwidth 120 --counts 10000 100000 --size 320x240 --rounds 1 --megabytes 16
+    suite benchmark 300 --quick --scene torus --backend points --views 1 --size 96x64
+    suite feeds 600 --quick --views 1 --size 96x64
+    suite octrees 600 --quick --views 1 --size 96x64
 else
     step tests 3600 "${pytest[@]}" "${tested[@]}"
     speed points 600 --rounds 11
-    speed splats 600
     speed range_samples 600
-    speed instancing 900 --data "$out/data"
-    speed bandwidth 600 --data "$out/data"
-    table benchmark 900 none --quick
-    table table-two 3600 table-two --suite slomp
-    table octree-tables 3600 octree-tables --suite octrees
+    speed splats 900
+    speed bandwidth 600
+    suite benchmark 900 --quick
+    suite feeds 3600
+    suite octrees 3600
 fi
 [ -z "$archive" ] || rm -rf "$out/environment"
 tell "$failed steps have failed; measurements are in $out/data"

@@ -13,11 +13,11 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from experiments.landmarks.places import truth_places
 from PIL import Image
 from virtual_screen import PANEL, ROOT, RunningApp, running_app, virtual_screen
 
 from viewer.analysis.landmarks.templates import templates
-from viewer.bench.tracking.places import truth_places
 from viewer.camera import Camera
 from viewer.geometry import vector
 

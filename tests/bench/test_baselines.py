@@ -81,18 +81,6 @@ def test_pictures_that_no_opengl_draws_are_not_allowed(renderer: Renderer) -> No
         assert (~allowed_points(renderer.gpu, cloud, camera, changed)).sum() >= at_least * len(shown)
 
 
-def test_precomputed_planes_are_those_of_the_nearest_points() -> None:
-    cloud, camera = sphere(4000, center=(3, 0, 0)), Camera((3.0, 0.0, 5.0), (3.0, 0.0, 0.0))
-    found = baselines.with_planes(cloud, camera, 10)
-    towards = np.sign(np.einsum("ij,ij->i", cloud.normals, np.array([3.0, 0, 5]) - cloud.world()))
-    cosine = np.einsum("ij,ij->i", found.normals, cloud.normals) * towards
-    assert np.quantile(cosine, 0.02) > np.cos(np.radians(2))
-    # k of n points are within the radius on a sphere: pi r^2 = 4 pi k / n, and splats are 2 r / sqrt(k).
-    assert np.median(found.radii) == pytest.approx(2 * np.sqrt(4 / 4000), rel=0.1)
-    few = sphere(3)
-    assert np.isfinite(baselines.with_planes(few, camera, 10).normals).all()
-
-
 def test_a_mesh_without_faces_in_view_is_nothing(renderer: Renderer) -> None:
     mesh = sphere_mesh()
     surface = Surface(renderer.gpu, (16, 16))

@@ -23,6 +23,7 @@ from viewer.mesh.reference import trace
 from viewer.mesh.scene import Scene
 from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 
 if TYPE_CHECKING:
     from viewer.drawing.renderer import Renderer
@@ -112,7 +113,7 @@ def test_holes_where_nothing_was_scanned_are_told_from_the_others(renderer: Rend
     pod = sphere_view((4, 0, 0), size=(120, 100))  # sees the half to the right
     pod = replace(pod, mask=np.isfinite(pod.depth))
     truth = AnalyticScene((Sphere(),))
-    seen = Judge.of(renderer.gpu, truth, AHEAD, SIZE, LOOK, pod.points(), None, (pod,))
+    seen = Judge.of(renderer.gpu, truth, AHEAD, SIZE, LOOK, Pose.of(0, 0.0, "", (pod,)), None)
     assert seen.scanned is not None
     columns = np.flatnonzero(seen.scanned.any(axis=0))
     assert SIZE[0] / 2 <= columns[0] < SIZE[0] / 2 + 20  # it sees not quite to its horizon

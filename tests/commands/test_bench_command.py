@@ -87,42 +87,6 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
     assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
-def test_the_feeds_are_timed_and_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
-    """Without the sequences the demo alone."""
-    (tmp_path / "data").mkdir()
-    small = ("--quick", "--size", "96x64", "--views", 1, "--data", tmp_path / "data")
-    done = run("bench", "--suite", "slomp", *small, "-o", tmp_path / "out")
-    assert done.code == 0, done.err
-    assert "crane is left out" in done.err
-    assert done.out.splitlines()[-1] == str(tmp_path / "out" / "table-two.md")
-    rows = read_rows(tmp_path / "out")
-    assert {row["scene"] for row in rows} == {"demo"}
-    assert {row["params"].get("instancing") for row in rows} > {"gs", "ubo", "tbo", "vbo"}
-    assert all(row["errors"] == {} and row["busy_ms"]["median"] > 0 for row in rows)
-    text = (tmp_path / "out" / "table-two.md").read_text(encoding="utf-8")
-    assert f"| `demo` | {rows[0]['n']:,} |".replace(",", "\N{NARROW NO-BREAK SPACE}") in text
-
-
-@pytest.mark.slow
-def test_octrees_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
-    """Without the sequences the demo alone."""
-    (tmp_path / "data").mkdir()
-    small = ("--quick", "--size", "96x64", "--views", 1, "--data", tmp_path / "data")
-    done = run("bench", "--suite", "octrees", *small, "-o", tmp_path / "out")
-    assert done.code == 0, done.err
-    assert "crane is left out" in done.err
-    assert done.out.splitlines()[-1] == str(tmp_path / "out" / "octree-tables.md")
-    rows = read_rows(tmp_path / "out")
-    assert {row["sweep"] for row in rows} == {"instancing", "max_depth"}
-    assert all(bool(row["errors"]) == (row["sweep"] == "max_depth") for row in rows)
-    assert [row["delta"] for row in read_rows(tmp_path / "out" / "octrees.jsonl")] == [2, 5, 10, 50]
-    assert {row["scene"] for row in read_rows(tmp_path / "out" / "octree-sizes.jsonl")} == {"demo"}
-    text = (tmp_path / "out" / "octree-tables.md").read_text(encoding="utf-8")
-    assert text.count("| `demo` |") == 3  # octrees, and levels with two kinds of cubes
-    assert text.count("| `demo`, level 10 |") == 2
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -136,9 +100,6 @@ def test_octrees_stand_beside_the_papers(run: Run, tmp_path: Path) -> None:
         (["--suite", "speed"], ["speed", "numerics"]),
         (["--seed", "-1"], ["-1"]),
         (["--suite", "numerics", "--compare", "."], ["--compare"]),
-        (["--suite", "slomp", "--scene", "sphere"], ["slomp", "--scene"]),
-        (["--suite", "slomp", "--backend", "points"], ["slomp", "--backend"]),
-        (["--suite", "octrees", "--backend", "points"], ["octrees", "--backend"]),
         (["--scene", "sphere", "--size", "20000x20000"], ["20000x20000", "too large"]),
     ],
 )
@@ -156,29 +117,6 @@ def test_two_files_of_one_name_are_refused(refused: Refused, tmp_path: Path) -> 
         write_ply(tmp_path / folder / "ball.ply")
     files = (tmp_path / "a" / "ball.ply", tmp_path / "b" / "ball.ply")
     assert "ball.ply" in refused("bench", "--scene", *files, "-o", tmp_path / "out")
-
-
-@pytest.mark.slow
-def test_visible_points_of_a_mesh_of_ones_own_are_judged(run: Run, mesh: Path, tmp_path: Path) -> None:
-    quick = ("--quick", "--suite", "hpr", "--scene", mesh, "--size", "96x64", "-o", tmp_path / "out")
-    assert run("bench", *quick).code == 0
-    page = (tmp_path / "out" / "hpr.md").read_text(encoding="utf-8")
-    assert page.count("| exact |") > 2
-    for name in (
-        "hpr.json",
-        "pictures/hpr-errors.png",
-        "pictures/hpr-sectors.png",
-        "pictures/hpr-growth.png",
-    ):
-        assert (tmp_path / "out" / name).is_file()
-    assert run("bench", *quick).code == 2  # what is there is not replaced
-
-
-def test_measuring_takes_the_scenes_that_are_named(run: Run, tmp_path: Path) -> None:
-    file = tmp_path / "ball.obj"
-    done = run("bench", "--suite", "measuring", "--scene", file, "-o", tmp_path / "out")
-    assert done.code == 2
-    assert f"{file} is left out" in done.err
 
 
 @pytest.mark.slow
@@ -253,14 +191,6 @@ def test_a_missing_library_is_told(refused: Refused, tmp_path: Path, monkeypatch
     message = refused("bench", "-o", tmp_path)
     assert "not installed: jinja2, skimage. " in message
     assert message.endswith("-m pip install jinja2 scikit-image\n")
-
-
-def test_what_octrees_are_compared_with_is_needed_for_them_alone(
-    refused: Refused, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    leave_out(monkeypatch, "DracoPy")
-    assert "DracoPy" in refused("bench", "--suite", "octrees", "-o", tmp_path)
-    assert "DracoPy" not in refused("bench", "--scene", "nowhere", "-o", tmp_path)
 
 
 @pytest.mark.slow

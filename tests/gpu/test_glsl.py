@@ -18,6 +18,7 @@ import numpy as np
 import packed
 import pytest
 import sampling
+from experiments.slomp_2014 import literal
 from range_scenes import sphere_view
 from scenes import DRAWS_POINTS, sphere, sphere_mesh
 from test_bins import filled, some_visits
@@ -27,7 +28,6 @@ from test_range_samples import held, probe, seen_by, stepped_view
 
 from viewer.backends import Backend, backend, backends
 from viewer.bench import baselines
-from viewer.bench.papers.slomp_2014 import literal
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame, supersample
 from viewer.drawing.renderer import Renderer

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..backends import Backend, Derives, FrameView
-from ..camera import Camera
 from ..gpu import gl
 from ..gpu.bindings import Texture
 from ..gpu.context import Gpu
@@ -22,13 +21,10 @@ from ..gpu.pose import GpuPose
 from ..mesh.triangles import Mesh
 from ..picture.surface import Surface
 from ..scan.faces import Triangles
-from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..view import View
 
-FLOOR, CEILING, RANGE_MESH, PRECOMPUTED = "gl-points", "mesh", "range-mesh", "precomputed"
-PLANE_POINTS = 10  # points that a precomputed plane goes through
-_CHUNK = 1 << 18  # points whose planes are fitted at a time
+FLOOR, CEILING, RANGE_MESH = "gl-points", "mesh", "range-mesh"
 
 
 @dataclass(frozen=True)
@@ -44,33 +40,6 @@ def gl_points() -> Backend:
 def mesh(drawn: Mesh, name: str = CEILING) -> Backend:
     """The triangles of a mesh, rasterised; for a pose whose cloud are the vertices, with normals."""
     return _Triangles(name, drawn.faces)
-
-
-def with_planes(cloud: PointCloud, camera: Camera, k: int) -> PointCloud:
-    """The bare points with normals and radii of the planes through the k nearest of all of them, each its own
-    neighbour, as Preiner 2012 (6) makes them: normals towards the eye, radii 2 r / sqrt(k)."""
-    from scipy.spatial import cKDTree
-
-    points = cloud.positions.astype(np.float64)
-    tree = cKDTree(points)
-    normals, radii = np.empty((len(cloud), 3)), np.empty(len(cloud))
-    for start in range(0, len(cloud), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        distances, rows = tree.query(points[part], min(k, len(cloud)), workers=-1)
-        offsets = points[rows] - points[part, None]
-        offsets -= offsets.mean(axis=1, keepdims=True)
-        normals[part] = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))[1][:, :, 0]
-        radii[part] = 2 * distances[:, -1] / np.sqrt(distances.shape[1])
-    away = View.of(camera, (1, 1), cloud.origin, cloud.bounds()).faces_away(points, normals)
-    normals[away] *= -1
-    return PointCloud(
-        positions=cloud.positions,
-        origin=cloud.origin,
-        normals=normals.astype(np.float32),
-        colors=cloud.colors,
-        radii=radii.astype(np.float32),
-        ids=cloud.ids,
-    )
 
 
 class _Points(Backend):

@@ -18,6 +18,7 @@ from ..mesh.reference import Reference, both_see, footprint, trace, visible
 from ..mesh.scene import Rays, Scene
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
+from ..scan.pose import Pose
 from ..scan.range_view import RangeView
 from ..scan.spacing import typical_spacing
 from . import metrics
@@ -69,17 +70,16 @@ class Judge:
         camera: Camera,
         size: tuple[int, int],
         look: Look,
-        cloud: PointCloud,
+        scan: PointCloud | Pose,
         tolerance: float | None,
-        views: Sequence[RangeView] = (),
     ) -> Judge:
         """Trace the reference picture and find which points can truly be seen.
 
-        cloud, views: what backends draw of the truth. size: (width, height), pixels. tolerance: how far its
-        points may lie off the truth, scan units; None: they are exact (`reference.visible`). The look says
-        its own light, since clouds without normals and the reference would choose differently.
-        Raises InputError for a size that is no picture.
-        """
+        scan: what backends draw of the truth, points or a pose. size: (width, height), pixels. tolerance: how
+        far its points may lie off the truth, scan units; None: they are exact (`reference.visible`). The look
+        says its own light, since clouds without normals and the reference would choose differently. Raises
+        InputError for a size that is no picture."""
+        cloud, views = (scan.cloud, scan.views) if isinstance(scan, Pose) else (scan, ())
         reference = trace(truth, camera, size)
         steps = _steps(reference, typical_spacing(cloud))
         return cls(

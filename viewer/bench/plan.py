@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from ..backends import backend
+from ..backends import Backend, backend
+from ..camera import Camera
+from ..scan.points import PointCloud
 from .baselines import CEILING, FLOOR
 from .scenes import catalog
 from .scenes.catalog import Sweep
@@ -20,15 +22,15 @@ _PREFERRED = ("torus", "dragon", "torus-simulated", "bunny-simulated")  # to var
 
 @dataclass(frozen=True)
 class Contender:
-    """A backend with its parameters. params: None for the floor and the ceiling, which have none; those of
-    surfels for `PRECOMPUTED` (viewer/bench/baselines.py).
+    """A backend with its parameters. params: None for the floor and the ceiling, which have none.
 
-    sweep: the parameter that differs from its default; empty: none does.
-    """
+    sweep: the parameter that differs from its default; empty: none does. drawn: for what no user chooses:
+    gives the points that are drawn instead of the scan's for a camera, and the backend that draws them."""
 
     backend: str
     params: Any = None
     sweep: str = ""
+    drawn: Callable[[PointCloud, Camera], tuple[PointCloud, str | Backend]] | None = None
 
 
 @dataclass(frozen=True)

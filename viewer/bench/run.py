@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from pathlib import Path
 from typing import Literal
 
 from .. import __version__
-from ..backends import backend
+from ..backends import Backend, backend
 from ..camera import Camera
 from ..drawing.renderer import Renderer
 from ..drawing.request import Request
@@ -32,10 +33,9 @@ from ..mesh.reference import footprint
 from ..picture.surface import Surface
 from ..signals import Interrupts
 from . import baselines, numerics
-from .baselines import CEILING, FLOOR, PLANE_POINTS, PRECOMPUTED, RANGE_MESH
+from .baselines import CEILING, FLOOR, RANGE_MESH
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
-from .papers.slomp_2014 import literal
 from .plan import Contender, Group
 from .report.pictures import picture_path, side_by_side
 from .report.results import SPREADS, Row, spread
@@ -254,9 +254,7 @@ class Bench:
 
     def _judge(self, subject: Subject, moment: Moment, camera: Camera) -> Judge:
         pose, size = moment.pose, self.settings.size
-        return Judge.of(
-            self.renderer.gpu, moment.truth, camera, size, LOOK, pose.cloud, subject.tolerance, pose.views
-        )
+        return Judge.of(self.renderer.gpu, moment.truth, camera, size, LOOK, pose, subject.tolerance)
 
     def _time(self, request: Request, surface: Surface, tally: _Tally, anew: bool) -> None:
         """Add what one view takes: the preparation of a pose that is new to the GPU, then warm draws."""
@@ -338,20 +336,17 @@ class Bench:
 
     def _request(self, contender: Contender, moment: Moment, camera: Camera) -> Request:
         """The request that draws a contender. Raises InputError where the moment has not what it draws."""
-        if contender.backend in (CEILING, RANGE_MESH):
-            truth = contender.backend == CEILING
-            mesh = moment.mesh if truth else self._triangulated(moment.pose.views)
-            pose = replace(moment.pose, points=mesh.points)
-            return Request(pose, camera, baselines.mesh(mesh, contender.backend), look=LOOK)
-        if contender.backend == PRECOMPUTED:
-            points = baselines.with_planes(moment.pose.cloud, camera, PLANE_POINTS)
-            pose = replace(moment.pose, points=points)
-            return Request(pose, camera, "surfels", contender.params, LOOK)
-        if contender.backend == literal.NAME:
-            pose = replace(moment.pose, points=literal.colored(moment.pose.cloud))
-            return Request(pose, camera, literal.paper_splats(), contender.params, LOOK)
-        drawn = baselines.gl_points() if contender.backend == FLOOR else contender.backend
-        return Request(moment.pose, camera, drawn, contender.params, LOOK)
+        pose = moment.pose
+        drawn: str | Backend = contender.backend
+        if contender.drawn is not None:
+            cloud, drawn = contender.drawn(pose.cloud, camera)
+            pose = replace(pose, points=cloud)
+        elif contender.backend in (CEILING, RANGE_MESH):
+            mesh = moment.mesh if contender.backend == CEILING else self._triangulated(pose.views)
+            pose, drawn = replace(pose, points=mesh.points), baselines.mesh(mesh, contender.backend)
+        elif contender.backend == FLOOR:
+            drawn = baselines.gl_points()
+        return Request(pose, camera, drawn, contender.params, LOOK)
 
     # --- rows -------------------------------------------------------------------------
 
@@ -405,3 +400,8 @@ def undisturbed() -> Iterator[None]:
         yield
     finally:
         gc.enable()
+
+
+def slug(device: str) -> str:
+    """A device's name as a part of a file's: what stands before the first bracket or slash."""
+    return re.sub(r"[^a-z0-9]+", "-", re.split(r"[(/]", device)[0].lower()).strip("-")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from experiments.landmarks.known import KeptFrames
 from swinging_arms import LONG, SPACING, THICK, arms, on_arm
 
 from viewer.analysis.landmarks import Landmark
@@ -22,7 +23,6 @@ from viewer.analysis.tracking.hold import Hold
 from viewer.analysis.tracking.registration import Placement, patch_of
 from viewer.analysis.tracking.surface import MomentSurface
 from viewer.analysis.tracking.tracker import _lose, _move_apart
-from viewer.bench.tracking.known import KeptFrames
 from viewer.geometry import vector
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline

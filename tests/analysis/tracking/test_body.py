@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from experiments.landmarks.known import KeptFrames
 from scenes import rarely
 from swinging_arms import APART, LONG, SPACING, THICK, arms, on_arm
 
@@ -12,7 +13,6 @@ from viewer.analysis.spot import Spot
 from viewer.analysis.track import Known
 from viewer.analysis.tracking import track_landmarks
 from viewer.analysis.tracking.body import DeformableBody
-from viewer.bench.tracking.known import KeptFrames
 from viewer.geometry import vector
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from experiments.landmarks.known import KeptFrames
 from numpy.typing import NDArray
 from swinging_arms import LONG, SPACING, THICK, arms, on_arm
 
@@ -15,7 +16,6 @@ from viewer.analysis.track import Known, Track
 from viewer.analysis.tracking import track_landmarks
 from viewer.analysis.tracking.pattern import PointPattern, RecurringPoints
 from viewer.analysis.tracking.surface import MomentSurface
-from viewer.bench.tracking.known import KeptFrames
 from viewer.geometry import vector
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline

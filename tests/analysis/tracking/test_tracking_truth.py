@@ -6,10 +6,10 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from experiments.landmarks.known import resampled_demo, resampled_mesh, shuffled_mesh
+from experiments.landmarks.landmark_judge import Judgement, judge_tracking
 
 from viewer.analysis.tracking import track_landmarks
-from viewer.bench.tracking.known import resampled_demo, resampled_mesh, shuffled_mesh
-from viewer.bench.tracking.landmark_judge import Judgement, judge_tracking
 from viewer.scan.open import find_source
 
 pytestmark = pytest.mark.slow

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from experiments.preiner_2012 import auto_splats, fits
 
 from viewer.bench.baselines import PRECOMPUTED
-from viewer.bench.papers.preiner_2012 import auto_splats, fits
 from viewer.bench.plan import Contender, Group
 from viewer.bench.run import Bench, BenchSettings
 from viewer.bench.scenes import catalog

@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from experiments.marsik_2010.words import nearest_to_a_step
 from word_scenes import drawn_pixels
 
 from viewer.backends import backend
-from viewer.bench.papers.marsik_2010.words import nearest_to_a_step
 from viewer.bench.scenes.samples import on_torus
 from viewer.camera import PROJECTIONS, Camera
 from viewer.codewords.engine import draw_words

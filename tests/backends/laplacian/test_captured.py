@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from experiments.farooq_2013.seams import pods_facing, seam_visibility, seams
 from numpy.typing import NDArray
 from plain_splines import KERNELS, blended, expanded, pyramid
 from range_scenes import heights, straight_above
@@ -15,7 +16,6 @@ from test_merged_views import DIFFERENT, front, painted_ball, pods
 from test_spline import ROUNDING, SHAPE, banded, speckled, two_views, unbanded
 
 from viewer.backends import backend
-from viewer.bench.seams import pods_facing, seam_visibility, seams
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from experiments.farooq_2013.seams import detail_psnr, pods_facing, seam_visibility, seams
 from numpy.typing import NDArray
 from range_scenes import heights, sphere_view, straight_above
 from scenes import NOTHING, rarely, sphere, sphere_mesh
 
-from viewer.bench.seams import detail_psnr, pods_facing, seam_visibility, seams
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from experiments.slomp_2014 import surfels as slomp
 from numpy.typing import NDArray
 
-from viewer.bench.papers.slomp_2014 import surfels as slomp
 from viewer.scan.octree.build import Stop, build
 from viewer.scan.points import PointCloud
 

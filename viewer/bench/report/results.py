@@ -17,16 +17,7 @@ from ..baselines import CEILING, FLOOR
 Row = dict[str, Any]
 
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
-OCTREES, OCTREE_SIZES = "octrees.jsonl", "octree-sizes.jsonl"
-LARGE_VIEWS, PLAYING = "large-views.jsonl", "playing.jsonl"
-SEARCHES, FITS = "searches.jsonl", "fits.jsonl"
-DISTANCES = "distances.jsonl"
-WAYS, CHOICES = "ways.jsonl", "choices.jsonl"
-SEAMS, ALONE, PICTURE_SIZES, BAND_TIMES = (
-    "seams.jsonl", "alone.jsonl", "picture-sizes.jsonl", "band-times.jsonl",
-)  # fmt: skip
-WORD_TIMES, WORD_PIXELS, WORD_TABLES = "word-times.jsonl", "word-pixels.jsonl", "word-tables.jsonl"
-VISIBILITY, GROWTH, SPEEDS = "visibility.jsonl", "growth.jsonl", "speeds.jsonl"
+WAYS = "ways.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -37,25 +28,7 @@ _NEEDED: dict[str, dict[str, Any]] = {
         "size": list, "seed": int, "views": int, "sweep": str, "gpu_ms": dict, "errors": dict,
     },
     NUMERICS: {"row": str, "backend": str, "held": bool},
-    OCTREES: {"scene": str, "n": int, "delta": int, "poses": int, "ms": dict, "sorts": dict},
-    OCTREE_SIZES: {"scene": str, "points": int, "stop": str, "bits": dict},
-    LARGE_VIEWS: {"scenario": str, "levels": int, "primitive": str, "samples": int},
-    PLAYING: {"scene": str, "poses": int, "primitive": str, "reading": dict, "playing": dict},
-    SEARCHES: {"scene": str, "n": int, "visible": int, "params": dict, "first": dict, "later": dict},
-    DISTANCES: {"scene": str, "backend": str, "zoom": int | float, "pairs": int, "covered": int | float},
     WAYS: {"scene": str, "key": str, "scale": int | float, "ms": int | float, "seen": dict},
-    CHOICES: {"scene": str, "view": int, "key": str, "ms": int | float, "error": int | float, "chosen": list},
-    VISIBILITY: {"scene": str, "n": int, "noise": int | float, "method": str, "radius": str, "by_view": list},
-    GROWTH: {"scene": str, "n": int, "method": str, "visible": int, "error": int | float},
-    SPEEDS: {"scene": str, "n": int, "sectors": int, "busy_ms": dict, "wall_ms": dict},
-    SEAMS: {"scene": str, "way": str, "by_view": list},
-    ALONE: {"scene": str, "way": str, "by_view": list},
-    PICTURE_SIZES: {"scene": str, "way": str, "zoom": int | float, "by_view": list},
-    BAND_TIMES: {"scene": str, "way": str, "pods": int, "wall_ms": int | float, "passes": dict},
-    WORD_TIMES: {"scene": str, "n": int, "size": list, "busy_ms": dict, "wall_ms": dict},
-    WORD_PIXELS: {"scene": str, "projection": str, "quality": str, "ids": int | float},
-    WORD_TABLES: {"steps": str, "busy_ms": dict, "nbytes": int, "bitmap_bytes": int},
-    FITS: {"scene": str, "noise": int | float, "params": dict, "found_inside": dict, "found_band": dict},
 }  # fmt: skip
 
 # --- what is measured -----------------------------------------------------------------
@@ -189,9 +162,10 @@ def write_row(stream: TextIO, row: Row) -> None:
     stream.flush()
 
 
-def read_rows(path: Path) -> list[Row]:
+def read_rows(path: Path, needed: dict[str, Any] | None = None) -> list[Row]:
     """The rows of a file of JSON lines, or of the results in a folder; null becomes NaN.
 
+    needed: the fields of a row with their types; None: those that the file's name says.
     A last line without its end, as a crash leaves it, is left out.
     Raises InputError, with the line, for what is no row.
     """
@@ -201,11 +175,13 @@ def read_rows(path: Path) -> list[Row]:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot be read: {error}", path, "Name a results.jsonl or its folder") from error
+    if needed is None:
+        needed = _NEEDED.get(path.name, _NEEDED[RESULTS])
     rows = []
     for number, line in enumerate(lines, start=1):
         if line.strip():
             try:
-                rows.append(_parsed(line, _NEEDED.get(path.name, _NEEDED[RESULTS])))
+                rows.append(_parsed(line, needed))
             except ValueError as error:
                 if number < len(lines):
                     hint = "Remove the line, or run the benchmark again"

@@ -1,0 +1,13 @@
+"""Run an experiment of tools/experiments: measure, print or store, and make the tables of the docs.
+
+python tools/experiment.py                          list all experiments
+python tools/experiment.py NAME [OPTION ...]        run one; --help shows its options
+python tools/experiment.py NAME --against TREE      compare with another checkout, by turns
+"""
+
+import sys
+
+from experiments.command import main
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,69 @@
+"""Auto splats: normals by numbers of neighbours, uneven points, and two savings. It needs the data folder."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Iterator
+from functools import partial
+from itertools import product
+
+from experiments.pictures import draw, error_cells, errors_of, renderer, request, scene
+from experiments.preiner_2012.fits import fit_errors, noisy
+from experiments.script import Script
+from experiments.tables import Row, spaced
+from experiments.timing import CORES, by_turns
+from viewer.bench.run import BenchSettings
+from viewer.bench.scenes.viewpoints import viewpoints
+from viewer.picture.surface import Surface
+
+BACKEND = "auto_splats"
+VIEWS, SIZE = 2, (880, 450)
+ROUNDS = 3
+
+
+def normals(_: Namespace) -> Iterator[Row]:
+    """Angles to the true normals by numbers of neighbours, of one model with and without noise."""
+    settings = BenchSettings(size=SIZE, views=1)
+    counts = {f"k = {k}": {"k": k, "adaptive": False} for k in (6, 10, 32)}
+    counts |= {f"adaptive, {k}": {"k": k, "adaptive": True} for k in (10, 32)}
+    moment = scene("armadillo").moment(0)
+    for noise in (0.0, 0.1, 0.3, 0.6):
+        cloud, row = noisy(moment.pose.cloud, noise, 0), {"noise": str(noise)}
+        for name, params in counts.items():
+            inside = fit_errors(cloud, moment.mesh, settings, params)["found_inside"]
+            row[name] = f"{inside['median']:.1f}, {inside['p95']:.0f}"
+        yield row
+
+
+def uneven(_: Namespace) -> Iterator[Row]:
+    """Errors where points lie evenly and where they do not."""
+    for name in ("armadillo-bare", "armadillo-ramp-bare", "igea-bare", "igea-ramp-bare"):
+        subject = scene(name)
+        (errors,) = errors_of(subject, BACKEND, [{}], VIEWS, SIZE)
+        yield {"scene": f"`{name}`, {spaced(len(subject.moment(0).pose.cloud))}", **error_cells(errors)}
+
+
+def savings(_: Namespace) -> Iterator[Row]:
+    """Errors and times with refinement and grid culling, and without."""
+    settings = [{"refine": refine, "cull": cull} for refine, cull in product((False, True), repeat=2)]
+    for name, count in (("horses", 100_000), ("dragon", None)):
+        subject = scene(name, count)
+        pose = subject.moment(0).pose
+        camera = viewpoints(subject.moment(0).mesh, 1, SIZE, up=subject.up)[0]
+        surface = Surface(renderer().gpu, SIZE)
+        works = {}
+        for number, params in enumerate(settings):
+            # From elsewhere in between, so that nothing of the picture before helps.
+            works[f"elsewhere {number}"] = partial(
+                draw, request(pose, camera.orbited(90, 0), BACKEND, params), surface
+            )
+            works[f"{number}"] = partial(draw, request(pose, camera, BACKEND, params), surface)
+        least = by_turns(works, ROUNDS, renderer().gpu.ctx.finish, of="least")
+        found = errors_of(subject, BACKEND, settings, VIEWS, SIZE)
+        for number, (params, errors) in enumerate(zip(settings, found, strict=True)):
+            switched = " and ".join(f"`{key}`" for key, on in params.items() if on) or "neither"
+            named = {"scene": f"{name}, {spaced(len(pose.cloud))}", "with": switched}
+            yield {**named, **error_cells(errors), "time": f"{least[str(number)].busy / CORES:.0f} ms"}
+
+
+EXPERIMENT = Script([normals, uneven, savings], page="auto-splats.md")

@@ -1,1 +1,0 @@
-"""What papers measured, and the same here: one folder a paper."""

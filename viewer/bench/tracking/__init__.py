@@ -1,1 +1,0 @@
-"""How well landmarks are tracked: scans of known motion, no two frames with the same points."""
