@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scenes import looking_down_z
 
 from viewer.analysis.local_surface import local_surface
-from viewer.analysis.pick import SURE
+from viewer.analysis.words import SURE
 from viewer.bounds import Bounds
 from viewer.view import View
 

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 from scenes import looking_down_z, plane, sphere
 
 from viewer.analysis.measures.distances import distance_of
-from viewer.analysis.pick import SURE, Neighbor, Picked, pick
+from viewer.analysis.pick import Neighbor, Picked, pick
 from viewer.analysis.spot import Spot, followed
+from viewer.analysis.words import SURE
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.gpu.constants import EMPTY

@@ -24,7 +24,7 @@ from acting import Actor
 from cut_texts import CutTexts
 from imgui_bundle import imgui
 
-from viewer.analysis.pick import SURE
+from viewer.analysis.words import SURE
 from viewer.app import run
 from viewer.app.app import App
 from viewer.backends import backends

@@ -251,6 +251,18 @@ RISE = DrawnCurve("rise", "mm", 0xFF8000, VALUES_OF_RISE, (1.5,) * 10)
 PLOT = DrawnPlot("time [s]", tuple(float(n) for n in range(10)), (RISE,))
 
 
+def test_the_legend_of_a_plot_gives_values_with_their_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
+    written: list[str] = []
+    monkeypatch.setattr(ImagePainter, "text", lambda _, left, top, text: written.append(text))
+    for pose, words in ((5, "rise: 5.0 ± 1.5 mm"), (3, "rise: -")):
+        written.clear()
+        assert draw_plot(ImagePainter(SIZE), SIZE, PLOT, pose)
+        assert words in written
+    bare = replace(PLOT, curves=(replace(RISE, band=()),))
+    assert draw_plot(ImagePainter(SIZE), SIZE, bare, 5)
+    assert "rise: 5 mm" in written
+
+
 def plotted(plot: DrawnPlot, pose: int = 0, size: tuple[int, int] = SIZE) -> NDArray[np.int64]:
     """The lower part of a picture with a plot."""
     legend = replace(LEGEND, plot=plot, pose=pose, marks=Marks(plot=True))
@@ -298,7 +310,7 @@ def test_a_plot_has_values_at_its_axes_with_their_units_and_a_band() -> None:
     painter = Written((1280, 720))
     assert draw_plot(painter, painter.image.size, replace(PLOT, curves=(RISE, area)), 9)
     texts = {text: (left, top) for left, top, text in painter.texts}
-    assert {"time [s]", "mm", "mm²", "rise: 9 mm", "area: 550 mm²"} <= set(texts)
+    assert {"time [s]", "mm", "mm²", "rise: 9.0 ± 1.5 mm", "area: 550 mm²"} <= set(texts)
     numbers = [(left, top, float(text)) for left, top, text in painter.texts if text[-1].isdecimal()]
     foot = texts["time [s]"][1] - 30
     left_axis = [(top, value) for left, top, value in numbers if left < 100 and top < foot]

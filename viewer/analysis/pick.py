@@ -18,8 +18,8 @@ from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import ENOUGH, nearest_rows, spacing_at
 from .local_surface import LocalSurface, local_surface
+from .words import SURE
 
-SURE = 1.96  # standard deviations within which 95 % of a normal distribution lie
 LEFT_OUT = 0.05  # the share beyond
 _REACH = 4  # pixels from points to the middle of a gap, where spacings are less
 _GAP = 1.5  # spacings from points to the middle of a gap between them, at most

@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.measures.curves import BAND_SIGMAS
+from ..analysis.words import with_uncertainty
 from ..look import rgba
 from .image_painter import ImagePainter
 from .labels import Box
@@ -99,7 +101,8 @@ def _draw_legend(
     at, row = left, 0
     for number, line in enumerate(lines):
         curve, now = line.curve, line.values[pose] if pose < len(line.values) else np.nan
-        words = f"{now:.4g} {curve.unit}" if np.isfinite(now) else "-"
+        band = line.band[pose] if pose < len(line.band) else np.nan
+        words = with_uncertainty(float(now), float(band) / BAND_SIGMAS, curve.unit)
         text = fitted_text(painter, f"{curve.name}: {words}" if curve.name else words, stop - left - em)
         is_last = row == most_rows - 1 and number < len(lines) - 1
         more = f"and {len(lines) - number} more"

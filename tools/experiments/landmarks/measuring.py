@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from experiments.suite import Part, Suite, row_of, subjects
 from experiments.tables import Column, Row, StoredRun, Table, at, code, grouped
 from viewer.analysis.measures.distances import distance_of
-from viewer.analysis.pick import SURE, before_gap, pick
+from viewer.analysis.pick import before_gap, pick
 from viewer.analysis.spot import Spot
+from viewer.analysis.words import SURE
 from viewer.backends import backend
 from viewer.bench.report.page import three_digits
 from viewer.bench.run import Bench, BenchSettings

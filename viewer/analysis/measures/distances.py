@@ -23,9 +23,9 @@ from ...scan.pose import Pose
 from ...scan.units import Scale, conversion
 from ..landmarks import Landmark
 from ..landmarks.placed import spot_at
-from ..pick import SURE
 from ..spot import Spot
 from ..track import STATES, Known, Track
+from ..words import SURE
 from . import Measure, Series
 from .series import series_of
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis.landmarks import Landmark
-from ....analysis.pick import SURE
 from ....analysis.spot import Spot
 from ....analysis.track import KNOWN_WORDS, Known, Track
+from ....analysis.words import SURE
 from ....geometry import vector
 from ....output.overlays import DrawnLandmark
 

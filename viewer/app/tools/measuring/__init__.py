@@ -15,9 +15,9 @@ from imgui_bundle import imgui
 
 from ....analysis.measures import Measure
 from ....analysis.measures.distances import Ends, distance_rows, is_distance_table, read_distances
-from ....analysis.measures.words import measured_in_words
 from ....analysis.spot import Spot
 from ....analysis.track import KNOWN_WORDS, Known
+from ....analysis.words import measured_in_words
 from ....csv_text import save_rows, to_text
 from ....document.landmarks import Landmarks
 from ....errors import InputError

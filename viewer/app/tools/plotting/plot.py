@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ....analysis.measures.curves import correlations
-from ....analysis.measures.words import with_note, with_uncertainty
+from ....analysis.words import with_note, with_uncertainty
 from ....output.overlays import BAND_OPACITY
 from ....output.plots import CurvePlot, PlotLine
 from ... import widgets

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 
 from ....analysis.measures.curves import MeasureCurve
-from ....analysis.measures.words import UNKNOWN, with_uncertainty
-from ....analysis.pick import SURE
+from ....analysis.words import SURE, UNKNOWN, with_uncertainty
 
 WARNING = "(!)"  # before numbers of a movement that the user should know more about
 NUMBERS_HELP = {

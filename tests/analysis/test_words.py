@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from viewer.analysis.measures.words import measured_in_words, with_uncertainty
+from viewer.analysis.words import measured_in_words, with_uncertainty
 
 
 @pytest.mark.parametrize(

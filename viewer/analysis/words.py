@@ -1,11 +1,10 @@
-"""Values of measures in words."""
+"""Values with their uncertainty in words."""
 
 from __future__ import annotations
 
 import math
 
-from ..pick import SURE
-
+SURE = 1.96  # standard deviations within which 95 % of a normal distribution lie
 UNKNOWN = "-"
 _DECIMALS = (-6, 12)  # that a number is written out with
 _COVERED = "(95 %)"  # of cases in which the true value is within what ± says
