@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from word_scenes import GREY, front_view, one_element, scattered
 
-from viewer.codewords.encode import Elements, Light, encode_elements, project_elements
+from viewer.codewords.encode import Elements, Encoding, Light, encode_elements, project_elements
 from viewer.codewords.engine import draw_words
 from viewer.codewords.project_kernels import NORMAL_I, NORMAL_J, SIZE
 from viewer.codewords.stream import WordStream
@@ -56,12 +56,14 @@ def test_elements_beyond_an_edge(side: tuple[int, int], exact: bool) -> None:
     view = front_view((30, 20))
     for step in range(-6, 9):
         place = (side[0] * (15 + step), side[1] * (10 + step), 0.0)
-        stream = encode_elements(one_element(place, 3.0), view, GREY, exact=exact)
+        stream = encode_elements(one_element(place, 3.0), view, GREY, rules=Encoding(exact=exact))
         expected = ellipse(view, (15 + place[0], 10 - place[1]), 3.0, 0, 0)
         assert np.array_equal(covered(stream), expected)
         assert len(stream) > 0 or not expected.any()
     for far in (100, 1e5, 1e30, np.inf, np.nan):
-        stream = encode_elements(one_element((side[0] * far, side[1] * far, 0), 3.0), view, GREY, exact=exact)
+        stream = encode_elements(
+            one_element((side[0] * far, side[1] * far, 0), 3.0), view, GREY, rules=Encoding(exact=exact)
+        )
         assert len(stream) == 0
 
 
@@ -102,7 +104,7 @@ def test_one_depth_and_none() -> None:
     assert np.array_equal(np.unique(draw_words(one).depths()), [100, np.inf])
     empty = Elements(np.empty((0, 3), np.float32), np.empty(0, np.uint8))
     for exact in (False, True):
-        assert len(encode_elements(empty, view, GREY, exact=exact)) == 0
+        assert len(encode_elements(empty, view, GREY, rules=Encoding(exact=exact))) == 0
 
 
 def test_words_are_sorted_by_line_and_then_by_id() -> None:
@@ -134,7 +136,7 @@ def test_missing_normals_and_radii() -> None:
             ellipse(view, (20, 15), 5.0, 0, 0),
         )
     for radius in (0.0, -1.0, np.nan, np.inf):
-        stream = encode_elements(one_element((0, 0, 0), radius), view, GREY, radius_scale=3.0)
+        stream = encode_elements(one_element((0, 0, 0), radius), view, GREY, rules=Encoding(radius_scale=3.0))
         assert np.array_equal(covered(stream), ellipse(view, (20, 15), 3.0, 0, 0))
     tiny = encode_elements(one_element((0, 0, 0), 1e-6), view, GREY)
     assert covered(tiny).sum() == 4  # as a bitmap is symmetric about a corner of pixels
@@ -143,7 +145,14 @@ def test_missing_normals_and_radii() -> None:
 def test_what_faces_away_can_be_left_out() -> None:
     view = front_view((40, 30))
     for normal, kept in (((0, 0, 1), 1), ((0, 0, -1), 0), ((1, 0, 0), 0)):
-        assert len(encode_elements(one_element((0, 0, 0), 3.0, normal), view, GREY, cull_back=True)) == kept
+        assert (
+            len(
+                encode_elements(
+                    one_element((0, 0, 0), 3.0, normal), view, GREY, rules=Encoding(cull_back=True)
+                )
+            )
+            == kept
+        )
 
 
 def test_ellipses_have_half_axes_of_their_own() -> None:
@@ -153,7 +162,7 @@ def test_ellipses_have_half_axes_of_their_own() -> None:
     elements = Elements(elements.positions, elements.materials, elements.normals, elements.radii, axes)
     y, x = np.mgrid[:40, :60] + 0.5
     exact = ((x - 30) / 8) ** 2 + ((y - 20) / 4) ** 2 <= 1
-    assert np.array_equal(covered(encode_elements(elements, view, GREY, exact=True)), exact)
+    assert np.array_equal(covered(encode_elements(elements, view, GREY, rules=Encoding(exact=True))), exact)
     nearly = covered(encode_elements(elements, view, GREY))
     assert np.count_nonzero(nearly != exact) <= 8  # n' = sqrt(3), of which the table has 1.8
 
@@ -180,7 +189,7 @@ def test_exact_outlines_are_those_of_rays(perspective: bool) -> None:
         elements = one_element(tuple(center), radius, normal)
         center = elements.positions[0].astype(float)
         normal = elements.normals[0].astype(float)  # type: ignore[index]
-        stream = encode_elements(elements, view, GREY, exact=True)
+        stream = encode_elements(elements, view, GREY, rules=Encoding(exact=True))
         picture = draw_words(stream)
         expected, depth = exact_disc(view, center, normal, float(elements.radii[0]))  # type: ignore[index]
         assert np.array_equal(picture.covered, expected)
@@ -197,7 +206,7 @@ def test_exact_discs_end_at_the_near_plane(perspective: bool) -> None:
         center = rng.uniform(-1, 1, 3) * [40, 30, 25] + [0, 0, 100]
         elements = one_element(tuple(center), float(rng.uniform(2, 60)) * 10.0**power, rng.normal(size=3))
         center, normal = elements.positions[0].astype(float), elements.normals[0].astype(float)  # type: ignore[index]
-        stream = encode_elements(elements, view, GREY, exact=True)
+        stream = encode_elements(elements, view, GREY, rules=Encoding(exact=True))
         picture = draw_words(stream)
         expected, depth = exact_disc(view, center, normal, float(elements.radii[0]))  # type: ignore[index]
         expected &= depth >= 1.0
@@ -223,7 +232,9 @@ def test_depths_of_discs_that_are_seen_edge_on(perspective: bool) -> None:
             toward = np.array(place) - (np.array([0, 0, 100]) if perspective else np.array([*place[:2], 100]))
             aside = np.cross(toward, (0, 1, 0))
             normal = aside / np.linalg.norm(aside) + tilt * toward / np.linalg.norm(toward)
-            picture = draw_words(encode_elements(one_element(place, 8.0, normal), view, GREY, exact=True))
+            picture = draw_words(
+                encode_elements(one_element(place, 8.0, normal), view, GREY, rules=Encoding(exact=True))
+            )
             depth = picture.depths()[picture.covered]
             shown += len(depth)
             assert (np.abs(depth - (100 - place[2])) <= 8.001).all()
@@ -248,7 +259,7 @@ def test_the_table_is_off_by_its_steps_alone() -> None:
 def test_sizes_and_normals_are_within_half_a_step(steps: Steps) -> None:
     """In a parallel view, where a disc's image is exactly one of the table's; opposite normals are one."""
     view, elements = front_view((200, 150)), scattered(3000, (200, 150), 7)
-    found = project_elements(elements, view, FLAT, steps)
+    found = project_elements(elements, view, FLAT, Encoding(steps))
     assert elements.normals is not None
     assert elements.radii is not None
     normals, radii = (each[found.rows].astype(float) for each in (elements.normals, elements.radii))
@@ -264,6 +275,8 @@ def test_sizes_and_normals_are_within_half_a_step(steps: Steps) -> None:
 
 def test_other_steps() -> None:
     view, steps = front_view((60, 40)), Steps(33, 4, 121, 10)
-    stream = encode_elements(one_element((0, 0, 0), 5.25, (0.7, 0, 1)), view, GREY, steps=steps)
+    stream = encode_elements(
+        one_element((0, 0, 0), 5.25, (0.7, 0, 1)), view, GREY, rules=Encoding(steps=steps)
+    )
     assert np.array_equal(covered(stream), ellipse(view, (30, 20), 5.25, 0.7, 0))
     assert shape_table(steps).steps != PAPER

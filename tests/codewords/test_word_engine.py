@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from word_scenes import GREY, front_view, scattered, streams
 
-from viewer.codewords.encode import encode_elements
+from viewer.codewords.encode import Encoding, encode_elements
 from viewer.codewords.engine import NO_KEY, NO_WORD, CodePicture, draw_words, draw_words_plainly
 from viewer.codewords.lighting import Materials
 from viewer.codewords.stream import WordStream
@@ -52,7 +52,7 @@ def test_the_engine_draws_as_its_twin_with_any_window(stream: WordStream, window
 def test_encoded_scenes_are_drawn_the_same(exact: bool) -> None:
     for seed, size in enumerate([(70, 40), (1, 1), (7, 9), (530, 12)]):
         view = front_view(size, perspective=bool(seed % 2))
-        stream = encode_elements(scattered(120, size, seed), view, GREY, exact=exact)
+        stream = encode_elements(scattered(120, size, seed), view, GREY, rules=Encoding(exact=exact))
         picture = draw_words(stream)
         assert picture.covered.any()
         assert same(picture, draw_words_plainly(stream, 8))

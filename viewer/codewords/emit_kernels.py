@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled import compiled
-from .outline_kernels import exact_rows
+from ..compiled import compiled, inlined
+from .outline_kernels import RowSpans, exact_rows
 from .project_kernels import DIFFUSE, NORMAL_I, NORMAL_J, SIZE, SPECULAR, X, Y
 
 Whole = int | np.integer
@@ -18,35 +18,55 @@ _LARGE = 1 << 31
 _MOST_KEY = float(1 << 30)
 
 
+class TableArrays(NamedTuple):
+    """A table of shapes as compiled loops have it, see `tables`."""
+
+    entries: NDArray[np.uint32]
+    rows: NDArray[np.uint16]
+    reach: int
+    steps: NDArray[np.int64]  # of `Steps`: sizes per pixel, steepest normal, normals per unit
+
+
+class EmittedElements(NamedTuple):
+    """M elements that words are written of."""
+
+    ids: NDArray[np.uint32]  # (M,)
+    materials: NDArray[np.uint8]  # (M,)
+    shapes: NDArray[np.int32]  # (M, 7), see `project_kernels`
+    planes: NDArray[np.float64]  # (M, 15)
+    depths: NDArray[np.int32]  # (M,), Z
+    finer: NDArray[np.float64]  # (M, 3), in steps, at the corner and a pixel right and down
+
+
+class WordArrays(NamedTuple):
+    """Room for words; of length 0 where they are only counted."""
+
+    cursor: NDArray[np.int64]  # (strips * height,), where the next word of each line goes; it is moved on
+    words: NDArray[np.uint64]
+    ids: NDArray[np.uint32]
+    fine: NDArray[np.int32]  # (words, 3), of exact outlines
+
+
 @compiled
 def emit(
     size: tuple[int, int],
     stride: int,
-    steps: NDArray[np.int64],
-    entries: NDArray[np.uint32],
-    table_rows: NDArray[np.uint16],
-    reach: int,
     exact: bool,
-    rows: NDArray[np.uint32],
-    materials: NDArray[np.uint8],
-    shapes: NDArray[np.int32],
-    planes: NDArray[np.float64],
-    depths: NDArray[np.int32],
-    finer: NDArray[np.float64],
-    cursor: NDArray[np.int64],
-    words: NDArray[np.uint64],
-    ids: NDArray[np.uint32],
-    fine: NDArray[np.int32],
+    table: TableArrays,
+    elements: EmittedElements,
+    out: WordArrays,
 ) -> None:
-    """Write the words of elements, or count them, where `words` is empty.
+    """Write the words of elements, or count them.
 
-    entries, table_rows, reach: of the table. rows: of `project`, ids of the elements (M,). materials: (M,).
-    depths: (M,), Z of each. finer: (M, 3), in steps, at the corner and a pixel right and down. cursor:
-    (strips * height,), where the next word of each line goes; it is moved on.
+    size: of the picture. stride: of its strips. exact: whether outlines are.
     """
     width, height = size
-    first, last = np.empty(height, np.int32), np.empty(height, np.int32)
-    for number in range(len(rows)):
+    entries, table_rows, reach, steps = table
+    numbers, materials, shapes, planes, depths, finer = elements
+    cursor, words, ids, fine = out
+    spans = np.empty((2, height), np.int32)
+    first, last = spans[0], spans[1]
+    for number in range(len(numbers)):
         shape = shapes[number]
         x, y = shape[X], shape[Y]
         head = (
@@ -57,9 +77,9 @@ def emit(
         )
         from_strip = 0
         if exact:
-            top, bottom = exact_rows(planes[number], x, y, width, height, first, last)
+            top, bottom = exact_rows(planes[number], x, y, width, spans)
         elif shape[SIZE] >= len(entries):
-            top, bottom = _computed_rows(shape, steps, width, height, first, last)
+            top, bottom = _computed_rows(shape, steps, width, spans)
         else:
             entry = entries[shape[SIZE], _place(shape[NORMAL_I], shape[NORMAL_J], steps)]
             if entry < _LARGE and x >= 4 and y >= 4 and x - 4 < width and y - 4 < height:
@@ -69,11 +89,11 @@ def emit(
                     | np.uint64(entry) << np.uint64(1)
                     | np.uint64(x - 4 - strip * stride) << np.uint64(46)
                 )
-                _put(word, strip * height + y - 4, rows[number], cursor, words, ids)
+                _put(word, strip * height + y - 4, numbers[number], cursor, words, ids)
                 from_strip = strip + 1
                 if x + 3 < min(from_strip * stride, width) or from_strip * stride >= width:
                     continue
-            top, bottom = _table_rows(entry, table_rows, reach, x, y, width, height, first, last)
+            top, bottom = _table_rows(entry, table_rows, reach, x, y, width, spans)
         while top <= bottom and first[top] > last[top]:
             top += 1
         for begin in range(top, bottom + 1, 4):
@@ -97,7 +117,7 @@ def emit(
                         continue
                     word = head | np.uint64(1) | np.uint64(scans) << np.uint64(1)
                     word |= np.uint64(column - strip * stride) << np.uint64(46)
-                    at = _put(word, strip * height + begin, rows[number], cursor, words, ids)
+                    at = _put(word, strip * height + begin, numbers[number], cursor, words, ids)
                     if at >= 0 and len(fine):
                         q, right_step, down_step = finer[number]
                         q += right_step * (column + 0.5 - x) + down_step * (begin + 0.5 - y)
@@ -106,7 +126,7 @@ def emit(
                         fine[at, 2] = np.int32(np.rint(down_step))
 
 
-@compiled
+@inlined
 def _put(
     word: Whole,
     line: Whole,
@@ -115,7 +135,7 @@ def _put(
     words: NDArray[np.uint64],
     ids: NDArray[np.uint32],
 ) -> int:
-    """Write a word where its line goes on, and move this; its place, -1 where words are but counted."""
+    """Append a word to its line; gives its index, -1 where words are only counted."""
     at = cursor[line]
     cursor[line] += 1
     if len(words) == 0:
@@ -124,7 +144,7 @@ def _put(
     return at
 
 
-@compiled
+@inlined
 def _place(i: int, j: int, steps: NDArray[np.int64]) -> int:
     """See `tables.shape_place`."""
     normals = 2 * steps[1] + 1
@@ -132,7 +152,7 @@ def _place(i: int, j: int, steps: NDArray[np.int64]) -> int:
     return min(at, normals * normals - 1 - at)
 
 
-@compiled
+@inlined
 def _table_rows(
     entry: int,
     table_rows: NDArray[np.uint16],
@@ -140,11 +160,10 @@ def _table_rows(
     x: int,
     y: int,
     width: int,
-    height: int,
-    first: NDArray[np.int32],
-    last: NDArray[np.int32],
+    spans: RowSpans,
 ) -> tuple[Whole, Whole]:
-    """Fill the rows of a shape of the table, cut to the picture; the first and the last one."""
+    """Fill the rows of a shape of the table, cut to the picture; gives the first and the last of them."""
+    first, last, height = spans[0], spans[1], spans.shape[1]
     small = entry < _LARGE
     half = 4 if small else reach
     top, bottom = max(y - half, 0), min(y + half, height) - 1
@@ -165,16 +184,12 @@ def _table_rows(
     return top, bottom
 
 
-@compiled
+@inlined
 def _computed_rows(
-    shape: NDArray[np.int32],
-    steps: NDArray[np.int64],
-    width: int,
-    height: int,
-    first: NDArray[np.int32],
-    last: NDArray[np.int32],
+    shape: NDArray[np.int32], steps: NDArray[np.int64], width: int, spans: RowSpans
 ) -> tuple[Whole, Whole]:
     """Fill the rows of a shape that is larger than those of the table, by the same rule."""
+    first, last, height = spans[0], spans[1], spans.shape[1]
     size_parts, _, normal_parts = steps
     x, y = shape[X], shape[Y]
     i, j = np.int64(shape[NORMAL_I]), np.int64(shape[NORMAL_J])
@@ -202,7 +217,7 @@ def _computed_rows(
     return top, bottom
 
 
-@compiled
+@inlined
 def _inside(u: Whole, v: Whole, i: Whole, j: Whole, unit: Whole, scaled: Whole, limit: Whole) -> Any:
     """The rule of `tables`."""
     across = i * u + j * v

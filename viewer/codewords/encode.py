@@ -20,6 +20,7 @@ disc's plane, see `WordStream.finer`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,67 +78,92 @@ class Projected:
     far: float
 
 
+@dataclass(frozen=True)
+class Encoding:
+    """Rules by which elements become code words.
+
+    steps: of sizes and normals. exact: whether outlines and depths are not rounded to steps, see above.
+    radius_scale: factor on radii. cull_back: whether elements that face away are left out.
+    """
+
+    steps: Steps = PAPER
+    exact: bool = False
+    radius_scale: float = 1.0
+    cull_back: bool = False
+
+
+class EmittedWords(NamedTuple):
+    """Code words of elements, as `WordStream` has them."""
+
+    line_starts: NDArray[np.int64]
+    words: NDArray[np.uint64]
+    ids: NDArray[np.uint32]
+    finer: NDArray[np.int32] | None
+
+
 def encode_elements(
     elements: Elements,
     view: View,
     materials: Materials,
     light: Light = Light(),  # a frozen value
+    rules: Encoding = Encoding(),  # a frozen value
     *,
-    steps: Steps = PAPER,
-    exact: bool = False,
-    radius_scale: float = 1.0,
-    cull_back: bool = False,
     background: tuple[int, int, int, int] = (0, 0, 0, 255),
 ) -> WordStream:
     """Code words of what a view shows of some points; ids are their rows. Float64 throughout.
 
-    exact: outlines and depths are not quantised to the steps, see above. radius_scale: factor on radii.
-    cull_back: whether elements that face away are left out. Raises InputError where there are too many.
+    Raises InputError where there are too many.
     """
     check_picture_size(view.size)
-    found = project_elements(elements, view, light, steps, exact, radius_scale, cull_back)
-    depths, finer = _depths(found.planes, found.near, found.far, view.perspective, exact)
-    line_starts, words, ids, fine = emit_words(found, elements.materials, view.size, steps, depths, finer)
+    found = project_elements(elements, view, light, rules)
+    depths, finer = _depths(found.planes, found.near, found.far, view.perspective, rules.exact)
+    emitted = emit_words(found, elements.materials, view.size, rules.steps, depths, finer)
     return WordStream(
-        size=view.size, stride=strip_width(view.size[0]), line_starts=line_starts, words=words, ids=ids,
-        near=found.near + view.base, far=found.far + view.base, materials=materials, background=background,
-        perspective=view.perspective, finer=fine,
+        size=view.size, stride=strip_width(view.size[0]), **emitted._asdict(), near=found.near + view.base,
+        far=found.far + view.base, materials=materials, background=background, perspective=view.perspective,
     )  # fmt: skip
 
 
-def project_elements(
-    elements: Elements,
-    view: View,
-    light: Light,
-    steps: Steps = PAPER,
-    exact: bool = False,
-    radius_scale: float = 1.0,
-    cull_back: bool = False,
-) -> Projected:
+def project_elements(elements: Elements, view: View, light: Light, rules: Encoding = Encoding()) -> Projected:
     """The elements that a view may show, in steps; arguments as those of `encode_elements`."""
-    from .outline_kernels import PLANE_COLUMNS
-    from .project_kernels import SHAPE_COLUMNS, project
+    from .outline_kernels import PLANE_COLUMNS, PictureView
+    from .project_kernels import (
+        SHAPE_COLUMNS,
+        ElementArrays,
+        LightRules,
+        ProjectedArrays,
+        SplatRules,
+        project,
+    )
 
     count = len(elements.positions)
-    rows, spread = np.empty(count, np.uint32), np.empty(2)
-    shapes, planes = np.empty((count, SHAPE_COLUMNS), np.int32), np.empty((count, PLANE_COLUMNS))
-    none = np.empty((0, 3), np.float32)
-    direction = light.direction or (0.0, 0.0, 1.0)
-    drawn = project(
+    arrays = ElementArrays(
+        np.column_stack([view.rotation, view.translation]),
         elements.positions,
-        none if elements.normals is None else elements.normals,
+        np.empty((0, 3), np.float32) if elements.normals is None else elements.normals,
         np.empty(0, np.float32) if elements.radii is None else elements.radii,
         np.empty((0, 4), np.float32) if elements.axes is None else elements.axes,
-        np.column_stack([view.rotation, view.translation]),
-        np.array([*view.size, *view.center, view.scale, view.near, view.far]),
-        np.array([elements.radius, radius_scale, LEAST_RADIUS]),
-        np.array([*direction, light.shininess]),
-        _parts(steps),
-        np.array([view.perspective, light.is_lit, light.direction is None, cull_back, exact]),
-        rows, shapes, planes, spread,
+    )
+    picture = PictureView(
+        width=int(view.size[0]), height=int(view.size[1]),
+        center_x=float(view.center[0]), center_y=float(view.center[1]), scale=float(view.scale),
+        near=float(view.near), far=float(view.far), perspective=bool(view.perspective),
     )  # fmt: skip
-    near, far = (float(end) for end in spread) if drawn else (1.0, 1.0)
-    return Projected(rows[:drawn], shapes[:drawn], planes[:drawn], near, far)
+    splats = SplatRules(
+        float(elements.radius), float(rules.radius_scale), LEAST_RADIUS, rules.steps.size_parts,
+        rules.steps.steepest, rules.steps.normal_parts, bool(rules.cull_back), bool(rules.exact),
+    )  # fmt: skip
+    towards = np.array(light.direction or (0.0, 0.0, 1.0), np.float64)
+    lit = LightRules(float(light.shininess), bool(light.is_lit), light.direction is None)
+    out = ProjectedArrays(
+        np.empty(count, np.uint32),
+        np.empty((count, SHAPE_COLUMNS), np.int32),
+        np.empty((count, PLANE_COLUMNS)),
+        np.empty(2),
+    )
+    drawn = project(arrays, picture, splats, lit, towards, out)
+    near, far = (float(end) for end in out.spread) if drawn else (1.0, 1.0)
+    return Projected(out.rows[:drawn], out.shapes[:drawn], out.planes[:drawn], near, far)
 
 
 def emit_words(
@@ -147,39 +173,38 @@ def emit_words(
     steps: Steps,
     depths: NDArray[np.int32],
     finer: NDArray[np.float64] | None = None,
-) -> tuple[NDArray[np.int64], NDArray[np.uint64], NDArray[np.uint32], NDArray[np.int32] | None]:
-    """(line_starts, words, ids, finer), as `WordStream` has them, of elements.
+) -> EmittedWords:
+    """Code words of projected elements.
 
     materials: (N,) of all points. size: of the picture. depths: (M,), Z of each. finer: (M, 3), in steps, at
     the corner and a pixel right and down, of exact outlines; None: they are those of the table. Raises
     InputError where there are too many words.
     """
-    from .emit_kernels import emit
+    from .emit_kernels import EmittedElements, TableArrays, WordArrays, emit
 
     width, height = size
-    stride, exact, table = strip_width(width), finer is not None, shape_table(steps)
-    cursor = np.zeros(-(-width // stride) * height, np.int64)
-    given = (
-        size, stride, _parts(steps), table.entries, table.rows, table.reach, exact,
+    stride, exact, shapes = strip_width(width), finer is not None, shape_table(steps)
+    parts = np.array([steps.size_parts, steps.steepest, steps.normal_parts])
+    table = TableArrays(shapes.entries, shapes.rows, shapes.reach, parts)
+    given = EmittedElements(
         found.rows, materials[found.rows], found.shapes, found.planes, depths,
         np.empty((len(depths), 3)) if finer is None else finer,
     )  # fmt: skip
-    emit(*given, cursor, np.empty(0, np.uint64), np.empty(0, np.uint32), np.empty((0, 3), np.int32))
-    starts = np.concatenate([[0], np.cumsum(cursor)])
+
+    def emitted(cursor: NDArray[np.int64], count: int) -> WordArrays:
+        fine = np.empty((count if exact else 0, 3), np.int32)
+        out = WordArrays(cursor, np.empty(count, np.uint64), np.empty(count, np.uint32), fine)
+        emit(size, stride, exact, table, given, out)
+        return out
+
+    counts = emitted(np.zeros(-(-width // stride) * height, np.int64), 0).cursor
+    starts = np.concatenate([[0], np.cumsum(counts)])
     if (total := int(starts[-1])) > MOST_WORDS:
         raise InputError(
             f"{total:,} code words in one picture", hint="Move away, or draw smaller splats with radius_scale"
         )
-    words, ids = np.empty(total, np.uint64), np.empty(total, np.uint32)
-    fine = np.empty((total if exact else 0, 3), np.int32)
-    if total:
-        emit(*given, starts[:-1].copy(), words, ids, fine)
-    return starts, words, ids, fine if exact else None
-
-
-def _parts(steps: Steps) -> NDArray[np.int64]:
-    """Steps as the compiled loops have them."""
-    return np.array([steps.size_parts, steps.steepest, steps.normal_parts])
+    out = emitted(starts[:-1].copy(), total)
+    return EmittedWords(starts, out.words, out.ids, out.fine if exact else None)
 
 
 def _depths(

@@ -68,7 +68,7 @@ def draw_words(
     window: lines, at least eight. background: (H, W, 4) uint8 that is drawn over; None: the stream's colour.
     Raises InputError.
     """
-    from .engine_kernels import slide
+    from .engine_kernels import PictureArrays, StripPart, StripWords, slide
 
     picture = begun(stream, window, background)
     materials = stream.materials
@@ -77,12 +77,15 @@ def draw_words(
 
     def drawn(strip: int, top: int, bottom: int) -> None:
         left, height = strip * stream.stride, stream.size[1]
+        starts = stream.line_starts[strip * height : (strip + 1) * height + 1]
         slide(
-            height, left, min(stream.stride, stream.size[0] - left), top, bottom,
-            stream.line_starts[strip * height : (strip + 1) * height + 1], stream.words, stream.ids,
-            no_finer if stream.finer is None else stream.finer, coefficients, LIGHT_BYTES, window,
-            picture.image, picture.keys, picture.places,
-        )  # fmt: skip
+            StripPart(left, min(stream.stride, stream.size[0] - left), top, bottom),
+            StripWords(starts, stream.words, stream.ids, no_finer if stream.finer is None else stream.finer),
+            window,
+            coefficients,
+            LIGHT_BYTES,
+            PictureArrays(picture.image, picture.keys, picture.places),
+        )
 
     together(_PIXELS * len(stream), [partial(drawn, *part) for part in _parts(stream)])
     return picture

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,30 +15,46 @@ _NO_KEY = np.int32(0x7FFFFFFF)
 _NO_WORD = np.uint32(NOTHING)
 
 
+class StripPart(NamedTuple):
+    """A part of a strip of the picture."""
+
+    left: int  # column of the strip
+    columns: int  # of the strip
+    top: int  # first line that is flushed
+    bottom: int  # line after the last one
+
+
+class StripWords(NamedTuple):
+    """The words of a strip, see `WordStream`."""
+
+    line_starts: NDArray[np.int64]  # (height + 1,), of the strip alone
+    words: NDArray[np.uint64]
+    ids: NDArray[np.uint32]
+    finer: NDArray[np.int32]  # (words, 3) or (0, 3)
+
+
+class PictureArrays(NamedTuple):
+    """A picture that is drawn into, see `CodePicture`."""
+
+    image: NDArray[np.uint8]
+    keys: NDArray[np.int32]
+    places: NDArray[np.uint32]
+
+
 @compiled
 def slide(
-    height: int,
-    left: int,
-    columns: int,
-    top: int,
-    bottom: int,
-    line_starts: NDArray[np.int64],
-    words: NDArray[np.uint64],
-    ids: NDArray[np.uint32],
-    finer: NDArray[np.int32],
+    part: StripPart,
+    stream: StripWords,
+    window: int,
     materials: NDArray[np.int32],
     light_bytes: NDArray[np.uint8],
-    window: int,
-    image: NDArray[np.uint8],
-    keys: NDArray[np.int32],
-    places: NDArray[np.uint32],
+    picture: PictureArrays,
 ) -> None:
-    """Slide a window down a part of a strip.
-
-    left, columns: of the strip. top, bottom: lines that are flushed, the last one not. line_starts: of the
-    strip alone, (height + 1,). materials: (3, M, 3), I_0, k_d and k_s. image, keys, places: as `CodePicture`
-    has them, of what is not drawn.
-    """
+    """Slide a window of some lines down a part of a strip. materials: (3, M, 3), I_0, k_d and k_s."""
+    left, columns, top, bottom = part
+    line_starts, words, ids, finer = stream
+    image, keys, places = picture
+    height = len(line_starts) - 1
     has_finer = len(finer) > 0
     most = len(light_bytes) - 1
     window_keys = np.full((window, columns), _NO_KEY, np.int32)

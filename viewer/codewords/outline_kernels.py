@@ -11,6 +11,7 @@ plane leaves of it, three numbers: places where g + h x + i y <= 0.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,27 +22,41 @@ PLANE_COLUMNS = 15
 Whole = int | np.integer
 
 
+CENTER, NORMAL, U, V, EYE, LENGTHS = range(6)  # rows of a disc, (6, 3), in view space, see `Disc`
+
+# What compiled loops hold of a disc, one array that each element fills anew: its centre, its unit normal
+# towards the eye, unit vectors along its half-axes, the unit vector to the eye, and the half-axes' lengths.
+Disc = NDArray[np.float64]
+# The pixels that a shape covers in each row of a picture, (2, H): first and last; none where first > last.
+RowSpans = NDArray[np.int32]
+
+
+class PictureView(NamedTuple):
+    """A view as compiled loops have it."""
+
+    width: int
+    height: int
+    center_x: float  # of the line of sight, pixels
+    center_y: float
+    scale: float  # pixels in a scan unit, at depth 1 in perspective
+    near: float
+    far: float
+    perspective: bool
+
+
 @compiled
 def project_outline(
-    c: NDArray[np.float64],
-    n: NDArray[np.float64],
-    u: NDArray[np.float64],
-    v: NDArray[np.float64],
-    first: float,
-    second: float,
-    corner_x: float,
-    corner_y: float,
-    scale: float,
-    perspective: bool,
-    near: float,
-    plane: NDArray[np.float64],
+    disc: Disc, view: PictureView, corner_x: float, corner_y: float, plane: NDArray[np.float64]
 ) -> None:
     """The plane of a disc over the picture, and its outline, from a corner of pixels: (corner_x, corner_y)
-    from the line of sight, pixels. near: depth of the near plane.
+    from the line of sight, pixels.
 
     A ray of the picture meets the plane where the inverse of its depth, and the disc's two coordinates times
     that, are linear in pixels. In parallel views coordinates and depth are.
     """
+    c, n, u, v = disc[CENTER], disc[NORMAL], disc[U], disc[V]
+    first, second = disc[LENGTHS, 0], disc[LENGTHS, 1]
+    scale, near, perspective = view.scale, view.near, view.perspective
     lines = np.empty((3, 3))  # coordinate along u, along v, and 1; each: at the corner, a pixel right, down
     at = np.array([corner_x / scale, -corner_y / scale])
     step = np.array([1.0 / scale, -1.0 / scale])
@@ -120,15 +135,11 @@ def is_outline_seen(plane: NDArray[np.float64], x: float, y: float, width: float
 
 @compiled
 def exact_rows(
-    plane: NDArray[np.float64],
-    x: int,
-    y: int,
-    width: int,
-    height: int,
-    first: NDArray[np.int32],
-    last: NDArray[np.int32],
+    plane: NDArray[np.float64], x: int, y: int, width: int, spans: RowSpans
 ) -> tuple[Whole, Whole]:
-    """Fill the rows of an exact outline, cut to the picture and at the near plane."""
+    """Fill the rows of an exact outline, cut to the picture and at the near plane; gives the first and the
+    last of them."""
+    first, last, height = spans[0], spans[1], spans.shape[1]
     a, b, c, d, e, f = plane[4], plane[5], plane[6], plane[7], plane[8], plane[9]
     is_open = plane[10] == -np.inf
     top = np.int64(max(math.ceil(max(y + plane[10], -1.0) - 0.5), 0.0))
@@ -161,18 +172,13 @@ def exact_rows(
 
 @compiled
 def seen_range(
-    plane: NDArray[np.float64],
-    x: int,
-    y: int,
-    width: int,
-    height: int,
-    first: NDArray[np.int32],
-    last: NDArray[np.int32],
+    plane: NDArray[np.float64], x: int, y: int, width: int, spans: RowSpans
 ) -> tuple[float, float]:
     """The least and the largest depth, or inverse of it in perspective, of the pixels inside an outline; the
-    first is the larger one where there are none. first, last: as `exact_rows` fills them."""
+    first is the larger one where there are none. spans: get the rows of `exact_rows`."""
     low, high = np.inf, -np.inf
-    top, bottom = exact_rows(plane, x, y, width, height, first, last)
+    first, last = spans[0], spans[1]
+    top, bottom = exact_rows(plane, x, y, width, spans)
     for row in range(top, bottom + 1):
         if first[row] <= last[row]:
             for column in (first[row], last[row]):

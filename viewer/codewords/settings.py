@@ -17,7 +17,7 @@ from ..scan.ranges import robust_range
 from ..scan.spacing import typical_spacing
 from ..srgb import bytes_from_light, light_from_bytes
 from ..view import View
-from .encode import Elements, Light, encode_elements
+from .encode import Elements, Encoding, Light, encode_elements
 from .lighting import Materials, map_palette, mapped, palette_of
 from .stream import WordStream
 from .tables import Steps
@@ -100,10 +100,7 @@ def words_of(pose: Pose, view: View, look: Look, params: Params, layers: Layers 
         view,
         materials,
         lights,
-        steps=params.steps,
-        exact=params.quality == "exact",
-        radius_scale=params.radius_scale,
-        cull_back=params.cull_back,
+        Encoding(params.steps, params.quality == "exact", params.radius_scale, params.cull_back),
         background=rgba(look.background),
     )
 

@@ -11,7 +11,7 @@ from word_scenes import GREY, front_view, scattered, streams
 
 from viewer.backends.codeword import engine
 from viewer.backends.codeword.engine import draw_stream
-from viewer.codewords.encode import Elements, encode_elements
+from viewer.codewords.encode import Elements, Encoding, encode_elements
 from viewer.codewords.engine import CodePicture, draw_words, draw_words_plainly
 from viewer.codewords.stream import WordStream
 from viewer.drawing.renderer import Renderer
@@ -52,7 +52,9 @@ def test_bands_of_many_words_are_drawn_in_several_calls(
 @pytest.mark.parametrize("window", [*rarely(8, 16), 13, 64])
 def test_strips_and_bands_meet(renderer: Renderer, size: tuple[int, int], exact: bool, window: int) -> None:
     view = front_view(size, perspective=True)
-    stream = encode_elements(scattered(4000, size, seed=1, radius=5.0), view, GREY, exact=exact)
+    stream = encode_elements(
+        scattered(4000, size, seed=1, radius=5.0), view, GREY, rules=Encoding(exact=exact)
+    )
     assert_same(draw_stream(renderer.gpu, stream, window), draw_words(stream))
 
 
@@ -60,7 +62,7 @@ def test_strips_and_bands_meet(renderer: Renderer, size: tuple[int, int], exact:
 def test_a_background_is_drawn_over(renderer: Renderer, exact: bool) -> None:
     size = (70, 50)
     elements = scattered(60, size, seed=2)
-    stream = encode_elements(elements, front_view(size), GREY, exact=exact)
+    stream = encode_elements(elements, front_view(size), GREY, rules=Encoding(exact=exact))
     picture = np.random.default_rng(3).integers(0, 256, (50, 70, 4), np.uint8)
     drawn = draw_stream(renderer.gpu, stream, background=picture)
     assert_same(drawn, draw_words_plainly(stream, background=picture))

@@ -14,7 +14,7 @@ from viewer.backends.codeword import encoder
 from viewer.backends.codeword.engine import WordBuffers
 from viewer.bench.scenes.samples import on_torus
 from viewer.camera import PROJECTIONS, Camera
-from viewer.codewords.encode import Projected, emit_words, project_elements
+from viewer.codewords.encode import Encoding, Projected, emit_words, project_elements
 from viewer.codewords.engine import draw_words
 from viewer.codewords.outline_kernels import PLANE_COLUMNS
 from viewer.codewords.project_kernels import (
@@ -130,7 +130,7 @@ def test_elements_are_within_a_step(
     view, light = view_of(request, size), word_lights(LOOK, True)
     elements = elements_of(pose, view, params, np.zeros(COUNT, np.uint8))
     there = project_elements(
-        elements, view, light, params.steps, radius_scale=params.radius_scale, cull_back=params.cull_back
+        elements, view, light, Encoding(params.steps, False, params.radius_scale, params.cull_back)
     )
     rows, mine, theirs = np.intersect1d(here.rows, there.rows, return_indices=True)
     assert len(rows) >= 0.998 * max(len(here.rows), len(there.rows)) > 0  # others are at an edge
