@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.analysis.landmarks import Landmark
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.errors import InputError
 from viewer.scan.faces import Faces
 from viewer.scan.points import PointCloud
@@ -88,13 +88,13 @@ def truth(x: float, y: float, frames: int) -> NDArray[np.float64]:
     return np.stack([moved(at_rest(x, y)[None], frame)[0] for frame in range(frames)])
 
 
-def key(x: float, y: float, frame: int) -> Spot:
+def key(x: float, y: float, frame: int) -> SurfacePoint:
     """A place of the surface, as set exactly in a frame."""
     place = moved(at_rest(x, y)[None], frame)[0]
     where = (float(place[0]), float(place[1]), float(place[2]))
-    return Spot(frame, frame / 25.0, where, None, SPACING, 0, (0.0,) * 6)
+    return SurfacePoint(frame, frame / 25.0, where, None, SPACING, 0, (0.0,) * 6)
 
 
-def placed(name: str, *keys: Spot) -> Landmark:
+def placed(name: str, *keys: SurfacePoint) -> Landmark:
     """A landmark that was set at these."""
     return Landmark(name, keys)

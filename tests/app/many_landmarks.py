@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.measures import Measure
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.app.tools.plotting.choices import CurveChoices
 from viewer.document.document import Document
 from viewer.document.landmarks import Landmarks
@@ -34,7 +34,7 @@ def document(first: NDArray[np.float64], landmarks: int, measures: int) -> Docum
     rows = np.linspace(0, len(first) - 1, landmarks).astype(int).tolist()
     names = [f"landmark {number}" for number in range(1, landmarks + 1)]
     placed = tuple(
-        Landmark(name, (Spot(0, 0.0, vector(first[row]), row, 1.2, 0),))
+        Landmark(name, (SurfacePoint(0, 0.0, vector(first[row]), row, 1.2, 0),))
         for name, row in zip(names, rows, strict=True)
     )
     made = tuple(

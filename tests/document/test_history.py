@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Bookmark, Document
@@ -23,7 +23,7 @@ Change = Callable[[Document, np.random.Generator], Document]
 
 
 def with_distance(document: Document, number: float) -> Document:
-    ends = ([Spot(0, 0.0, (number, 0, side), 3, 0.1, 0)] for side in (0, 1))
+    ends = ([SurfacePoint(0, 0.0, (number, 0, side), 3, 0.1, 0)] for side in (0, 1))
     return document.with_part(document.part(Landmarks).with_distance(*ends))
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from viewer.analysis.landmarks import Landmark, Template
 from viewer.analysis.measures import Measure
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.document.landmarks import Landmarks
 
 WIDTH = Measure("width", "distance", ("left", "right"))
@@ -15,8 +15,8 @@ PAIR = Template(
 )
 
 
-def spot(frame: int) -> Spot:
-    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), None, None, 0)
+def spot(frame: int) -> SurfacePoint:
+    return SurfacePoint(frame, frame / 10, (1.0, 2.0, 3.0), None, None, 0)
 
 
 def test_landmarks_are_placed_in_turn_but_those_that_are_not_there() -> None:

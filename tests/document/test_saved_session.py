@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 from hostile_values import variants
 
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.choice.goal import Goal
@@ -35,7 +35,10 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 CAMERA = Camera(eye=(0.1, 1 / 3, 5e7), fov_y=30.5)
-ENDS = (Spot(2, 0.08, (0.1, 1e-17, 3), 7, 0.2, 0),), (Spot(2, 0.08, (1, 2, 3), None, None, 2),)
+ENDS = (
+    (SurfacePoint(2, 0.08, (0.1, 1e-17, 3), 7, 0.2, 0),),
+    (SurfacePoint(2, 0.08, (1, 2, 3), None, None, 2),),
+)
 FULL = Document(
     camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},

@@ -22,7 +22,7 @@ from whole_folders import FOLDERS
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.analysis.landmarks.templates import read_template, save_template, templates
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.app import keys, settings
 from viewer.app.menus import Commands
 from viewer.app.part import part_classes, stored_values
@@ -99,7 +99,7 @@ def _write_choices(folder: Path) -> None:
     marks = (Bookmark("front", camera),)
     chosen = {"session": {"look": {"light": "head"}}, "scans": {"recent": ["demo"]}}
     settings.save(chosen, folder / "settings.json")
-    end = Spot(0, 0.0, (1.0, 2.0, 3.0), 3, 0.1, 0)
+    end = SurfacePoint(0, 0.0, (1.0, 2.0, 3.0), 3, 0.1, 0)
     document = Document(camera, (1.0, 2.0, 3.0), Look(light="head"), "points", unit="mm", bookmarks=marks)
     document = document.with_params("points", backend("points").params()).with_part(
         Landmarks().with_distance([end], [replace(end, id=None)])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scenes import DRAWS_POINTS, NOTHING, rarely, sphere, sphere_mesh
 
 from viewer.analysis.pick import is_seen, pick
-from viewer.analysis.spot import Spot, followed
+from viewer.analysis.surface_point import SurfacePoint, followed
 from viewer.backends import backend as find_backend
 from viewer.backends import backends
 from viewer.bench.judge import Judge
@@ -246,7 +246,7 @@ def test_ends_of_distances_go_with_the_pose(renderer: Renderer) -> None:
     there = moved(CLOUD, TURNED)
     surface = drawn(renderer, POSE, camera_of(there), Layers(world_from_pose=TURNED), "surfels")
     places = [pick(surface, x, y) for y, x in np.argwhere(surface.row != NOTHING)[[100, 3000]].tolist()]
-    ends = [Spot.of(place, POSE, place=TURNED) for place in places if place is not None]
+    ends = [SurfacePoint.of(place, POSE, place=TURNED) for place in places if place is not None]
     for end, place in zip(ends, places, strict=True):
         assert place is not None
         position = TURNED.points(np.array(end.position))

@@ -14,7 +14,7 @@ from scenes import NOTHING
 from test_laid_over import turned
 
 from viewer.analysis.pick import Picked, before_gap, is_seen, pick
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.backends import Backend
 from viewer.camera import Camera
 from viewer.document.anonymous import anonymous_request
@@ -190,11 +190,11 @@ def test_picks_and_measurements_are_those_of_the_points(renderer: Renderer, scen
         assert pick(samples, x, y, spacing=False).id == one.id
         assert is_seen(samples, one.position, 0.5)
         assert before_gap(samples, x, y) == before_gap(points, x, y)
-        end = Spot.of(one, pose, place=TURNED)
-        assert end == replace(Spot.of(other, points.pose.pose, place=TURNED), spacing=end.spacing)
+        end = SurfacePoint.of(one, pose, place=TURNED)
+        assert end == replace(SurfacePoint.of(other, points.pose.pose, place=TURNED), spacing=end.spacing)
     place = Picked(TURNED.points(pose.bounds.center), level=2)
     filled, expected = (
-        Spot.of(place, of, filled=True, place=TURNED).spacing for of in (pose, points.pose.pose)
+        SurfacePoint.of(place, of, filled=True, place=TURNED).spacing for of in (pose, points.pose.pose)
     )
     assert filled == pytest.approx(expected, rel=1e-6)
     assert not is_merged(samples)

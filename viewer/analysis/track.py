@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from .spot import Spot
+    from .surface_point import SurfacePoint
 
 
 class Known(IntEnum):
@@ -58,11 +58,11 @@ class Track:
         )
 
     @classmethod
-    def of(cls, spot: Spot) -> Track:
-        """One of a single frame, in which the landmark was placed at a spot."""
-        spread = np.full((3, 3), np.nan) if spot.spread is None else spot.spread
+    def of(cls, point: SurfacePoint) -> Track:
+        """One of a single frame, in which the landmark was placed at a point of the surface."""
+        spread = np.full((3, 3), np.nan) if point.spread is None else point.spread
         known = np.array([Known.PLACED], np.uint8)
-        return cls(np.array([spot.time]), np.array([spot.position]), spread[None], known)
+        return cls(np.array([point.time]), np.array([point.position]), spread[None], known)
 
     @property
     def is_whole(self) -> bool:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 from ..analysis.landmarks import Landmark, Template
 from ..analysis.measures import Measure
-from ..analysis.spot import Spot
+from ..analysis.surface_point import SurfacePoint
 from ..geometry import Vector
 from .part import Part
 
@@ -55,7 +55,9 @@ class Landmarks(Part, name="landmarks"):
         """The landmarks of a measure, in its order."""
         return [one for name in measure.landmarks if (one := self.named(name))]
 
-    def with_distance(self, first: Iterable[Spot], second: Iterable[Spot], name: str = "") -> Landmarks:
+    def with_distance(
+        self, first: Iterable[SurfacePoint], second: Iterable[SurfacePoint], name: str = ""
+    ) -> Landmarks:
         """Add a distance between two landmarks of its own, where these are placed. name: that it has unless
         it is taken; "" for the next number."""
         taken = {*(one.name for one in self.all), *(one.name for one in self.measures)}

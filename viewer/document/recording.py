@@ -32,7 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
-from ..analysis.spot import slack_before
+from ..analysis.surface_point import slack_before
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..choice.choose import Automatic, Choice

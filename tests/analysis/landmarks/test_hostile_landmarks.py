@@ -58,7 +58,7 @@ BAD = {
     ("m.csv", "a,b\n1,2\n"): "line 1: names neither",
     ("m.csv", "name,x,y,z\n"): "holds no landmarks",
     ("m.csv", "name,x,y,z\na,1,2\n"): "line 2: has 3 values, and 4 columns",
-    ("m.csv", 'name,x,y,z\n"a,1,2,3\n'): "is not a row of data of a table",
+    ("m.csv", 'name,x,y,z\n"a,1,2,3\n'): "is not a row of the table",
     ("m.csv", "name,x,y,z\na,1,2,3\na,1,2,3\n"): "line 3: 'a' appears twice",
     ("m.csv", "name,x,y,z\na,1,2,0x10\n"): "'0x10' is no number",
     ("m.csv", "name;x;y;z\na;1,5;2;3\n"): "Decimals follow a point",
@@ -80,7 +80,7 @@ BAD = {
     ("m.c3d", "\x02P" * 600): "parameters or frames are damaged",
     ("m.stl", "solid"): "unknown file suffix '.stl'",
     ("m.tps", ""): "is empty",
-    ("m.tps", "LM3=1\n1 2 3\0\n"): "is not a UTF-8 text",
+    ("m.tps", "LM3=1\n1 2 3\0\n"): "is not text",
 }  # fmt: skip
 
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
-from viewer.analysis.landmarks.placed import landmarks_of, spot_at, told_beside
-from viewer.analysis.spot import followed
+from viewer.analysis.landmarks.placed import landmarks_of, surface_point_at, told_beside
+from viewer.analysis.surface_point import followed
 from viewer.analysis.track import Known
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -19,8 +19,8 @@ POSES = [Pose(n, n / 10, "", PointCloud.from_arrays(GRID + n * STEP)) for n in r
 
 def test_a_place_follows_the_points_around_it() -> None:
     place = np.array([7.3, 8.8, 0.0])
-    spot = spot_at(place, POSES[1], 0.2)
-    spot = spot_at(place + STEP, POSES[1], 0.2)
+    spot = surface_point_at(place, POSES[1], 0.2)
+    spot = surface_point_at(place + STEP, POSES[1], 0.2)
     assert (spot.frame, spot.time, len(spot.neighbors)) == (1, 0.1, 8)
     assert spot.uncertainty is not None
     np.testing.assert_allclose(spot.uncertainty, 1.96 * 0.2)
@@ -30,7 +30,7 @@ def test_a_place_follows_the_points_around_it() -> None:
 
 
 def test_a_place_beside_the_surface_follows_nothing() -> None:
-    spot = spot_at(np.array([7.0, 8.0, 40.0]), POSES[0])
+    spot = surface_point_at(np.array([7.0, 8.0, 40.0]), POSES[0])
     assert spot.id is None
     assert spot.neighbors == ()
     assert spot.spread is not None

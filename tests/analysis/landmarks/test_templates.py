@@ -19,7 +19,7 @@ from viewer.analysis.landmarks.templates import (
     templates,
 )
 from viewer.analysis.measures import Measure
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.errors import InputError
 
 
@@ -62,7 +62,7 @@ def own(**changes: Any) -> dict[str, Any]:
 
 
 def test_a_template_of_present_landmarks_is_read_again(tmp_path: Path) -> None:
-    spot = Spot(0, 0.0, (1.0, 2.0, 3.0), None, None, 0)
+    spot = SurfacePoint(0, 0.0, (1.0, 2.0, 3.0), None, None, 0)
     landmarks = (
         Landmark("left", (spot,), partner="right", about="the left one"), Landmark("right", partner="left"),
         Landmark("alone", partner="left", skipped=True), Landmark("lost", partner="nobody"),

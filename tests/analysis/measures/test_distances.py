@@ -19,7 +19,7 @@ from viewer.analysis.measures.distances import (
 )
 from viewer.analysis.measures.series import all_series
 from viewer.analysis.pick import Neighbor
-from viewer.analysis.spot import Spot, followed
+from viewer.analysis.surface_point import SurfacePoint, followed
 from viewer.analysis.track import Known, Track
 from viewer.csv_text import save_rows, to_text
 from viewer.document.landmarks import Landmarks
@@ -36,9 +36,9 @@ SCAN, MM = 'the "left", ear', Scale("mm")
 FRAMES = range(3)
 
 
-def at(position: tuple[float, float, float], *deviations: float) -> Spot:
+def at(position: tuple[float, float, float], *deviations: float) -> SurfacePoint:
     x, y, z = (deviation**2 for deviation in deviations or (math.nan,) * 3)
-    return Spot(0, 0.0, position, 0, 0.1, 0, (x, 0, 0, y, 0, z) if deviations else None)
+    return SurfacePoint(0, 0.0, position, 0, 0.1, 0, (x, 0, 0, y, 0, z) if deviations else None)
 
 
 # --- ± --------------------------------------------------------------------------------------
@@ -58,7 +58,7 @@ def test_the_uncertainty_covers_what_ends_that_err_give() -> None:
     spreads = [tilted @ np.diag([0.3, 0.1, 0.02]) ** 2 @ tilted.T, np.diag([0.05, 0.2, 0.1]) ** 2]
     places = np.array([[0.0, 0, 0], [20, 30, -10]])
     ends = [
-        Spot(0, 0.0, vector(place), 0, 0.1, 0, tuple(matrix[np.triu_indices(3)].tolist()))
+        SurfacePoint(0, 0.0, vector(place), 0, 0.1, 0, tuple(matrix[np.triu_indices(3)].tolist()))
         for place, matrix in zip(places, spreads, strict=True)
     ]
     drawn = [rng.multivariate_normal(place, m, 100_000) for place, m in zip(places, spreads, strict=True)]
@@ -79,7 +79,7 @@ def pose(index: int) -> Pose:
     return Pose(index, 0.5 * index, f"{index}", PointCloud.from_arrays(points))
 
 
-def end(row: int, frame: int = 0) -> Spot:
+def end(row: int, frame: int = 0) -> SurfacePoint:
     """An end beside a point, as clicks set them: it follows the points around."""
     points = pose(frame).cloud.world()
     position = points[row] + np.array([0.01, 0.02, -0.01])
@@ -87,13 +87,13 @@ def end(row: int, frame: int = 0) -> Spot:
     neighbors = tuple(Neighbor(int(n), vector(points[n] - position)) for n in nearest)
     spread = np.diag([1e-4, 4e-4, 1e-4])
     covariance = tuple(spread[np.triu_indices(3)].tolist())
-    return Spot(frame, 0.5 * frame, vector(position), row, 0.1, 0, covariance, neighbors)
+    return SurfacePoint(frame, 0.5 * frame, vector(position), row, 0.1, 0, covariance, neighbors)
 
 
 MADE = Landmarks().with_distance([end(3)], [end(50)]).with_distance([end(7, 1)], [end(90, 1)], "=lips")
 
 
-def track(spot: Spot) -> Track:
+def track(spot: SurfacePoint) -> Track:
     """An end through all frames, in the last of which it is a gap."""
     there = [followed(spot, pose(frame)) for frame in FRAMES]
     found = Track.pending(np.array([0.5 * frame for frame in FRAMES]))

@@ -14,7 +14,7 @@ from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.analysis.landmarks.placed import landmarks_of
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known, Track
 from viewer.analysis.tracking import TrackingSettings, track_landmarks
 from viewer.analysis.tracking.body import DeformableBody
@@ -46,7 +46,7 @@ def tracks_of(landmarks: list[Landmark], scan: Timeline) -> list[Track]:
 def keyed(sigma: float, scale: float = 1.0) -> list[Landmark]:
     six = (sigma**2, 0.0, 0.0, sigma**2, 0.0, sigma**2)
     return [
-        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), None, scale * SPACING, 0, six))
+        Landmark(f"{n}").with_key(SurfacePoint(0, 0.0, vector(place), None, scale * SPACING, 0, six))
         for n, place in enumerate(scale * PATHS[0])
     ]
 
@@ -87,7 +87,7 @@ def test_the_unit_of_a_scan_changes_lengths_alone() -> None:
 
 def followers(*places: tuple[float, float, float]) -> list[Follower]:
     surface = MomentSurface(arms(0), SPACING)
-    keys = [Spot(0, 0.0, place, None, SPACING, 0) for place in places]
+    keys = [SurfacePoint(0, 0.0, place, None, SPACING, 0) for place in places]
     return [Follower(key, surface, np.zeros(3), TrackingSettings()) for key in keys]
 
 

@@ -9,7 +9,7 @@ from scenes import rarely
 from swinging_arms import APART, LONG, SPACING, THICK, arms, on_arm
 
 from viewer.analysis.landmarks import Landmark
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known
 from viewer.analysis.tracking import track_landmarks
 from viewer.analysis.tracking.body import DeformableBody
@@ -67,7 +67,7 @@ def test_a_few_points_are_a_body_too(count: int) -> None:
 
 def test_landmarks_of_limbs_are_told_on_their_own_limb() -> None:
     places = [*on_arm(0, -1, ENDS), *on_arm(0, 1, ENDS)]
-    keys = [Spot(0, 0.0, vector(place), None, SPACING, 0, (0.0,) * 6) for place in places]
+    keys = [SurfacePoint(0, 0.0, vector(place), None, SPACING, 0, (0.0,) * 6) for place in places]
     landmarks = [Landmark(f"{number}").with_key(key) for number, key in enumerate(keys)]
     clouds = [PointCloud.from_arrays(arms(frame)) for frame in range(5)]
     source = KeptFrames("arms", clouds, np.arange(5.0))

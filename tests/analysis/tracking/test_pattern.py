@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swinging_arms import LONG, SPACING, THICK, arms, on_arm
 
 from viewer.analysis.landmarks import Landmark
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known, Track
 from viewer.analysis.tracking import track_landmarks
 from viewer.analysis.tracking.pattern import PointPattern, RecurringPoints
@@ -121,7 +121,7 @@ def tracks_of_arms(noise: float, kept: float = 1.0, scale: float = 1.0) -> Mappi
         points = points[chance.permutation(len(points))[: int(kept * len(points))]]
         clouds.append(PointCloud.from_arrays(scale * (points + chance.normal(0, noise, points.shape))))
     landmarks = [
-        Landmark(f"{n}").with_key(Spot(0, 0.0, vector(place), None, scale * SPACING, 0, (0.0,) * 6))
+        Landmark(f"{n}").with_key(SurfacePoint(0, 0.0, vector(place), None, scale * SPACING, 0, (0.0,) * 6))
         for n, place in enumerate(scale * PATHS[0])
     ]
     source = KeptFrames("arms", clouds, np.arange(float(FRAMES)))

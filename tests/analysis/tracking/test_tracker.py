@@ -139,14 +139,14 @@ def test_a_cancelled_tracker_goes_on_later() -> None:
 
 def test_one_topology_is_followed_exactly() -> None:
     from viewer.analysis.pick import Neighbor
-    from viewer.analysis.spot import Spot
+    from viewer.analysis.surface_point import SurfacePoint
     from viewer.geometry import vector
     from viewer.scan.demo import DemoSource
 
     source = DemoSource()
     timeline = Timeline(source, source.times(), source.unit)
     row = 4321
-    spot = Spot(
+    spot = SurfacePoint(
         0,
         0.0,
         vector(timeline.pose(0).cloud.world(row)),

@@ -11,7 +11,7 @@ import pytest
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.measures import Measure
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known, Track
 from viewer.app.clicks import Clicks
 from viewer.app.followed import Followed
@@ -28,9 +28,9 @@ TIMES = np.arange(4) / 10
 MM = Scale.of("mm", None)
 
 
-def spot(frame: int) -> Spot:
+def spot(frame: int) -> SurfacePoint:
     covariance = (0.01, 0.0, 0.0, 0.04, 0.0, 0.01)
-    return Spot(frame, frame / 10, (1.0, 2.0, 3.0), None, 0.5, 0, covariance)
+    return SurfacePoint(frame, frame / 10, (1.0, 2.0, 3.0), None, 0.5, 0, covariance)
 
 
 def track(*known: Known, reasons: dict[int, str] | None = None) -> Track:

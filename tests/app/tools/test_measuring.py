@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from imgui_bundle import ImVec2
 
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.app.clicks import Clicks
 from viewer.app.followed import Followed
 from viewer.app.scene.canvas import ViewPlace
@@ -23,8 +23,8 @@ from viewer.document.landmarks import Landmarks
 PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 
 
-def end(id: int | None) -> Spot:
-    return Spot(0, 0.0, (0, 0, 0), id, None, 0)
+def end(id: int | None) -> SurfacePoint:
+    return SurfacePoint(0, 0.0, (0, 0, 0), id, None, 0)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from experiments.landmarks.known import KnownScan
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.analysis.landmarks.placed import landmarks_of
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known, Track
 from viewer.geometry import vector
 from viewer.scan.spacing import nearest_row
@@ -61,7 +61,7 @@ def keyed_landmarks(known: KnownScan, keys: int = 1) -> list[Landmark]:
             place = known.paths[frame, number]
             row, _ = nearest_row(known.source.load(frame), place)
             time = float(known.source.times()[frame])
-            spot = Spot(frame, time, vector(place), row, known.spacing, 0, _EXACT)
+            spot = SurfacePoint(frame, time, vector(place), row, known.spacing, 0, _EXACT)
             landmark = landmark.with_key(spot)
         landmarks.append(landmark)
     return landmarks

@@ -17,7 +17,7 @@ from experiments.suite import Part, Suite, row_of, subjects
 from experiments.tables import Column, Row, StoredRun, Table, at, code, grouped
 from viewer.analysis.measures.distances import distance_of
 from viewer.analysis.pick import before_gap, pick
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.words import SURE
 from viewer.backends import backend
 from viewer.bench.report.page import three_digits
@@ -146,11 +146,11 @@ def measured_in(
     return Distances(np.array(off), np.array(uncertainty), float(np.median(pitches)))
 
 
-def _end(surface: Surface, pose: Pose, x: int, y: int) -> Spot:
+def _end(surface: Surface, pose: Pose, x: int, y: int) -> SurfacePoint:
     """The end that a click sets."""
     picked = pick(surface, x, y, shown=before_gap(surface, x, y))
     assert picked is not None
-    return Spot.of(picked, pose, filled=True)
+    return SurfacePoint.of(picked, pose, filled=True)
 
 
 # --- as a table -----------------------------------------------------------------------

@@ -24,7 +24,7 @@ from experiments.landmarks.resampled import ResampledDemo
 from experiments.script import Script
 from experiments.tables import Row
 from viewer.analysis.landmarks import Landmark
-from viewer.analysis.spot import Spot
+from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.tracking import Tracker
 from viewer.geometry import vector
 from viewer.scan import formats
@@ -54,7 +54,7 @@ def landmarks_in(source: ResampledDemo, folder: Path) -> list[Landmark]:
     spacing, placed = typical_spacing(cloud), []
     for name, place in zip(PLACES, path_of(truth_places(), [0.0], source.demo.motion)[0], strict=True):
         row, _ = nearest_row(cloud, place)
-        placed.append(Landmark(name).with_key(Spot(0, 0.0, vector(place), row, spacing, 0, _EXACT)))
+        placed.append(Landmark(name).with_key(SurfacePoint(0, 0.0, vector(place), row, spacing, 0, _EXACT)))
     return placed
 
 

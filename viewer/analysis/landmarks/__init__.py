@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from ..measures import Measure
-from ..spot import Spot
+from ..surface_point import SurfacePoint
 
 State = Literal["not placed", "placed", "skipped"]
 
@@ -22,7 +22,7 @@ class Landmark:
     """
 
     name: str
-    keys: tuple[Spot, ...] = ()
+    keys: tuple[SurfacePoint, ...] = ()
     skipped: bool = False
     missing: tuple[int, ...] = ()
     partner: str = ""
@@ -42,15 +42,15 @@ class Landmark:
             return "placed"
         return "skipped" if self.skipped else "not placed"
 
-    def key_at(self, frame: int) -> Spot | None:
-        """The spot at which it was set in a frame; None where it was not."""
+    def key_at(self, frame: int) -> SurfacePoint | None:
+        """The point of the surface at which it was placed in a frame; None where it was not."""
         return next((key for key in self.keys if key.frame == frame), None)
 
-    def with_key(self, spot: Spot) -> Landmark:
-        """The landmark set at a spot, in place of what was set in that frame; it is there then."""
-        others = (key for key in self.keys if key.frame != spot.frame)
-        keys = tuple(sorted((*others, spot), key=lambda key: key.frame))
-        missing = tuple(frame for frame in self.missing if frame != spot.frame)
+    def with_key(self, key: SurfacePoint) -> Landmark:
+        """The landmark with a key, in place of the one in that frame; it is visible there then."""
+        others = (other for other in self.keys if other.frame != key.frame)
+        keys = tuple(sorted((*others, key), key=lambda one: one.frame))
+        missing = tuple(frame for frame in self.missing if frame != key.frame)
         return replace(self, keys=keys, missing=missing, skipped=False)
 
     def without_key(self, frame: int) -> Landmark:

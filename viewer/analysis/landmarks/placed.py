@@ -14,7 +14,7 @@ from ...scan.pose import Pose
 from ...scan.spacing import nearest_row, spacing_at
 from ...task import checkpoint
 from ..pick import FOLLOWED, Neighbor
-from ..spot import Spot
+from ..surface_point import SurfacePoint
 from ..track import Known
 from . import Landmark
 from .landmark_set import LandmarkSet
@@ -37,20 +37,22 @@ def landmarks_of(
     frames = found.frames if found.is_framed or len(found) > 1 else np.array([frame])
     placed = found.known == Known.PLACED
     keyed = placed | (found.is_defined & ~placed.any(axis=0))
-    keys: list[list[Spot]] = [[] for _ in found.names]
+    keys: list[list[SurfacePoint]] = [[] for _ in found.names]
     for row, index in enumerate(frames.tolist()):
         if not (0 <= index < count and keyed[row].any()):
             continue
         checkpoint(row / len(frames))
         pose = pose_of(index)
         for number in np.flatnonzero(keyed[row]):
-            keys[number].append(spot_at(found.positions[row, number], pose, float(found.sigmas[row, number])))
+            keys[number].append(
+                surface_point_at(found.positions[row, number], pose, float(found.sigmas[row, number]))
+            )
     before = {landmark.name: landmark for landmark in known}
     partners = partners_of(found.names)
     landmarks = []
-    for name, spots, about in zip(found.names, keys, found.about, strict=True):
+    for name, points, about in zip(found.names, keys, found.about, strict=True):
         old = before.get(name, Landmark(name, partner=partners.get(name, "")))
-        landmarks.append(Landmark(name, tuple(spots), partner=old.partner, about=about or old.about))
+        landmarks.append(Landmark(name, tuple(points), partner=old.partner, about=about or old.about))
     return tuple(landmarks)
 
 
@@ -70,7 +72,7 @@ def told_beside(landmarks: Sequence[Landmark]) -> str | None:
     )
 
 
-def spot_at(position: NDArray[np.float64], pose: Pose, sigma: float = math.nan) -> Spot:
+def surface_point_at(position: NDArray[np.float64], pose: Pose, sigma: float = math.nan) -> SurfacePoint:
     """A place, (3,), on the surface of a pose, with the points that it follows; none where none is near.
 
     sigma: standard deviation of its coordinates; where it is not known, the place is as uncertain as the
@@ -95,7 +97,7 @@ def spot_at(position: NDArray[np.float64], pose: Pose, sigma: float = math.nan) 
         )
         id = neighbors[0].id
     variance = sigma**2
-    return Spot(
+    return SurfacePoint(
         frame=pose.index,
         time=float(pose.time),
         position=vector(position),

@@ -22,8 +22,8 @@ from ...files import open_plain, read_text
 from ...scan.pose import Pose
 from ...scan.units import Scale, conversion
 from ..landmarks import Landmark
-from ..landmarks.placed import spot_at
-from ..spot import Spot
+from ..landmarks.placed import surface_point_at
+from ..surface_point import SurfacePoint
 from ..track import STATES, Known, Track
 from ..words import SURE
 from . import Measure, Series
@@ -37,10 +37,10 @@ COLUMNS = (
     *(f"{name}_{number}" for number in (1, 2) for name in _OF_END),
 )  # fmt: skip
 
-Ends = tuple[tuple[Spot, ...], tuple[Spot, ...]]  # where each end was placed, by frame
+Ends = tuple[tuple[SurfacePoint, ...], tuple[SurfacePoint, ...]]  # where each end was placed, by frame
 
 
-def distance_of(one: Spot, other: Spot) -> tuple[float, float]:
+def distance_of(one: SurfacePoint, other: SurfacePoint) -> tuple[float, float]:
     """The distance between two places and its standard deviation, scan units; NaN where one is unknown."""
     measure = Measure("", "distance", ("1", "2"))
     series = series_of(measure, {"1": Track.of(one), "2": Track.of(other)})
@@ -116,7 +116,7 @@ def read_distances(
     the scan's frames. pose_of: gives one by its index. Raises InputError, with the line, for what cannot be
     used, and where no row is of the scan.
     """
-    found: dict[str, tuple[list[Spot], list[Spot]]] = {}
+    found: dict[str, tuple[list[SurfacePoint], list[SurfacePoint]]] = {}
     others = set()
     for where, row in _rows(path):
         if (name := text_of_cell(row["scan"])) != scan:
@@ -126,9 +126,9 @@ def read_distances(
         if factor is None:
             what = f"lengths are in '{row['unit']}', those of the scan in '{unit}'"
             raise InputError(what, where, "Set the scan's unit in the panel first")
-        for number, spots in enumerate(found.setdefault(text_of_cell(row["measure"]), ([], [])), 1):
+        for number, points in enumerate(found.setdefault(text_of_cell(row["measure"]), ([], [])), 1):
             if row[f"state_{number}"] == STATES[Known.PLACED]:
-                spots.append(_spot(row, number, where, factor, count, pose_of))
+                points.append(_surface_point(row, number, where, factor, count, pose_of))
     if others or not found:
         what = f"is of '{min(others)}', not of '{scan}'" if others else "holds no distances"
         raise InputError(what, path, "Open that scan first" if others else _HINT)
@@ -157,14 +157,14 @@ def _rows(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
         raise InputError(f"is no table: {error}", f"{path}, line {rows.line_num}", _HINT) from error
 
 
-def _spot(
+def _surface_point(
     row: Mapping[str, str],
     number: int,
     where: str,
     factor: float,
     count: int,
     pose_of: Callable[[int], Pose],
-) -> Spot:
+) -> SurfacePoint:
     """Read the key of an end, with the points that it follows. factor: from the row's unit to the scan's."""
 
     def read(column: str) -> float:
@@ -181,4 +181,4 @@ def _spot(
         raise InputError(f"'frame' is {frame:g}, and not from 1 to {count}", where, _HINT)
     position = np.array([read(f"{axis}_{number}") for axis in "xyz"]) * factor
     sure = abs(read(f"uncertainty_{number}")) * factor if row[f"uncertainty_{number}"] else math.nan
-    return spot_at(position, pose_of(int(frame) - 1), sure / SURE)
+    return surface_point_at(position, pose_of(int(frame) - 1), sure / SURE)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..landmarks import Landmark
-from ..spot import Spot
+from ..surface_point import SurfacePoint
 from ..track import Known, Track
 from .follower import Sighting
 
@@ -22,7 +22,7 @@ _ELSEWHERE = "it was set in a frame that the scan does not have"
 
 def track_of(
     landmark: Landmark,
-    seen: Mapping[tuple[Spot, int], Seen],
+    seen: Mapping[tuple[SurfacePoint, int], Seen],
     bound: float,
     so_far: Track,
     frames: Iterable[int],
@@ -63,9 +63,9 @@ def track_of(
 
 
 def _between(
-    before: Spot | None,
-    after: Spot | None,
-    seen: Mapping[tuple[Spot, int], Seen],
+    before: SurfacePoint | None,
+    after: SurfacePoint | None,
+    seen: Mapping[tuple[SurfacePoint, int], Seen],
     frame: int,
     bound: float,
 ) -> Sighting | None:
@@ -98,7 +98,7 @@ def _between(
     )
 
 
-def _held(seen: Sighting | None, at_end: Sighting | None, end: Spot, share: float) -> Sighting | None:
+def _held(seen: Sighting | None, at_end: Sighting | None, end: SurfacePoint, share: float) -> Sighting | None:
     """A sighting from one side, held at the spot on the other side, where that was reached."""
     if seen is None or seen.reason or at_end is None or at_end.reason:
         return seen

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..spot import Spot
+from ..surface_point import SurfacePoint
 from .body import DeformableBody, Grip
 from .hold import Hold
 from .pattern import FoundPattern, PointPattern, RecurringPoints
@@ -82,7 +82,9 @@ class Follower:
     (3,).
     """
 
-    def __init__(self, spot: Spot, surface: MomentSurface, origin: Float, settings: TrackingSettings) -> None:
+    def __init__(
+        self, spot: SurfacePoint, surface: MomentSurface, origin: Float, settings: TrackingSettings
+    ) -> None:
         self._settings, self.spacing = settings, surface.spacing
         self._origin = origin
         self._place = np.array(spot.position, np.float64) - origin

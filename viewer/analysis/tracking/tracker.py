@@ -17,7 +17,7 @@ from ...scan.pose import Pose
 from ...scan.timeline import Timeline
 from ...task import checkpoint
 from ..landmarks import Landmark
-from ..spot import Spot, followed
+from ..surface_point import SurfacePoint, followed
 from ..track import Track
 from .blending import track_of
 from .body import DeformableBody
@@ -55,7 +55,7 @@ class _Pass:
     end: the last frame that it has to reach; it may come farther, where it had to before.
     """
 
-    spot: Spot
+    spot: SurfacePoint
     direction: int
     end: int
     seen: dict[int, Sighting] = field(default_factory=dict)
@@ -109,7 +109,7 @@ class Tracker:
         self._origin: NDArray[np.float64] | None = old._origin if old else None
         self._spacing: float = old._spacing if old else 1.0
         self._moments: OrderedDict[int, _Moment] = old._moments if old else OrderedDict()
-        self._passes: dict[tuple[Spot, int], _Pass] = {}
+        self._passes: dict[tuple[SurfacePoint, int], _Pass] = {}
         self._bodies: dict[int, tuple[int, DeformableBody]] = {}  # by direction: in which frame, and which
         for landmark in self._landmarks:
             for part in _passes_of(landmark, len(timeline)):
@@ -337,7 +337,7 @@ class Tracker:
             | {frame for key in landmark.keys for _, part in self._of_key(key) for frame in part.seen}
         )
 
-    def _of_key(self, key: Spot) -> Iterator[tuple[tuple[Spot, int], _Pass]]:
+    def _of_key(self, key: SurfacePoint) -> Iterator[tuple[tuple[SurfacePoint, int], _Pass]]:
         for name in ((key, 1), (key, -1)):
             if name in self._passes:
                 yield name, self._passes[name]
@@ -384,7 +384,7 @@ def _passes_of(landmark: Landmark, count: int) -> Iterator[_Pass]:
             yield _Pass(after, -1, before.frame if before else 0)
 
 
-def _exact(spot: Spot, pose: Pose) -> Sighting:
+def _exact(spot: SurfacePoint, pose: Pose) -> Sighting:
     """A spot in a pose of the same topology."""
     there = followed(spot, pose)
     if there is None:

@@ -40,7 +40,7 @@ def read_all(path: Path) -> str:
     """The text of a file in UTF-8, or where it is none in Latin-1. Raises InputError for what is no text."""
     data = read_bytes(path)
     if b"\0" in data:
-        raise InputError("is no text")
+        raise InputError("is not text")
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ....analysis.landmarks import Landmark, Template
 from ....analysis.landmarks.mirroring import Proposal, proposal_for
 from ....analysis.pick import are_seen
-from ....analysis.spot import Spot, slack_before
+from ....analysis.surface_point import SurfacePoint, slack_before
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
@@ -216,12 +216,12 @@ class Tool:
         """Set one at what is seen, and go on to the next. name, merge: of the step of the history."""
         if click.picked is None:
             raise InputError("No surface here: click on the scan.")
-        spot = Spot.of(click.picked, click.pose, place=click.motion)
+        point = SurfacePoint.of(click.picked, click.pose, place=click.motion)
         if click.through_gap:
             self.context.note("No data there: placed on the nearest surface in front.")
         self.corrects = self.corrects and bool(landmark.keys)
         self.selected = landmark.name
-        self.context.change(name, self.made.with_landmark(landmark.with_key(spot)), merge=merge)
+        self.context.change(name, self.made.with_landmark(landmark.with_key(point)), merge=merge)
 
     def on_press(self, mouse: ImVec2) -> bool:
         """Take hold of the one under the mouse, where one is."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis.landmarks import Landmark
-from ....analysis.spot import Spot
+from ....analysis.surface_point import SurfacePoint
 from ....analysis.track import KNOWN_WORDS, Known, Track
 from ....analysis.words import SURE
 from ....geometry import vector
@@ -44,7 +44,7 @@ class ShownLandmarks:
         count, gap = len(landmarks), int(Known.GAP)
         positions, spreads = np.full((count, 3), np.nan), np.full((count, 3, 3), np.nan)
         known, spacings = np.zeros(count, np.uint8), np.zeros(count)
-        keyed: dict[int, Spot] = {}
+        keyed: dict[int, SurfacePoint] = {}
         tracked: dict[int, Track] = {}
         for number, landmark in enumerate(landmarks):
             if not landmark.keys:

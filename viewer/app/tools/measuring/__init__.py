@@ -15,7 +15,7 @@ from imgui_bundle import imgui
 
 from ....analysis.measures import Measure
 from ....analysis.measures.distances import Ends, distance_rows, is_distance_table, read_distances
-from ....analysis.spot import Spot
+from ....analysis.surface_point import SurfacePoint
 from ....analysis.track import KNOWN_WORDS, Known
 from ....analysis.words import measured_in_words
 from ....csv_text import save_rows, to_text
@@ -46,7 +46,7 @@ class DistanceRow(NamedTuple):
     value: float
     sigma: float
     state: str
-    ends: tuple[Spot, ...]
+    ends: tuple[SurfacePoint, ...]
 
     def words(self, scale: Scale) -> str:
         """The label and the distance, or why it is not known."""
@@ -68,7 +68,7 @@ class Tool:
         self.saving = SaveDialog("Export distances", about, ".csv", self._save, context.redraw)
         about = "A table that 'Export distances...' has written of this scan"
         self.reading = ReadDialog("Import distances", about, ".csv", self._read, context.redraw)
-        self.begun: Spot | None = None
+        self.begun: SurfacePoint | None = None
 
     @property
     def made(self) -> Landmarks:
@@ -122,14 +122,14 @@ class Tool:
         """Set an end at what was clicked; raises InputError where it cannot be."""
         if click.picked is None:
             raise InputError("No surface here: click on the scan.")
-        end = Spot.of(click.picked, click.pose, filled=self.filled, place=click.motion)
+        end = SurfacePoint.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
             self.context.note("No data there: placed on the nearest surface in front.")
         log.debug("end at %r, point %s, frame %d", end.position, end.id, end.frame)
         self.set_end(end)
         return True
 
-    def set_end(self, end: Spot) -> None:
+    def set_end(self, end: SurfacePoint) -> None:
         """Begin a distance, or complete the one that was begun.
 
         An end at the very place and frame of the first, as a second click of a double click sets it, changes
@@ -249,7 +249,7 @@ class Tool:
         self.context.note(f"Imported {len(new)} distances{there}.")
 
 
-def _places(ends: Sequence[Sequence[Spot]]) -> tuple[object, ...]:
+def _places(ends: Sequence[Sequence[SurfacePoint]]) -> tuple[object, ...]:
     """The frames and places of the ends, to a millionth of their distance: what tells it from others."""
     digits = 6 - math.floor(math.log10(math.dist(ends[0][0].position, ends[1][0].position) or 1))
     return tuple(

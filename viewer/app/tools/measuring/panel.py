@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
-from ....analysis.spot import Spot
+from ....analysis.surface_point import SurfacePoint
 from ....scan.times import frame_in_words
 from ....scan.units import Scale
 from ... import widgets
@@ -64,7 +64,7 @@ def _draw_row(tool: Tool, one: DistanceRow) -> bool:
     return is_deleted
 
 
-def snap_words(ends: Sequence[Spot]) -> str:
+def snap_words(ends: Sequence[SurfacePoint]) -> str:
     """The points that the ends are at, or the surface, such as "at points 12 and 345"."""
     ids = [end.id for end in ends if end.id is not None]
     if len(ids) == 2:
@@ -72,7 +72,7 @@ def snap_words(ends: Sequence[Spot]) -> str:
     return f"at point {ids[0]} and on the surface" if ids else "on the surface"
 
 
-def _end_words(end: Spot, scale: Scale) -> str:
+def _end_words(end: SurfacePoint, scale: Scale) -> str:
     """The key of an end, in full."""
     what = "surface" if end.id is None else f"at point {end.id}"
     place = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ....analysis.landmarks import Landmark
 from ....analysis.measures import Measure
-from ....analysis.spot import Spot
+from ....analysis.surface_point import SurfacePoint
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
@@ -69,13 +69,15 @@ class Lasso:
     def _add(self, places: NDArray[np.float64]) -> None:
         """Add a region: landmarks at its corners, its area and its outline."""
         made = self._context.document.part(Landmarks)
-        spots = [self._spot(place) for place in (places[corners_of(places)] if len(places) > 2 else ())]
-        found = [spot for spot in spots if spot is not None]
+        points = [
+            self._surface_point(place) for place in (places[corners_of(places)] if len(places) > 2 else ())
+        ]
+        found = [point for point in points if point is not None]
         if len(found) < 3:
             raise InputError("No surface inside that outline.")
         name = _free_name(made)
         names = tuple(f"{name}.{number}" for number in range(1, len(found) + 1))
-        landmarks = (Landmark(each).with_key(spot) for each, spot in zip(names, found, strict=True))
+        landmarks = (Landmark(each).with_key(point) for each, point in zip(names, found, strict=True))
         options = {"depth": "through"} if self.through else {}
         measures = (
             Measure(f"{name}, area", "area", names, options),
@@ -85,12 +87,12 @@ class Lasso:
         self._context.change("Add region", made)
         self.put_away()
 
-    def _spot(self, place: NDArray[np.float64]) -> Spot | None:
-        """The spot at a place that was drawn over; None where nothing was measured there."""
+    def _surface_point(self, place: NDArray[np.float64]) -> SurfacePoint | None:
+        """The point at a place that was drawn over; None where nothing was measured there."""
         click = self._context.seen_at(vector(place))
         if click is None or click.picked is None or not click.picked.measured:
             return None
-        return Spot.of(click.picked, click.pose, place=click.motion)
+        return SurfacePoint.of(click.picked, click.pose, place=click.motion)
 
     def draw(self, canvas: Canvas, view: ViewPlace) -> None:
         """Draw the outline as far as it goes."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ....analysis.measures import Measure, Series
 from ....analysis.measures.curves import power_of, unit_of
 from ....analysis.measures.series import lines_of
-from ....analysis.spot import slack_before
+from ....analysis.surface_point import slack_before
 from ....analysis.words import SURE, measured_in_words, with_note
 from ....document.landmarks import Landmarks
 from ....mesh.geodesic import length_of, steps_along

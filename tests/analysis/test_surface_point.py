@@ -15,7 +15,7 @@ from scenes import looking_down_z, plane, sphere
 
 from viewer.analysis.measures.distances import distance_of
 from viewer.analysis.pick import Neighbor, Picked, pick
-from viewer.analysis.spot import Spot, followed
+from viewer.analysis.surface_point import SurfacePoint, followed
 from viewer.analysis.words import SURE
 from viewer.camera import Camera
 from viewer.errors import InputError
@@ -33,17 +33,17 @@ def looking_from(eye: NDArray[np.float64], **fields: object) -> Camera:
     return Camera(**{**looking_down_z(**fields).to_json(), "eye": eye, "target": eye - np.array([0, 0, 1])})
 
 
-def clicked(surface: Surface, camera: Camera, point: NDArray[np.float64]) -> Spot:
+def clicked(surface: Surface, camera: Camera, point: NDArray[np.float64]) -> SurfacePoint:
     """The end that a click on the pixel of a point sets."""
     offsets = (point - surface.pose.cloud.origin)[None]
     x, y = surface.view.project(offsets)[0][0]
     picked = pick(surface, int(x), int(y))
     assert picked is not None
-    return Spot.of(picked, Pose(0, 0.0, "", surface.pose.cloud))
+    return SurfacePoint.of(picked, Pose(0, 0.0, "", surface.pose.cloud))
 
 
-def end(position: tuple[float, float, float], spacing: float | None = 0.1, **fields: object) -> Spot:
-    return Spot(**{"frame": 0, "time": 0.0, "position": position, "id": 0,
+def end(position: tuple[float, float, float], spacing: float | None = 0.1, **fields: object) -> SurfacePoint:
+    return SurfacePoint(**{"frame": 0, "time": 0.0, "position": position, "id": 0,
                   "spacing": spacing, "level": 0} | fields)  # fmt: skip
 
 
@@ -75,7 +75,7 @@ def test_an_end_has_the_spacing_around_its_point_and_the_frame_of_its_pose(draw:
     surface = draw(plane(100, depth=4.0), looking_down_z(), SIZE, "surfels")
     picked = pick(surface, 30, 20)
     assert picked is not None
-    made = Spot.of(picked, Pose(7, 0.28, "", surface.pose.cloud))
+    made = SurfacePoint.of(picked, Pose(7, 0.28, "", surface.pose.cloud))
     assert (made.frame, made.time, made.id) == (7, 0.28, picked.id)
     assert made.spacing == pytest.approx(0.05, rel=0.2)
 
@@ -99,7 +99,7 @@ def test_a_filled_place_between_points_of_one_surface_is_taken(draw: Draw, hole:
         picked = pick(surface, 58 + column, 58 + row)
         assert picked is not None
         try:
-            spot = Spot.of(picked, pose)
+            spot = SurfacePoint.of(picked, pose)
         except InputError:
             continue
         assert spot.uncertainty is not None
@@ -118,8 +118,8 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     picked, pose = pick(surface, x, y), Pose(0, 0.0, "", cloud)
     assert picked is not None
     with pytest.raises(InputError, match="filled by the renderer"):
-        Spot.of(picked, pose)
-    made = Spot.of(picked, pose, filled=True)
+        SurfacePoint.of(picked, pose)
+    made = SurfacePoint.of(picked, pose, filled=True)
     assert (made.id, made.level) == (None, 2)
     assert made.position == tuple(picked.position)
     nearest = np.linalg.norm(cloud.positions - picked.position, axis=1).min()
@@ -130,7 +130,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
 
 def test_on_a_measured_surface_without_a_point_the_spacing_counts() -> None:
     cloud = plane(40, depth=4.0)
-    made = Spot.of(Picked(np.array([0.01, 0.01, -4.0]), level=0), Pose(0, 0.0, "", cloud))
+    made = SurfacePoint.of(Picked(np.array([0.01, 0.01, -4.0]), level=0), Pose(0, 0.0, "", cloud))
     assert made.spacing == pytest.approx(0.05, rel=0.2)
 
 
@@ -151,7 +151,7 @@ def moved(index: int) -> Pose:
     return Pose(index, index / 25, "", PointCloud.from_arrays(points))
 
 
-def at_point(pose: Pose, id: int) -> Spot:
+def at_point(pose: Pose, id: int) -> SurfacePoint:
     return end(tuple(pose.cloud.world(id)), id=id, frame=pose.index, time=pose.time)
 
 

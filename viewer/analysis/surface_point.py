@@ -1,8 +1,8 @@
-"""Places on a surface that were picked: how sure they are, and how they follow their points through time.
+"""Surface points: picked positions, how sure they are, and how the points around carry them through time.
 
-A spot is the place that was picked, not the nearest point. Its uncertainty is a covariance: of what the
-points around leave open of the surface, of the pixel's size, and of what following the points adds. Where a
-scan has one topology (`PointCloud.topology`), a spot follows its points as a rigid body does.
+A surface point is the position that was picked, not the nearest point of the scan. Its uncertainty is a
+covariance: of what the points around leave open of the surface, of the pixel's size, and of what tracking
+adds. Where a scan has one topology (`PointCloud.topology`), a surface point moves with the points around it.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ _TURNING = 4  # points that tell how a place turns and how well they do
 
 
 @dataclass(frozen=True)
-class Spot:
-    """A place of the surface that was picked in a frame, such as an end of a distance.
+class SurfacePoint:
+    """A position on the surface that was picked in a frame, such as an end of a distance.
 
     frame: the pose's index. time: the pose's, seconds. position: float64, scan units. id: of the point that
     is seen there, or of the nearest one, None where none is. spacing: distance between the points around it,
@@ -49,8 +49,8 @@ class Spot:
     at_outline: bool = False
 
     @classmethod
-    def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> Spot:
-        """The spot at a place that was picked, with its spacing, in scan coordinates. place: the motion by
+    def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> SurfacePoint:
+        """The surface point that was picked, with its spacing, in scan coordinates. place: the motion by
         which the picture shows the pose.
 
         filled: whether a place may be taken that no point shows, also where it is not between points of one
@@ -68,25 +68,25 @@ class Spot:
         elif not neighbors:
             assert picked.id is not None
             neighbors = (Neighbor(picked.id, vector(picked.point - picked.position)),)
-        point, around = picked.id, [neighbor.id for neighbor in neighbors]
-        if point is not None and point not in around:  # the place is on another surface, or beside the point
-            point = around[0]
+        id, around = picked.id, [neighbor.id for neighbor in neighbors]
+        if id is not None and id not in around:  # the position is on another surface, or beside the point
+            id = around[0]
         covariance = picked.covariance
         if covariance is None and spacing is not None:
             beside = 0.0 if picked.point is None else float(np.linalg.norm(picked.point - picked.position))
             covariance = max(spacing, beside) ** 2 * np.eye(3)
-        spot = cls(
+        point = cls(
             frame=pose.index,
             time=float(pose.time),
             position=picked.place,
-            id=point,
+            id=id,
             spacing=spacing,
             level=picked.level,
             covariance=None if covariance is None else _six(covariance),
             neighbors=neighbors,
             at_outline=picked.at_outline,
         )
-        return _moved(spot, place.inverse)
+        return _moved(point, place.inverse)
 
     @property
     def spread(self) -> NDArray[np.float64] | None:
@@ -103,36 +103,36 @@ class Spot:
         return None if (spread := self.spread) is None else largest_deviation(spread)
 
 
-def followed(spot: Spot, pose: Pose) -> Spot | None:
-    """A spot where its points are in a pose of the same topology; None where the point that it was set at is
-    missing.
+def followed(point: SurfacePoint, pose: Pose) -> SurfacePoint | None:
+    """A surface point in a pose of the same topology, where the points around it are; None where its own
+    point is missing.
 
     To the covariance comes what following leaves open."""
-    if spot.id is None:
+    if point.id is None:
         return None
-    neighbors = spot.neighbors or (Neighbor(spot.id, (0.0, 0.0, 0.0)),)
+    neighbors = point.neighbors or (Neighbor(point.id, (0.0, 0.0, 0.0)),)
     rows = [pose.cloud.row_of(neighbor.id) for neighbor in neighbors]
-    if pose.cloud.row_of(spot.id) is None or all(row is None for row in rows):
+    if pose.cloud.row_of(point.id) is None or all(row is None for row in rows):
         return None
     there = [(row, neighbor) for row, neighbor in zip(rows, neighbors, strict=True) if row is not None]
     now = pose.cloud.world(np.array([row for row, _ in there]))
-    was = np.array(spot.position) + np.array([neighbor.offset for _, neighbor in there])
+    was = np.array(point.position) + np.array([neighbor.offset for _, neighbor in there])
     if np.abs(now - was).max() <= _SAME * np.abs(now).max():
-        return replace(spot, frame=pose.index, time=float(pose.time))
-    position, turned, error = _carried(np.array(spot.position), was, now)
-    spread = spot.spread
+        return replace(point, frame=pose.index, time=float(pose.time))
+    position, turned, error = _carried(np.array(point.position), was, now)
+    spread = point.spread
     if spread is not None:
         spread = turned @ spread @ turned.T + error**2 * np.eye(3)
     return replace(
-        spot,
+        point,
         frame=pose.index,
         time=float(pose.time),
         position=vector(position),
         covariance=None if spread is None else _six(spread),
-        neighbors=spot.neighbors
+        neighbors=point.neighbors
         and tuple(
-            Neighbor(neighbor.id, vector(point - position))
-            for (_, neighbor), point in zip(there, now, strict=True)
+            Neighbor(neighbor.id, vector(position_now - position))
+            for (_, neighbor), position_now in zip(there, now, strict=True)
         ),
     )
 
@@ -175,16 +175,16 @@ def _shares(position: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     return shares if shares @ shares <= 1 else usual  # else errors of points would grow
 
 
-def _moved(spot: Spot, motion: Rigid) -> Spot:
+def _moved(point: SurfacePoint, motion: Rigid) -> SurfacePoint:
     if motion.is_identity:
-        return spot
-    spread = spot.spread
+        return point
+    spread = point.spread
     return replace(
-        spot,
-        position=vector(motion.points(np.array(spot.position))),
+        point,
+        position=vector(motion.points(np.array(point.position))),
         covariance=None if spread is None else _six(motion.rotation @ spread @ motion.rotation.T),
         neighbors=tuple(
-            Neighbor(one.id, vector(motion.rotation @ np.array(one.offset))) for one in spot.neighbors
+            Neighbor(one.id, vector(motion.rotation @ np.array(one.offset))) for one in point.neighbors
         ),
     )
 
