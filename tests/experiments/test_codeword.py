@@ -19,7 +19,7 @@ def test_rows_become_tables(renderer: Renderer) -> None:
     times = list(words.measure_times(bench, ["torus"], 500, [SIZE]))
     pixels = list(words.measure_pixels(bench, ["torus"], 500, SIZE))
     built = list(words.measure_tables(bench))
-    assert [list(row["busy_ms"]) for row in times] == [[way.name for way in words.WAYS]]
+    assert [list(row["busy_ms"]) for row in times] == [[drawing.name for drawing in words.DRAWINGS]]
     assert min(times[0]["wall_ms"].values()) > 0
     assert [(row["projection"], row["quality"]) for row in pixels] == [
         (projection, quality)
@@ -28,7 +28,7 @@ def test_rows_become_tables(renderer: Renderer) -> None:
     ]
     run = codeword.EXPERIMENT.digest({"times": times, "pixels": pixels, "tables": built})
     made = codeword.EXPERIMENT.made([run])
-    assert all(f"| {way.name} |" in made["times"] for way in words.WAYS)
+    assert all(f"| {drawing.name} |" in made["times"] for drawing in words.DRAWINGS)
     assert "303\N{NARROW NO-BREAK SPACE}748" in made["tables"]
 
 

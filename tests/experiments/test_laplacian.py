@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from experiments.farooq_2013 import laplacian, splines
-from experiments.farooq_2013.splines import BEST, BY_LEVELS, LINEAR, WAYS, Drawn, Pair
+from experiments.farooq_2013.splines import BEST, BY_LEVELS, LINEAR, MERGINGS, Drawn, Pair
 from experiments.tables import Row, StoredRun
 from scenes import sphere_mesh
 from tables_of import cells
@@ -80,9 +80,9 @@ def test_one_view_alone_is_drawn_as_it_is(renderer: Renderer) -> None:
 
 def test_the_truth_of_a_small_picture_is_a_mean(renderer: Renderer) -> None:
     (camera,) = ball().cameras(1, ball().size)
-    told = splines.size_errors(renderer, ball(), camera, (LINEAR,))[LINEAR.name]
-    assert set(told) == set(splines.ZOOMS)
-    for errors in told.values():
+    found = splines.size_errors(renderer, ball(), camera, (LINEAR,))[LINEAR.name]
+    assert set(found) == set(splines.ZOOMS)
+    for errors in found.values():
         assert errors["psnr_scanned"] > 30
         assert errors["hole_scanned_percent"] < 0.5
 
@@ -101,7 +101,7 @@ def test_a_row_for_each_scene_and_way(renderer: Renderer, tmp_path: Path) -> Non
     bench = Bench(renderer, BenchSettings(size=(64, 48), views=1, repeat=1), tmp_path)
     bench.subject = lambda _: subject()  # type: ignore[assignment]
     rows = list(splines.measure_seams(bench, ["ball"], (64, 48)))
-    assert [row["way"] for row in rows] == [way.name for way in WAYS]
+    assert [row["merging"] for row in rows] == [merging.name for merging in MERGINGS]
     assert (tmp_path / splines.PICTURE).stat().st_size > 1000
     alone, sizes = (
         list(measure(bench, ["ball"], (64, 48))) for measure in (splines.measure_alone, splines.measure_sizes)
@@ -109,7 +109,7 @@ def test_a_row_for_each_scene_and_way(renderer: Renderer, tmp_path: Path) -> Non
     times = list(splines.measure_bands(bench, ["ball"], (64, 48), (64, 48)))
     assert len(alone) == len(BY_LEVELS)
     assert len(sizes) == (len(splines.SIZED) + 1) * len(splines.ZOOMS)
-    assert {(row["pods"], row["way"]) for row in times} >= {(1, SIX.name), (2, SIX.name)}
+    assert {(row["pods"], row["merging"]) for row in times} >= {(1, SIX.name), (2, SIX.name)}
     assert min(row["wall_ms"] for row in times) > 0
     made = laplacian.EXPERIMENT.made([digest(rows, alone, sizes, times)])
     assert all("| `ball` |" in made[table] for table in ("seams", "alone", "sizes"))
@@ -187,22 +187,27 @@ WHERE = {
 }  # fmt: skip
 
 
-def seam_row(way: str, seam: float, detail: float) -> dict[str, object]:
+def seam_row(merging: str, seam: float, detail: float) -> dict[str, object]:
     errors = {"seam": seam, **dict.fromkeys(("seam_1", "seam_2", "seam_4", "seam_8"), seam / 4)}
     view = {**errors, "detail": detail, "detail_alone": 40.0, "shown": 99.0}
-    return {"way": way, "by_view": [view, {**view, "seam": 3 * seam}], **WHERE}
+    return {"merging": merging, "by_view": [view, {**view, "seam": 3 * seam}], **WHERE}
 
 
 SEAM_ROWS = [seam_row("best", 4.0, 41.0), seam_row("linear", 2.0, 39.5), seam_row(SIX.name, 0.1, np.inf)]
 ALONE_ROWS = [
-    {"way": SIX.name, "by_view": [{"mean": 0.1, "worst": 3.0}, {"mean": 0.3, "worst": 2.0}], **WHERE}
+    {"merging": SIX.name, "by_view": [{"mean": 0.1, "worst": 3.0}, {"mean": 0.3, "worst": 2.0}], **WHERE}
 ]
 SIZE_ROWS = [
-    {"way": SIX.name, "zoom": zoom, "by_view": [{"psnr_scanned": psnr, "hole_scanned_percent": 0.0}], **WHERE}
+    {
+        "merging": SIX.name,
+        "zoom": zoom,
+        "by_view": [{"psnr_scanned": psnr, "hole_scanned_percent": 0.0}],
+        **WHERE,
+    }
     for zoom, psnr in zip(splines.ZOOMS, (41.0, 42.0, 43.0, 40.0), strict=True)
 ]
 PASSES = {"fill": 20.0, "view 1": 9.0, "view 1 level 2": 3.0}
-TIME_ROWS = [{"way": SIX.name, "pods": 2, "wall_ms": 500.0, "busy_ms": 900.0, "passes": PASSES, **WHERE}]
+TIME_ROWS = [{"merging": SIX.name, "pods": 2, "wall_ms": 500.0, "busy_ms": 900.0, "passes": PASSES, **WHERE}]
 
 
 def digest(*rows: Sequence[Row]) -> StoredRun:

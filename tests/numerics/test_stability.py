@@ -12,7 +12,7 @@ from scenes import DRAWS_POINTS, of_variant, variants
 from viewer.backends import Backend, Limit, backends
 from viewer.backends import backend as find_backend
 from viewer.backends.points import PointSquares
-from viewer.bench.numerics import EXACT, distinct_limits, rows, ways_of
+from viewer.bench.numerics import EXACT, distinct_limits, rows, swept_settings
 from viewer.bench.rounding import Rounding
 from viewer.bench.shots import RgbdImage, picture
 from viewer.bench.stability import Difference, Row, difference
@@ -40,7 +40,7 @@ def marks_of(backend: Backend, way: dict[str, Any]) -> list[pytest.MarkDecorator
 
 WAYS = [
     pytest.param(one, way, marks=marks_of(one, way), id=f"{one}-{next(iter(way.items()))}")
-    for one in map(find_backend, DRAWS_POINTS) for way in ways_of(one)
+    for one in map(find_backend, DRAWS_POINTS) for way in swept_settings(one)
 ]  # fmt: skip
 # Rows between two others that go further each way, or of which a farther one tells the same.
 BETWEEN = {
@@ -85,7 +85,7 @@ def test_other_pictures_stay_the_same(
 
 
 def test_the_ways_of_surfels_are_among_them() -> None:
-    ways = ways_of(backends()["surfels"])
+    ways = swept_settings(backends()["surfels"])
     drawn = [backends()["surfels"].params().passes, *(way["passes"] for way in ways if "passes" in way)]
     assert {"one", "two", "sorted"} <= set(drawn) | ({"two"} if "auto" in drawn else set())
 
@@ -102,7 +102,7 @@ def test_a_feed_brings_the_points_of_rows(renderer: Renderer, name: str) -> None
 
 
 def test_the_shapes_of_voxels_are_among_them() -> None:
-    shapes = {way["shape"] for way in ways_of(backends()["voxels"]) if "shape" in way}
+    shapes = {way["shape"] for way in swept_settings(backends()["voxels"]) if "shape" in way}
     assert shapes == {"cubes", "flat_cubes"}
 
 
@@ -126,7 +126,7 @@ def assert_allowed(renderer: Renderer, row: Row, backend: Backend, setting: dict
 def test_what_has_come_to_hold_is_no_limit(renderer: Renderer, row: Row, backend: Backend) -> None:
     """Each limit is one to some picture; else it would hide that the row holds, and goes."""
     drawn = [setting for name, setting in map(of_variant, variants()) if name == backend.name]
-    ways = [backend.params(way) for way in (*drawn, *ways_of(backend))]
+    ways = [backend.params(way) for way in (*drawn, *swept_settings(backend))]
     limited = [way for way in ways if row.limit_of(backend, way)]
     assert not all(row.compare(renderer, backend, way).held for way in limited)
 

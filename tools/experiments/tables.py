@@ -92,7 +92,7 @@ Rows = Callable[[Sequence[StoredRun]], Iterable[Row]]
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a page, in its place between `<!-- NAME -->` and `<!-- /NAME -->`.
+    """A table of a page, shown between `<!-- NAME -->` and `<!-- /NAME -->`.
 
     rows: the name of the rows of the first machine that it shows, or a function of all runs. columns: fixed,
     or a function of the rows. empty: what stands there without rows. merged: so many columns at the left are
@@ -180,8 +180,8 @@ def grouped(rows: Iterable[Row], *names: str) -> dict[tuple[Any, ...], list[Row]
 def markdown(head: Sequence[Column], cells: Sequence[Sequence[str]]) -> str:
     """A Markdown table of columns and the cells of its lines."""
     lefts = [
-        any(not _NUMBER.match(line[place]) for line in cells) if column.left is None else column.left
-        for place, column in enumerate(head)
+        any(not _NUMBER.match(line[number]) for line in cells) if column.left is None else column.left
+        for number, column in enumerate(head)
     ]
     rule = ["---" if left else "---:" for left in lefts]
     return "\n".join(f"| {' | '.join(row)} |" for row in ([column.title for column in head], rule, *cells))
@@ -190,7 +190,7 @@ def markdown(head: Sequence[Column], cells: Sequence[Sequence[str]]) -> str:
 def put_tables(text: str, tables: Mapping[str, str]) -> str:
     """A page with its tables: each replaces what stands between `<!-- NAME -->` and `<!-- /NAME -->`.
 
-    Raises ValueError where the page has no such place.
+    Raises ValueError where the page has no such comments.
     """
     for name, table in tables.items():
         start, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"

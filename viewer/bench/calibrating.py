@@ -66,9 +66,9 @@ class Truth:
     def error(self, surface: Surface) -> float:
         """How far off what a surface shows is, pixels: see docs/guide/automatic.md."""
         few, many = np.array(surface.size), np.array(surface.shown)
-        places = (2 * self.pixels + 1) * few // (2 * many)
-        aside = np.linalg.norm((places + 0.5) * many / few - (self.pixels + 0.5), axis=1)
-        drawn = surface.depth[places[:, 1], places[:, 0]].astype(np.float64)
+        nearest = (2 * self.pixels + 1) * few // (2 * many)
+        aside = np.linalg.norm((nearest + 0.5) * many / few - (self.pixels + 0.5), axis=1)
+        drawn = surface.depth[nearest[:, 1], nearest[:, 0]].astype(np.float64)
         is_drawn, is_there = np.isfinite(drawn), np.isfinite(self.depth)
         off = np.full(len(drawn), CAP)
         both = is_drawn & is_there
@@ -79,7 +79,7 @@ class Truth:
 
 
 def measure_ways(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row]:
-    """Yield a row for each view and each way of drawing it. scenes: names, or files of meshes; what cannot be
+    """Yield a row for each view and each configuration. scenes: names, or files of meshes; what cannot be
     had is noted and left out."""
     settings = bench.settings
     for scene in scenes:
@@ -119,7 +119,7 @@ def _frames(bench: Bench, subject: Subject) -> Iterator[tuple[Moment, Camera]]:
 
 
 def _measured(bench: Bench, moment: Moment, camera: Camera, size: tuple[int, int]) -> Iterator[Row]:
-    """The part of a row that each way of drawing a view has."""
+    """The part of a row that each configuration has."""
     renderer, pose = bench.renderer, moment.pose
     truth = Truth.of(moment.truth, camera, size, bench.settings.seed)
     seen = ScanInView.of(pose, view_of(Request(pose, camera), size))
@@ -140,17 +140,17 @@ def _measured(bench: Bench, moment: Moment, camera: Camera, size: tuple[int, int
 
 def measured_of(row: Row) -> Measured:
     """Picture that a row tells of, as models are fitted to it."""
-    seen = ScanInView(**row["seen"]).of_share(way(row).share)
+    seen = ScanInView(**row["seen"]).of_share(configuration_of(row).share)
     return Measured(seen, row["scale"], row["ms"], row["error"])
 
 
-def way(row: Row) -> DrawingWay:
-    """The way that a row is of."""
+def configuration_of(row: Row) -> DrawingWay:
+    """The configuration of a row."""
     return DrawingWay(row["backend"], row["values"], row["scale"])
 
 
 def laws_of(rows: Sequence[Row]) -> dict[str, Law]:
-    """A law for each way of drawing in rows, whatever its scale. Raises InputError where there is none."""
+    """A law for each configuration in rows, whatever its scale. Raises InputError where there is none."""
     if not rows:
         raise InputError("there are no pictures to learn from")
     by_key: dict[str, list[Any]] = {}

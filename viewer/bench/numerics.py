@@ -1,4 +1,4 @@
-"""Numerical stability: a scan given in another way must still give the same picture.
+"""Numerical stability: a scan in another form must still give the same picture.
 
 A row draws a shot and its variant with one backend, and says how far they may be apart.
 Where a backend cannot hold a row in principle, its module says so and what it holds instead:
@@ -38,17 +38,21 @@ def distinct_limits(backends: Iterable[Backend]) -> list[str]:
     return list(dict.fromkeys(limit.reason for limit in declared))
 
 
-def ways_of(backend: Backend) -> list[dict[str, Any]]:
+def swept_settings(backend: Backend) -> list[dict[str, Any]]:
     """Parameters that make other pictures than the defaults, one at a time: the words and switches that the
     declaration sweeps, and those that its limits speak of."""
-    told = [limit.when for row in backend.limits for limit in backend.limits_of(row)]
-    ways = []
+    conditions = [limit.when for row in backend.limits for limit in backend.limits_of(row)]
+    settings = []
     for parameter in backend.parameters:
         if parameter.affects != "speed" and parameter.type in (bool, str):
-            limited = [value for when in told for value in when.get(parameter.name, ())]
-            ways += [{parameter.name: value} for value in dict.fromkeys([*parameter.sweep, *limited])]
+            limited = [value for when in conditions for value in when.get(parameter.name, ())]
+            settings += [{parameter.name: value} for value in dict.fromkeys([*parameter.sweep, *limited])]
     defaults = backend.params()
-    return [way for way in ways if any(getattr(defaults, name) != value for name, value in way.items())]
+    return [
+        setting
+        for setting in settings
+        if any(getattr(defaults, name) != value for name, value in setting.items())
+    ]
 
 
 def rows() -> Iterator[Row]:
@@ -355,10 +359,10 @@ def _flipped() -> Iterator[Row]:
     def inside() -> PointView:
         return replace(_body(), camera=Camera((0, 0, 0), (0.6, 0, 0), fov_y=60))
 
-    for place, shot in (("around", _body), ("inside", inside)):
+    for where, shot in (("around", _body), ("inside", inside)):
         for power in (2, 4, 6, 8):
             yield Row(
-                f"a sphere of 10^{power} times the size, {place}",
+                f"a sphere of 10^{power} times the size, {where}",
                 shot,
                 partial(PointView.moved, scale=10.0 ** (-6 if power % 4 else 6)),
                 FLOAT32,

@@ -70,7 +70,9 @@ def plan(
     defaults = [Contender(FLOOR), Contender(CEILING)]
     defaults += [Contender(name, backend(name).params()) for name in backends]
     swept = [*defaults, *(contender for name in backends for contender in _sweeps(name))]
-    groups = [Group(scene, tuple(swept if place < limit else defaults)) for place, scene in enumerate(scenes)]
+    groups = [
+        Group(scene, tuple(swept if number < limit else defaults)) for number, scene in enumerate(scenes)
+    ]
     varied = min(limit, _SWEPT_SCENES)
     for scene, count in product(_varying(scenes, "n")[:varied], counts):
         if count != catalog.usual(scene, "n"):

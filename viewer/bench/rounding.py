@@ -13,7 +13,7 @@ class Rounding:
 
     quotient: units in the last place of a quotient or an inverse root; 0.5: as near as float32 comes.
     corner: pixels, along x and along y, by which the rasteriser moves the corners of what it draws. Depth and
-    all else is interpolated between corners so moved, so that within a triangle each place is moved by no
+    all else is interpolated between corners so moved, so that within a triangle each position is moved by no
     more: depth changes by the surface's slope times it, and a border lies as far beside.
     """
 

@@ -64,17 +64,17 @@ class PointView:
         """Points and camera turned about zero, scaled, then shifted, in float64."""
         rotation = np.asarray(turn)
 
-        def place(points: ArrayLike) -> NDArray[np.float64]:
+        def transformed(points: ArrayLike) -> NDArray[np.float64]:
             return scale * (np.asarray(points) @ rotation.T) + shift
 
         camera = replace(
             self.camera,
-            eye=tuple(place(self.camera.eye)),
-            target=tuple(place(self.camera.target)),
+            eye=tuple(transformed(self.camera.eye)),
+            target=tuple(transformed(self.camera.target)),
             up=tuple(rotation @ self.camera.up),
         )
         moved = self.given(
-            positions=place(self.arrays["positions"]),
+            positions=transformed(self.arrays["positions"]),
             normals=self.arrays["normals"] @ rotation.T,
             radii=self.arrays["radii"] * scale,
         )

@@ -95,7 +95,7 @@ class Outcome:
     """The result of a row.
 
     found: how far apart the pictures are. held: whether that is within the row's tolerance. limit: what
-    holds in place of it; None: the tolerance must hold. coarse: the share of the pixels that are coarse
+    holds instead of it; None: the tolerance must hold. coarse: the share of the pixels that are coarse
     steps apart, which a limit bounds.
     """
 
@@ -115,8 +115,8 @@ class Row:
     """One line of the suite: a shot, and a variant that must give its picture.
 
     summed: the tolerance where a rasteriser adds up what a pixel shows: of a backend that blends, fed as is
-    told. None: the same. setting: parameters of a backend, by name; the row is for those that have them all.
-    """
+    reported. None: the same. setting: parameters of a backend, by name; the row is for those that have them
+    all."""
 
     name: str
     shot: Callable[[], PointView]

@@ -23,7 +23,7 @@ def _means(row: Row) -> dict[str, float]:
 def _seams(runs: Sequence[StoredRun]) -> Iterator[Row]:
     """Visibility of seams by how views are merged, and how fine detail fares."""
     for rows in grouped(runs[0]["rows"], "scene").values():
-        total = {row["way"]: _means(row)["seam"] for row in rows}
+        total = {row["merging"]: _means(row)["seam"] for row in rows}
         for row in rows:
             means = _means(row)
             detail = means["detail"] - means["detail_alone"]
@@ -38,18 +38,18 @@ def _seams(runs: Sequence[StoredRun]) -> Iterator[Row]:
 
 def _sizes(runs: Sequence[StoredRun]) -> Iterator[Row]:
     """PSNR by pixels a sample."""
-    for (scene, way), rows in grouped(runs[0]["sizes"], "scene", "way").items():
+    for (scene, merging), rows in grouped(runs[0]["sizes"], "scene", "merging").items():
         found = {}
         for row in rows:
             by_name = {name: [view[name] for view in row["by_view"]] for name in row["by_view"][0]}
             found[f"{row['zoom']:g}"] = aggregate(by_name)["psnr_scanned"]
-        yield {"scene": scene, "way": way, **found, "range": float(np.ptp(list(found.values())))}
+        yield {"scene": scene, "merging": merging, **found, "range": float(np.ptp(list(found.values())))}
 
 
 def _passes(runs: Sequence[StoredRun]) -> Iterator[Row]:
     """Times of the passes of most levels, by level; those before the bands are of none."""
     for row in of_all("times")(runs):
-        if (row["pods"], row["way"]) != (2, BY_LEVELS[-1].name):
+        if (row["pods"], row["merging"]) != (2, BY_LEVELS[-1].name):
             continue
         parts: dict[str, dict[str, float]] = {}
         for name, ms in row["passes"].items():
@@ -59,16 +59,16 @@ def _passes(runs: Sequence[StoredRun]) -> Iterator[Row]:
             yield {"device": row["device"], "pass": stage, "at": by_level}
 
 
-_MERGED = Column("merged", "way", left=True)
+_MERGED = Column("merged", "merging", left=True)
 _MACHINE = Column("machine", "device")
 
 EXPERIMENT = Suite(
     page="laplacian.md",
     parts={
-        "rows": Part(("scene", "way", "by_view"), splines.measure_seams),
-        "alone": Part(("scene", "way", "by_view"), splines.measure_alone),
-        "sizes": Part(("scene", "way", "zoom", "by_view"), splines.measure_sizes),
-        "times": Part(("way", "pods", "wall_ms", "busy_ms", "passes"), splines.measure_bands),
+        "rows": Part(("scene", "merging", "by_view"), splines.measure_seams),
+        "alone": Part(("scene", "merging", "by_view"), splines.measure_alone),
+        "sizes": Part(("scene", "merging", "zoom", "by_view"), splines.measure_sizes),
+        "times": Part(("merging", "pods", "wall_ms", "busy_ms", "passes"), splines.measure_bands),
     },
     tables=[
         Table(
@@ -84,7 +84,7 @@ EXPERIMENT = Suite(
         Table(
             "alone",
             [
-                code("scene"), Column("drawn", "way", left=True),
+                code("scene"), Column("drawn", "merging", left=True),
                 Column("mean, steps of 255", lambda row: _means(row)["mean"]),
                 Column("largest", lambda row: max(view["worst"] for view in row["by_view"])),
             ],

@@ -56,26 +56,26 @@ _BLACK, _NOTHING = 1e-3, 205  # the darkest that has a gain; gray where nothing 
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way to merge views: a backend with what differs from its defaults."""
+class Merging:
+    """How views are merged: a backend with the parameters that differ from its defaults."""
 
     name: str
     backend: str
     params: Mapping[str, Any] = field(hash=False)
 
 
-BEST, LINEAR = Way("best", BLENDED, {"blend": "best"}), Way("linear", BLENDED, {"blend": "linear"})
-BY_LEVELS = tuple(Way(f"{count} levels", BACKEND, {"levels": count}) for count in LEVELS)
-CAPTURED = Way("6 levels of captures", BACKEND, {"levels": 6, "bands": "capture"})
-FINE = Way("6 levels, fine", BACKEND, {"levels": 6, "quality": "fine"})
-FRONT = "samples from the front"  # no way to merge: a pod in the camera's place
+BEST, LINEAR = Merging("best", BLENDED, {"blend": "best"}), Merging("linear", BLENDED, {"blend": "linear"})
+BY_LEVELS = tuple(Merging(f"{count} levels", BACKEND, {"levels": count}) for count in LEVELS)
+CAPTURED = Merging("6 levels of captures", BACKEND, {"levels": 6, "bands": "capture"})
+FINE = Merging("6 levels, fine", BACKEND, {"levels": 6, "quality": "fine"})
+FRONT = "samples from the front"  # not merged: a pod stands where the camera is
 VARIANTS = (
-    Way("6 levels of linear light", BACKEND, {"levels": 6, "light": "linear"}),
-    Way("6 levels, soft", BACKEND, {"levels": 6, "weights": "soft"}),
-    Way("6 levels, 3x3", BACKEND, {"levels": 6, "kernel": "3x3"}),
+    Merging("6 levels of linear light", BACKEND, {"levels": 6, "light": "linear"}),
+    Merging("6 levels, soft", BACKEND, {"levels": 6, "weights": "soft"}),
+    Merging("6 levels, 3x3", BACKEND, {"levels": 6, "kernel": "3x3"}),
     CAPTURED,
 )
-WAYS = (BEST, LINEAR, *BY_LEVELS, *VARIANTS)
+MERGINGS = (BEST, LINEAR, *BY_LEVELS, *VARIANTS)
 SIZED = (LINEAR, BY_LEVELS[-1], FINE, CAPTURED)
 TIMED = (BEST, LINEAR, *BY_LEVELS, FINE, CAPTURED)
 
@@ -116,18 +116,24 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """Picture of views, by a way. color: (H, W, 3), linear light. depth: (H, W), +inf where nothing is."""
+    """Picture of merged views. color: (H, W, 3), linear light. depth: (H, W), +inf where
+    nothing is."""
 
     color: NDArray[np.float64]
     depth: NDArray[np.float32]
 
     @classmethod
     def of(
-        cls, renderer: Renderer, views: Sequence[RangeView], camera: Camera, size: tuple[int, int], way: Way
+        cls,
+        renderer: Renderer,
+        views: Sequence[RangeView],
+        camera: Camera,
+        size: tuple[int, int],
+        merging: Merging,
     ) -> Drawn:
         """Draw them. size: (width, height), pixels."""
         surface = Surface(renderer.gpu, size)
-        draw(renderer, _request(views, camera, way), surface)
+        draw(renderer, _request(views, camera, merging), surface)
         drawn = cls(surface.color[..., :3].astype(np.float64), surface.depth)
         surface.release()
         return drawn
@@ -140,9 +146,9 @@ class Drawn:
         return shown
 
 
-def _request(views: Sequence[RangeView], camera: Camera, way: Way) -> Request:
+def _request(views: Sequence[RangeView], camera: Camera, merging: Merging) -> Request:
     pose = Pose.of(0, 0.0, "", tuple(views))
-    return Request(pose, camera, way.backend, backend(way.backend).params(way.params), _LOOK)
+    return Request(pose, camera, merging.backend, backend(merging.backend).params(merging.params), _LOOK)
 
 
 def _pairs(bench: Bench, scenes: Sequence[str], size: tuple[int, int]) -> Iterator[tuple[str, Pair]]:
@@ -167,21 +173,25 @@ def _inside(reference: Reference, mask: Mask, edge: int = _EDGE) -> Mask:
 def measure_seams(
     bench: Bench, scenes: Sequence[str] = SCENES, view_size: tuple[int, int] = VIEW_SIZE
 ) -> Iterator[Row]:
-    """Yield a row for each scene and way to merge, with the errors of each picture (`seam_errors`)."""
+    """Yield a row for each scene and each merging, with the errors of each picture (`seam_errors`)."""
     for scene, pair in _pairs(bench, scenes, view_size):
         cameras, size = pair.cameras(bench.settings.views, bench.settings.size), bench.settings.size
         found = [seam_errors(bench.renderer, pair, camera, size) for camera in cameras]
         if bench.folder and scene == scenes[0]:
             save_picture(seam_picture(bench.renderer, pair, cameras[0], size), bench.folder / PICTURE)
-        for way in WAYS:
-            by_view = [errors[way.name] for errors in found]
-            yield row_of(bench, scene=scene, way=way.name, by_view=by_view)
+        for merging in MERGINGS:
+            by_view = [errors[merging.name] for errors in found]
+            yield row_of(bench, scene=scene, merging=merging.name, by_view=by_view)
 
 
 def seam_errors(
-    renderer: Renderer, pair: Pair, camera: Camera, size: tuple[int, int], compared: Sequence[Way] = WAYS
+    renderer: Renderer,
+    pair: Pair,
+    camera: Camera,
+    size: tuple[int, int],
+    compared: Sequence[Merging] = MERGINGS,
 ) -> dict[str, dict[str, float]]:
-    """Errors of a picture, by the names of the ways.
+    """Errors of a picture, by the names of the mergings.
 
     Visibility of seams as `seam_visibility` has it. `detail`: PSNR of fine detail, dB, where both pods see
     the surface, of pods that are alike; `detail_alone`: of the better of them alone. `shown`: the percentage
@@ -194,10 +204,10 @@ def seam_errors(
         reference, np.logical_and.reduce([*(weights > 0), *(one.shows(reference) for one in alone)])
     )
     errors = {}
-    for way in compared:
-        alike, differing = _both_ways(renderer, pair, camera, size, way)
+    for merging in compared:
+        alike, differing = _both(renderer, pair, camera, size, merging)
         shown = alike.shows(reference) & differing.shows(reference)
-        errors[way.name] = {
+        errors[merging.name] = {
             **seam_visibility(differing.color, alike.color, shown, seams(weights)),
             "detail": _detail(alike, reference, both),
             "detail_alone": max(_detail(each, reference, both) for each in alone),
@@ -206,13 +216,13 @@ def seam_errors(
     return errors
 
 
-def _both_ways(
-    renderer: Renderer, pair: Pair, camera: Camera, size: tuple[int, int], way: Way
+def _both(
+    renderer: Renderer, pair: Pair, camera: Camera, size: tuple[int, int], merging: Merging
 ) -> tuple[Drawn, Drawn]:
     """The pictures of pods that are alike and of pods that differ."""
     return (
-        Drawn.of(renderer, pair.alike, camera, size, way),
-        Drawn.of(renderer, pair.differing, camera, size, way),
+        Drawn.of(renderer, pair.alike, camera, size, merging),
+        Drawn.of(renderer, pair.differing, camera, size, merging),
     )
 
 
@@ -226,13 +236,13 @@ def seam_picture(renderer: Renderer, pair: Pair, camera: Camera, size: tuple[int
     rows, columns = (np.flatnonzero(reference.covered.any(axis=axis)) for axis in (1, 0))
     box, (low, high) = (slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)), _GAINS
     panels: dict[str, Image] = {}
-    for way in (BEST, LINEAR, BY_LEVELS[0], BY_LEVELS[-1]):
-        alike, differing = _both_ways(renderer, pair, camera, size, way)
+    for merging in (BEST, LINEAR, BY_LEVELS[0], BY_LEVELS[-1]):
+        alike, differing = _both(renderer, pair, camera, size, merging)
         shown = (alike.shows(reference) & differing.shows(reference))[..., None]
         gain = differing.color.sum(axis=2) / np.maximum(alike.color.sum(axis=2), _BLACK)
         gray = np.repeat(255 * np.clip((gain - low) / (high - low), 0, 1)[..., None], 3, axis=2)
         both = [np.where(shown, each, _NOTHING)[box] for each in (bytes_from_linear(differing.color), gray)]
-        panels[f"{way.backend}, {way.name}"] = np.concatenate(both, axis=1).astype(np.uint8)
+        panels[f"{merging.backend}, {merging.name}"] = np.concatenate(both, axis=1).astype(np.uint8)
     return titled_row(panels)
 
 
@@ -244,20 +254,20 @@ def measure_alone(
 ) -> Iterator[Row]:
     """Yield a row for each scene and number of levels: how far a view alone is from its direct picture."""
     for scene, pair in _pairs(bench, scenes, view_size):
-        for way in BY_LEVELS:
-            by_view = list(alone_errors(bench.renderer, pair, bench.settings.size, way))
-            yield row_of(bench, scene=scene, way=way.name, by_view=by_view)
+        for merging in BY_LEVELS:
+            by_view = list(alone_errors(bench.renderer, pair, bench.settings.size, merging))
+            yield row_of(bench, scene=scene, merging=merging.name, by_view=by_view)
 
 
 def alone_errors(
-    renderer: Renderer, pair: Pair, size: tuple[int, int], way: Way
+    renderer: Renderer, pair: Pair, size: tuple[int, int], merging: Merging
 ) -> Iterator[dict[str, float]]:
     """Yield how far pictures of one view are from those that `pyramidal` draws, at a pixel a sample, from
     where the pod is and from aside: the mean and the largest difference away from edges, in 8-bit steps."""
     for pod, view in zip(pair.pods, pair.alike, strict=True):
         for camera in pod_viewpoints([view], 1.0, 2, size, up=pair.up):
             reference = trace(pair.moment.truth, camera, size)
-            direct, drawn = (Drawn.of(renderer, [view], camera, size, each) for each in (LINEAR, way))
+            direct, drawn = (Drawn.of(renderer, [view], camera, size, each) for each in (LINEAR, merging))
             seen = pods_facing(pair.moment.truth, reference, [pod])[0] > 0
             inside = _inside(reference, seen & direct.shows(reference))
             steps = [bytes_from_linear(each.color)[inside].astype(int) for each in (direct, drawn)]
@@ -271,19 +281,20 @@ def alone_errors(
 def measure_sizes(
     bench: Bench, scenes: Sequence[str] = SCENES, view_size: tuple[int, int] = VIEW_SIZE
 ) -> Iterator[Row]:
-    """Yield a row for each way and zoom, of the first scene: holes and PSNR of a picture (`size_errors`)."""
+    """Yield a row for each merging and zoom, of the first scene: holes and PSNR of a picture
+    (`size_errors`)."""
     for scene, pair in _pairs(bench, scenes[:1], view_size):
         found = [size_errors(bench.renderer, pair, camera) for camera in pair.cameras(1, pair.size)]
-        for way, zoom in product(found[0], ZOOMS):
-            by_view = [errors[way][zoom] for errors in found]
-            yield row_of(bench, scene=scene, way=way, zoom=zoom, by_view=by_view)
+        for merging, zoom in product(found[0], ZOOMS):
+            by_view = [errors[merging][zoom] for errors in found]
+            yield row_of(bench, scene=scene, merging=merging, zoom=zoom, by_view=by_view)
 
 
 def size_errors(
-    renderer: Renderer, pair: Pair, camera: Camera, compared: Sequence[Way] = SIZED, edge: int = _EDGE
+    renderer: Renderer, pair: Pair, camera: Camera, compared: Sequence[Merging] = SIZED, edge: int = _EDGE
 ) -> dict[str, dict[float, Errors]]:
-    """Holes and PSNR, dB, of pictures of several sizes, by the names of the ways and by zoom; and, for what
-    samples can tell at all, of samples that a pod in the camera's place would take, resized.
+    """Holes and PSNR, dB, of pictures of several sizes, by the names of the mergings and by zoom; and, for
+    what samples can tell at all, of samples that a pod where the camera is would take, resized.
 
     The truth is the mean of what the rays of a pixel see, in linear light, where the pods see all of it.
     edge: how many samples away from where they do not, and from steps of depth.
@@ -294,7 +305,7 @@ def size_errors(
     weights = pods_facing(pair.moment.truth, reference, pair.pods)
     seen = _inside(reference, weights.max(axis=0) > 0, density * edge)
     samples = trace(pair.moment.truth, camera, pair.size)
-    told: dict[str, dict[float, Errors]] = {}
+    found_by_zoom: dict[str, dict[float, Errors]] = {}
     for zoom in ZOOMS:
         rays = round(density / zoom)
         size = round(zoom * width), round(zoom * height)
@@ -303,11 +314,13 @@ def size_errors(
         def errors(shown: Mask, color: NDArray[np.floating]) -> Errors:
             return scanned(shown, bytes_from_linear(color), true, inside)  # noqa: B023
 
-        for way in compared:
-            drawn = Drawn.of(renderer, pair.alike, camera, size, way)
-            told.setdefault(way.name, {})[zoom] = errors(np.isfinite(drawn.depth), drawn.color)
-        told.setdefault(FRONT, {})[zoom] = errors(np.ones_like(inside), _resized(samples.color, zoom))
-    return told
+        for merging in compared:
+            drawn = Drawn.of(renderer, pair.alike, camera, size, merging)
+            found_by_zoom.setdefault(merging.name, {})[zoom] = errors(np.isfinite(drawn.depth), drawn.color)
+        found_by_zoom.setdefault(FRONT, {})[zoom] = errors(
+            np.ones_like(inside), _resized(samples.color, zoom)
+        )
+    return found_by_zoom
 
 
 def _resized(color: NDArray[np.floating], zoom: float) -> NDArray[np.float64]:
@@ -336,15 +349,16 @@ def measure_bands(
     view_size: tuple[int, int] = _LARGE,
     size: tuple[int, int] = _LARGE_PICTURE,
 ) -> Iterator[Row]:
-    """Yield a row for each way and one or two views of the first scene: what a picture takes, ms, the median.
+    """Yield a row for each merging and one or two views of the first scene: what a picture takes, ms, the
+    median.
 
     Wall and processor time of a picture, and each pass as the GPU's timers have it.
     """
     for scene, pair in _pairs(bench, scenes[:1], view_size):
         (camera,) = pair.cameras(1, size)
-        for count, way in product((1, 2), TIMED):
-            taken = _taken(bench, _request(pair.alike[:count], camera, way), size)
-            yield row_of(bench, scene=scene, way=way.name, pods=count, **taken)
+        for count, merging in product((1, 2), TIMED):
+            taken = _taken(bench, _request(pair.alike[:count], camera, merging), size)
+            yield row_of(bench, scene=scene, merging=merging.name, pods=count, **taken)
 
 
 def _taken(bench: Bench, request: Request, size: tuple[int, int]) -> Row:

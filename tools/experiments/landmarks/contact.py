@@ -17,12 +17,12 @@ _FAST = 1.0  # spacings a frame that the parts move against each other
 def near_contact(
     meshes: Sequence[Mesh], paths: NDArray[np.float64], vertices: NDArray[np.integer], spacing: float
 ) -> NDArray[np.bool_]:
-    """Tell in which frames places are near fast contact of the surface with itself, (T, N).
+    """Tell in which frames positions are near fast contact of the surface with itself, (T, N).
 
-    They are where a vertex moves against the place by more than a spacing to the frame before or after, is
+    They are where a vertex moves against the position by more than a spacing to the frame before or after, is
     nearer to it than it moves so or than 4 spacings, and more than four times as far along the edges of the
-    first mesh: then it may be taken for the place. meshes: T of the same faces. paths: (T, N, 3) of the
-    places; vertices: (N,), one beside each.
+    first mesh: then it may be taken for the position. meshes: T of the same faces. paths: (T, N, 3) of the
+    positions; vertices: (N,), one beside each.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import dijkstra
@@ -39,14 +39,14 @@ def near_contact(
     steps = np.diff(points, axis=0)
     own_steps = np.diff(paths, axis=0)
     touching = np.zeros(paths.shape[:2], bool)
-    for frame, place in np.ndindex(*touching.shape):
+    for frame, number in np.ndindex(*touching.shape):
         moves = [
-            np.linalg.norm(steps[step] - own_steps[step, place], axis=1)
+            np.linalg.norm(steps[step] - own_steps[step, number], axis=1)
             for step in (frame - 1, frame)
             if 0 <= step < len(steps)
         ]
         fast = np.max(moves, axis=0) > _FAST * spacing
         reach = np.maximum(np.max(moves, axis=0), _NEAR * spacing)
-        near = np.linalg.norm(points[frame] - paths[frame, place], axis=1) < reach
-        touching[frame, place] = (fast & near & (along[place] > _ALONG * reach)).any()
+        near = np.linalg.norm(points[frame] - paths[frame, number], axis=1) < reach
+        touching[frame, number] = (fast & near & (along[number] > _ALONG * reach)).any()
     return touching

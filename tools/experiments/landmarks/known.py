@@ -31,8 +31,8 @@ SCANNED = (560, 420)  # pixels of a pod: some 95 000 points a frame of two
 _FRAMED = 5  # frames that the pods are placed for
 _STEEPEST = 80.0  # degrees of incidence that a pod measures
 _GRAIN = 0.02  # standard deviation of a pod's colours, of their values
-_AT_SURFACE = 0.1  # mm that a place may lie behind the mesh of the exact surface
-_ABSENT = 2.0  # spacings to the nearest point, from which on a place that no pod sees is hidden
+_AT_SURFACE = 0.1  # mm that a position may lie behind the mesh of the exact surface
+_ABSENT = 2.0  # spacings to the nearest point, from which on a position that no pod sees is hidden
 
 
 class KeptFrames:
@@ -72,7 +72,7 @@ class KnownScan:
 
     names: of the landmarks. paths: (T, N, 3), where they are. hidden: (T, N), whether the scan lacks the
     surface there. counted: (T, N), whether it has it, so that a tracker can be held to it; where neither, the
-    place is at the edge of what the scan has, or parts of the surface touch. spacing: of its points.
+    position is at the edge of what the scan has, or parts of the surface touch. spacing: of its points.
     """
 
     name: str
@@ -89,9 +89,9 @@ def scanned_demo(
 ) -> list[KnownScan]:
     """The demo or a variant, by its name, as `scan4d simulate` scans it, once for each noise.
 
-    Its places are `PLACES`. noises: standard deviations of depth, mm. frames: those that are scanned; None:
-    all. Steeper than 80 degrees nothing is measured. A place is hidden where no pod's ray reaches it and no
-    point is within two spacings; those that no frame has are left out. Colours have a grain of 2 %.
+    Its positions are `PLACES`. noises: standard deviations of depth, mm. frames: those that are scanned;
+    None: all. Steeper than 80 degrees nothing is measured. A position is hidden where no pod's ray reaches it
+    and no point is within two spacings; those that no frame has are left out. Colours have a grain of 2 %.
     """
     demo = DemoSource(scan)
     chosen = list(range(len(demo)) if frames is None else frames)
@@ -108,11 +108,11 @@ def scanned_demo(
         checkpoint(row / len(chosen))
         mesh = head_mesh(float(time), demo.motion)
         pictures = [trace(mesh, camera, SCANNED) for camera in cameras]
-        for kept, those in zip(clouds, faults, strict=True):
+        for frames_of, those in zip(clouds, faults, strict=True):
             cloud = merge(measured(pictures, cameras, those, seed=seed, frame=index))
-            kept.append(with_grain(cloud, np.random.default_rng([seed, index, pods])))
+            frames_of.append(with_grain(cloud, np.random.default_rng([seed, index, pods])))
         seen[row] = _seen(mesh, paths[row], cameras)
-    return [_had(scan, kept, times, paths, seen) for kept in clouds]
+    return [_had(scan, frames_of, times, paths, seen) for frames_of in clouds]
 
 
 def with_grain(cloud: PointCloud, chance: np.random.Generator) -> PointCloud:
@@ -131,7 +131,8 @@ def _had(
     paths: NDArray[np.float64],
     seen: NDArray[np.bool_],
 ) -> KnownScan:
-    """A scan of the places that it has in any frame. paths: (T, N, 3) of `PLACES`; seen: (T, N), by a ray."""
+    """A scan of the positions that it has in any frame. paths: (T, N, 3) of `PLACES`; seen: (T, N), by a
+    ray."""
     spacing = typical_spacing(clouds[0])
     absent = _farther(clouds, paths, _ABSENT * spacing)
     hidden, counted = ~seen & absent, seen & ~absent
@@ -139,7 +140,7 @@ def _had(
     return KnownScan(
         name=name,
         source=KeptFrames(name, clouds, times),
-        names=tuple(PLACES[place] for place in had),
+        names=tuple(PLACES[number] for number in had),
         paths=paths[:, had],
         hidden=hidden[:, had],
         counted=counted[:, had],
@@ -167,7 +168,7 @@ def resampled_mesh(
 ) -> KnownScan:
     """A sequence of meshes with the same faces, sampled anew, as many points as it has vertices.
 
-    Its landmarks are places on faces, far from each other. Not counted is what `near_contact` finds.
+    Its landmarks are positions on faces, far from each other. Not counted is what `near_contact` finds.
     """
     anew = ResampledMesh(source, None, noise, seed)
     meshes, clouds = [], []
@@ -215,17 +216,19 @@ def _all_there(
     return KnownScan(source.name, source, names, paths, ~there, there, spacing)
 
 
-def _seen(mesh: Mesh, places: NDArray[np.float64], cameras: Sequence[Camera]) -> NDArray[np.bool_]:
-    """Whether the ray of any of the pods reaches places (N, 3), (N,)."""
-    local = places - mesh.origin
+def _seen(mesh: Mesh, positions: NDArray[np.float64], cameras: Sequence[Camera]) -> NDArray[np.bool_]:
+    """Whether the ray of any of the pods reaches positions (N, 3), (N,)."""
+    local = positions - mesh.origin
     return np.any([visible(mesh, local, camera, _AT_SURFACE) for camera in cameras], axis=0)
 
 
 def _farther(clouds: Sequence[PointCloud], paths: NDArray[np.float64], reach: float) -> NDArray[np.bool_]:
-    """Whether no point is within reach of places (T, N, 3), (T, N)."""
+    """Whether no point is within reach of positions (T, N, 3), (T, N)."""
     from scipy.spatial import cKDTree
 
-    nearest = [cKDTree(cloud.world()).query(places)[0] for cloud, places in zip(clouds, paths, strict=True)]
+    nearest = [
+        cKDTree(cloud.world()).query(positions)[0] for cloud, positions in zip(clouds, paths, strict=True)
+    ]
     return np.array(nearest) > reach
 
 

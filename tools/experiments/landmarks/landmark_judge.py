@@ -18,7 +18,7 @@ from viewer.geometry import vector
 from viewer.scan.spacing import nearest_row
 from viewer.scan.timeline import Timeline
 
-_WRONG = 3.0  # spacings: an error from which on a place is that of another part of the surface
+_WRONG = 3.0  # spacings: an error from which on a position is that of another part of the surface
 _EXACT = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # covariance of a key: it is the truth
 
 
@@ -27,7 +27,7 @@ class Judgement:
     """Figures of a tracked scan.
 
     frames, landmarks: how many. spacing: of the points, scan units. median, p95, worst: errors, scan units,
-    in frames that are told as tracked where the truth is in the scan. within: share of these errors that are
+    in frames that count as tracked where the truth is in the scan. within: share of these errors that are
     at most two standard deviations (`Track.sigmas`). wrong: share of them above three spacings. hidden: in
     how many frames landmarks are, all counted together. gaps_hit: the share of them that are gaps, NaN
     without any. gaps_false: the share of gaps where the truth is in the scan. seconds: of processor time, a
@@ -58,11 +58,11 @@ def keyed_landmarks(known: KnownScan, keys: int = 1) -> list[Landmark]:
     for number, name in enumerate(known.names):
         landmark, there = Landmark(name), np.flatnonzero(known.counted[:, number])
         for frame in dict.fromkeys(there[np.linspace(0, len(there) - 1, keys).astype(int)].tolist()):
-            place = known.paths[frame, number]
-            row, _ = nearest_row(known.source.load(frame), place)
+            position = known.paths[frame, number]
+            row, _ = nearest_row(known.source.load(frame), position)
             time = float(known.source.times()[frame])
-            spot = SurfacePoint(frame, time, vector(place), row, known.spacing, 0, _EXACT)
-            landmark = landmark.with_key(spot)
+            point = SurfacePoint(frame, time, vector(position), row, known.spacing, 0, _EXACT)
+            landmark = landmark.with_key(point)
         landmarks.append(landmark)
     return landmarks
 
@@ -77,8 +77,8 @@ def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float =
     states = np.stack([tracks[name].known for name in known.names], axis=1)
     positions = np.stack([tracks[name].positions for name in known.names], axis=1)
     sigmas = np.stack([tracks[name].sigmas for name in known.names], axis=1)
-    told = (states == Known.TRACKED) & known.counted
-    errors = np.linalg.norm(positions - known.paths, axis=2)[told]
+    tracked = (states == Known.TRACKED) & known.counted
+    errors = np.linalg.norm(positions - known.paths, axis=2)[tracked]
     gaps = states == Known.GAP
     asked = known.counted & (states != Known.PLACED)
 
@@ -94,7 +94,7 @@ def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float =
         median=float(median),
         p95=float(p95),
         worst=float(worst),
-        within=share(errors <= 2 * sigmas[told]),
+        within=share(errors <= 2 * sigmas[tracked]),
         wrong=share(errors > _WRONG * known.spacing),
         hidden=int(known.hidden.sum()),
         gaps_hit=share(gaps[known.hidden]),

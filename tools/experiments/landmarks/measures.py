@@ -65,7 +65,7 @@ SHAPES: dict[str, tuple[Shape, tuple[float, float]]] = {
     "saddle, 1 / 60": (saddle, (5.0, 3.0)),
 }
 STEP = 1e-4
-# Errors are told in mm, degrees, percent, and as heights over the region.
+# Errors are in mm, degrees, percent, and as heights over the region.
 FACTORS: dict[str, Callable[[dict[str, float]], float]] = {
     "distance": lambda true: 1.0,
     "angle": lambda true: 1.0,
@@ -76,7 +76,7 @@ FACTORS: dict[str, Callable[[dict[str, float]], float]] = {
 
 
 def tangents(shape: Shape, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The changes of place with both coordinates."""
+    """The changes of position with both coordinates."""
     right = (shape(u + STEP, v) - shape(u - STEP, v)) / (2 * STEP)
     up = (shape(u, v + STEP) - shape(u, v - STEP)) / (2 * STEP)
     return right, up
@@ -96,11 +96,14 @@ def sample(
     right, up = tangents(shape, u, v)
     normals = np.cross(right, up)
     area = np.linalg.norm(normals, axis=1)
-    box = 4 * reach.prod() * area.max() / len(u)  # of the shape that each place of the coordinates stands for
-    kept = rng.random(len(u)) < area / area.max() * box / spacing**2
-    assert box / spacing**2 < 1, "too few places"
+    box = (
+        4 * reach.prod() * area.max() / len(u)
+    )  # of the shape that each sample of the coordinates stands for
+    chosen = rng.random(len(u)) < area / area.max() * box / spacing**2
+    assert box / spacing**2 < 1, "too few samples"
     points = (
-        shape(u, v)[kept] + noise * rng.standard_normal((kept.sum(), 1)) * (normals / area[:, None])[kept]
+        shape(u, v)[chosen]
+        + noise * rng.standard_normal((chosen.sum(), 1)) * (normals / area[:, None])[chosen]
     )
     return points[np.linalg.norm(points - shape(*middle), axis=1) < REACH]
 
@@ -111,29 +114,29 @@ def true_path(shape: Shape, start: np.ndarray, end: np.ndarray, count: int = 64)
     scale = np.maximum(np.abs(end - start), 1e-3)
 
     def pieces(free: np.ndarray) -> np.ndarray:
-        places = straight.copy()
-        places[1:-1] = free.reshape(-1, 2) * scale
-        return np.diff(shape(*places.T), axis=0).ravel()
+        positions = straight.copy()
+        positions[1:-1] = free.reshape(-1, 2) * scale
+        return np.diff(shape(*positions.T), axis=0).ravel()
 
     found = least_squares(pieces, (straight[1:-1] / scale).ravel(), xtol=1e-14, ftol=1e-14)
     return np.concatenate([[start], found.x.reshape(-1, 2) * scale, [end]])
 
 
-def true_length(shape: Shape, places: np.ndarray) -> float:
+def true_length(shape: Shape, positions: np.ndarray) -> float:
     """The length of the path, of finer pieces."""
-    fine = np.linspace(0, len(places) - 1, 20 * len(places))
-    whole = np.stack([np.interp(fine, np.arange(len(places)), axis) for axis in places.T])
+    fine = np.linspace(0, len(positions) - 1, 20 * len(positions))
+    whole = np.stack([np.interp(fine, np.arange(len(positions)), axis) for axis in positions.T])
     return float(np.linalg.norm(np.diff(shape(*whole), axis=0), axis=1).sum())
 
 
 def within(shape: Shape, outline: np.ndarray, value: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> float:
-    """The integral of what each place has an area of, over what lies in an outline (P, 2)."""
+    """The integral of a value of each position, over what lies in an outline (P, 2)."""
     knots, weights = np.polynomial.legendre.leggauss(12)
     fine = np.linspace(0, 1, 9)[:-1, None]
     ends = np.roll(outline, -1, axis=0)
-    places = (outline[:, None] + fine * (ends - outline)[:, None]).reshape(-1, 2)
-    steps = np.roll(places, -1, axis=0) - places
-    middles, low = places + steps / 2, outline[:, 1].min()
+    positions = (outline[:, None] + fine * (ends - outline)[:, None]).reshape(-1, 2)
+    steps = np.roll(positions, -1, axis=0) - positions
+    middles, low = positions + steps / 2, outline[:, 1].min()
     half = (middles[:, 1] - low) / 2
     v = low + half[:, None] * (1 + knots)
     u = np.broadcast_to(middles[:, :1], v.shape)
@@ -193,10 +196,10 @@ def errors(options: Namespace) -> Iterator[Row]:
             true = truths(shape, corners)
             points = sample(shape, np.array(middle), spacing, noise, rng)
             surface = PoseSurface(Pose.of(0, 0.0, "shape", PointCloud.from_arrays(points)))
-            places = np.array([surface.nearest(place) for place in shape(*corners.T)], float)
+            positions = np.array([surface.nearest(position) for position in shape(*corners.T)], float)
             off.append([])
             for kind, expected in true.items():
-                few = places[:2] if kind in ("distance", "path") else places
+                few = positions[:2] if kind in ("distance", "path") else positions
                 error = values_of(kind, surface, few) - expected
                 off[-1].append(error / FACTORS[kind](true))
         usual = np.sqrt((np.array(off) ** 2).mean(axis=0))
@@ -206,12 +209,12 @@ def errors(options: Namespace) -> Iterator[Row]:
         yield {**named, **dict(zip(titles, cells, strict=True))}
 
 
-def values_of(kind: str, surface: PoseSurface, places: np.ndarray) -> float:
-    """The value of a kind at places."""
-    found = kind_of(Measure("m", kind, tuple("abc"[: len(places)])))
+def values_of(kind: str, surface: PoseSurface, positions: np.ndarray) -> float:
+    """The value of a kind at positions."""
+    found = kind_of(Measure("m", kind, tuple("abc"[: len(positions)])))
     if found.needs_surface:
-        return float(found.compute(surface, places, {}).value)  # type: ignore
-    return float(found.compute(places[None], {})[0])  # type: ignore
+        return float(found.compute(surface, positions, {}).value)  # type: ignore
+    return float(found.compute(positions[None], {})[0])  # type: ignore
 
 
 class OneFrame:
@@ -263,9 +266,9 @@ def coverage(options: Namespace) -> Iterator[Row]:
             for name, corner in zip("abc", corners, strict=True):
                 right, up = tangents(shape, *corner)
                 axes = np.linalg.qr(np.stack([right, up], axis=1))[0]
-                place = shape(*corner) + OFF * axes @ rng.standard_normal(2)
+                position = shape(*corner) + OFF * axes @ rng.standard_normal(2)
                 known = np.array([Known.PLACED], np.uint8)
-                tracks[name] = Track(np.zeros(1), place[None], OFF**2 * (axes @ axes.T)[None], known, {})
+                tracks[name] = Track(np.zeros(1), position[None], OFF**2 * (axes @ axes.T)[None], known, {})
             points = sample(shape, np.array(middle), SPACINGS[1], NOISES[1], rng)
             with Timeline(OneFrame(points), np.zeros(1), "mm") as timeline:
                 found = all_series(measures, tracks, timeline)

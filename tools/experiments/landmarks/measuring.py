@@ -1,7 +1,7 @@
 """Distances between pixels chosen by chance, against what is truly there: how often ± holds the truth.
 
-Pixels are picked as a click would. What was meant is somewhere in the pixel: a place in it is chosen by
-chance too, and the truth is what a ray through that place meets.
+Pixels are picked as a click would. What was meant is somewhere in the pixel: a random position in it is
+chosen, and the truth is what a ray through this position meets.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ DRAWN: dict[str, dict[str, Any]] = {
     "points": {"point_size": 0}, "surfels": {}, "voxels": {}, "auto_splats": {},
 }  # fmt: skip
 PAIRS = 400  # of each scene, renderer and zoom: of 95 % come out 92.9 to 97.1, in 95 % of cases
-_SMALL = (80, 60)  # pixels of the picture in which a place to look at is chosen
+_SMALL = (80, 60)  # pixels of the picture in which a position to look at is chosen
 _ELEVATIONS = (-30.0, 50.0)  # degrees
 
 
@@ -89,8 +89,8 @@ def measure_distances(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[
 def zoomed(
     scene: Scene, zoom: float, count: int, size: tuple[int, int], up: str = "+y", seed: int = 0
 ) -> list[Camera]:
-    """Cameras from directions by chance, each at a place that is seen, through a lens that shows so much less
-    than the whole. size: (width, height), pixels."""
+    """Cameras from directions by chance, each at a position that is seen, through a lens that shows so much
+    less than the whole. size: (width, height), pixels."""
     rng = np.random.default_rng(seed)
     cameras = []
     for _ in range(count):
@@ -120,7 +120,7 @@ def measured_in(
     pairs: int = PAIRS,
 ) -> Distances:
     """Distances between pairs of pixels that show a point, in pictures of a scan by a backend. values: its
-    parameters. pairs: of all pictures together. A pair of which one place meets nothing is left out."""
+    parameters. pairs: of all pictures together. A pair of which one ray meets nothing is left out."""
     drawn_by, surface, pose = backend(name), Surface(renderer.gpu, size), moment.pose
     params, off, uncertainty, pitches = drawn_by.params(values), [], [], []
     for number, camera in enumerate(cameras):

@@ -34,7 +34,7 @@ CLOSE = 11.0  # mm around the path of the landmark that moves most
 
 
 def picture(_: Namespace) -> Iterator[Row]:
-    """Track, draw the frame of the widest smile from two places, and draw paths and truth over it."""
+    """Track, draw the frame of the widest smile from two sides, and draw paths and truth over it."""
     (known,) = scanned_demo(SCAN, [NOISE])
     with Timeline(known.source, known.source.times(), "mm") as timeline:
         tracks = track_landmarks(timeline, keyed_landmarks(known))

@@ -1,4 +1,4 @@
-"""Sequences whose frames are sampled anew, each at other places of the subject: no two share a point."""
+"""Sequences whose frames are sampled anew, each at other positions on the subject: no two share a point."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class _Anew:
 class ResampledDemo(_Anew):
     """The demo or a variant of it by its name, about 78 000 points a frame, with colours and without normals.
 
-    Each frame has places of its own on the exact surface, and a grain of 1 % in their colours. behind: mm;
+    Each frame has positions of its own on the exact surface, and a grain of 1 % in their colours. behind: mm;
     what is farther back at rest is left out, which saves time; half of the points are before 30. count: of
     the points before anything is left out, None: 78 000. frames: how many, as the motion repeats; None: of
     one period.
@@ -107,11 +107,11 @@ class ResampledDemo(_Anew):
         parts = [
             _strewn(solid, chosen[rows], chance) for solid, rows in ((head.skin, skin), (head.eyes, ~skin))
         ]
-        places, normals = (np.concatenate(rows, axis=1) for rows in zip(*parts, strict=True))
+        rest_positions, normals = (np.concatenate(rows, axis=1) for rows in zip(*parts, strict=True))
         count = int(skin.sum())
-        albedo = colors.albedo(places, normals, count)
-        moved, turned, _ = move(places[:, :count], normals[:, :count], time, motion)
-        eyes, eye_normals = turn(places[:, count:], normals[:, count:], time, motion)
+        albedo = colors.albedo(rest_positions, normals, count)
+        moved, turned, _ = move(rest_positions[:, :count], normals[:, :count], time, motion)
+        eyes, eye_normals = turn(rest_positions[:, count:], normals[:, count:], time, motion)
         positions = np.concatenate([moved, eyes], axis=1).T
         positions = positions + self._off(np.concatenate([turned, eye_normals], axis=1).T, chance)
         return PointCloud.from_arrays(

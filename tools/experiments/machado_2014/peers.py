@@ -1,4 +1,4 @@
-"""Other ways to tell which points are visible, as far as their formulas are public. In float64, on the CPU.
+"""Other methods that find visible points, as far as their formulas are public. In float64, on the CPU.
 
 Katz and Tal 2015, On the Visibility of Point Clouds: any flip p / |p| f(|p|) with a falling f will do; beside
 the sphere's 2R - |p| they name |p|^g with g < 0. A point is the surer to be visible, the sharper its corner
@@ -44,10 +44,10 @@ def sharpness(seen: SeenPoints, kernel: Kernel) -> Floats:
     """How sharp the corners of the hull of flipped points are: 2 pi less the angles of the faces there, (N,);
     0 where a point is none."""
     flipped, triangles = flipped_triangles(seen, kernel)
-    places = np.concatenate([flipped, np.zeros((int(triangles.max()) + 1 - len(flipped), 3))])
-    angles = np.zeros(len(places))
+    positions = np.concatenate([flipped, np.zeros((int(triangles.max()) + 1 - len(flipped), 3))])
+    angles = np.zeros(len(positions))
     for corner in range(3):
-        at, one, other = (places[triangles[:, (corner + turn) % 3]] for turn in range(3))
+        at, one, other = (positions[triangles[:, (corner + turn) % 3]] for turn in range(3))
         across = np.linalg.norm(np.cross(one - at, other - at), axis=1)
         along = ((one - at) * (other - at)).sum(axis=1)
         np.add.at(angles, triangles[:, corner], np.arctan2(across, along))
@@ -90,11 +90,11 @@ def _heights_above(lower: LowerSide, triangles: NDArray[np.intp]) -> Floats:
     def flat(values: Floats) -> Floats:
         return (values - values.mean(axis=0)) / max(float(np.ptp(values)), np.finfo(float).tiny)
 
-    places = np.concatenate([flat(lower.across), flat(lower.heights[:, None])], axis=1).astype(np.float32)
+    positions = np.concatenate([flat(lower.across), flat(lower.heights[:, None])], axis=1).astype(np.float32)
     scene = t.geometry.RaycastingScene()
-    scene.add_triangles(Tensor.from_numpy(places), Tensor.from_numpy(triangles.astype(np.uint32)))
-    rays = np.zeros((len(places), 6), np.float32)
-    rays[:, :2], rays[:, 2], rays[:, 5] = places[:, :2], -2, 1
+    scene.add_triangles(Tensor.from_numpy(positions), Tensor.from_numpy(triangles.astype(np.uint32)))
+    rays = np.zeros((len(positions), 6), np.float32)
+    rays[:, :2], rays[:, 2], rays[:, 5] = positions[:, :2], -2, 1
     faces = scene.cast_rays(Tensor.from_numpy(rays))["primitive_ids"].numpy()
     met = np.flatnonzero(faces < len(triangles))
     corners = triangles[faces[met]]
@@ -104,7 +104,7 @@ def _heights_above(lower: LowerSide, triangles: NDArray[np.intp]) -> Floats:
     by_second = (base[:, 0] * beyond[:, 1] - base[:, 1] * beyond[:, 0]) / area
     by_third = (along[:, 0] * base[:, 1] - along[:, 1] * base[:, 0]) / area
     low, high, highest = (lower.heights[column] for column in corners.T)
-    above = np.zeros(len(places))
+    above = np.zeros(len(positions))
     above[met] = lower.heights[met] - (low + by_second * (high - low) + by_third * (highest - low))
     above[np.unique(triangles)] = 0
     return np.maximum(above, 0)

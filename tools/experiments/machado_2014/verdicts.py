@@ -34,7 +34,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Verdicts:
-    """How many points are judged which way. missed: visible, not called so; extra: called so, not visible."""
+    """Numbers of points by verdict. missed: visible, not called so; extra: called so, not visible."""
 
     missed: int
     extra: int

@@ -1,8 +1,8 @@
-"""Code words measured: time beside other ways to draw, pixels beside surfels of the same radii, tables.
+"""Code words measured: time beside other renderers, pixels beside surfels of the same radii, tables.
 
 The paper's model, a bone of 25,816 elements, is not to be had: scenes are surfaces with as many. Processor
 time is of all threads, the driver's included: what the work takes where OpenGL is software; wall time counts
-where it is a card. Ways take turns, from a camera that moves between pictures.
+where it is a card. They take turns, from a camera that moves between pictures.
 """
 
 from __future__ import annotations
@@ -43,22 +43,23 @@ _TABLES = {"paper": PAPER, "finer": Steps(sizes=65, size_parts=8, normals=121, n
 
 
 @dataclass(frozen=True)
-class WayToDraw:
-    """A way to draw. backend: which; empty: words on the CPU alone. params: of it."""
+class Drawing:
+    """How a picture is drawn. backend: its name; empty: code words on the CPU alone. params: of the
+    backend."""
 
     name: str
     backend: str
     params: dict[str, Any]
 
 
-WAYS = (
-    WayToDraw("codeword", BACKEND, {}),
-    WayToDraw("codeword, lighting own", BACKEND, {"lighting": "own"}),
-    WayToDraw("codeword, exact", BACKEND, {"quality": "exact"}),
-    WayToDraw(WITHOUT_GL, "", {}),
-    WayToDraw(f"{WITHOUT_GL}, exact", "", {"quality": "exact"}),
-    WayToDraw("surfels, one pass", "surfels", {"passes": "one", "radius": "own", "epsilon": 0.0}),
-    WayToDraw("points", "points", {}),
+DRAWINGS = (
+    Drawing("codeword", BACKEND, {}),
+    Drawing("codeword, lighting own", BACKEND, {"lighting": "own"}),
+    Drawing("codeword, exact", BACKEND, {"quality": "exact"}),
+    Drawing(WITHOUT_GL, "", {}),
+    Drawing(f"{WITHOUT_GL}, exact", "", {"quality": "exact"}),
+    Drawing("surfels, one pass", "surfels", {"passes": "one", "radius": "own", "epsilon": 0.0}),
+    Drawing("points", "points", {}),
 )
 
 
@@ -73,11 +74,11 @@ def measure_times(
             cameras = [camera, camera.orbited(_STEP, 0)]
 
             def drawn(
-                way: WayToDraw, camera: Iterator[Camera], pose: Pose = pose, surface: Surface = surface
+                drawing: Drawing, camera: Iterator[Camera], pose: Pose = pose, surface: Surface = surface
             ) -> None:
-                _draw(bench, way, pose, next(camera), surface)
+                _draw(bench, drawing, pose, next(camera), surface)
 
-            works = {way.name: partial(drawn, way, cycle(cameras)) for way in WAYS}
+            works = {drawing.name: partial(drawn, drawing, cycle(cameras)) for drawing in DRAWINGS}
             taken = by_turns(works, bench.settings.repeat, warm=2)
             surface.release()
             yield {
@@ -92,7 +93,7 @@ def measure_pixels(
 ) -> Iterator[Row]:
     """Yield a row for each scene, projection and quality: how code words differ from surfels in one pass
     without blending, with the same radii."""
-    surfels = next(way for way in WAYS if way.backend == "surfels")
+    surfels = next(drawing for drawing in DRAWINGS if drawing.backend == "surfels")
     for subject in subjects(bench, scenes, count):
         pose = subject.moment(0).pose
         for projection in PROJECTIONS:
@@ -169,15 +170,15 @@ def _camera(pose: Pose, size: tuple[int, int], up: str, projection: str = "persp
     return Camera.orbit(pose.bounds, *_SEEN_FROM, aspect=size[0] / size[1], up=up, projection=projection)
 
 
-def _draw(bench: Bench, way: WayToDraw, pose: Pose, camera: Camera, surface: Surface) -> None:
+def _draw(bench: Bench, drawing: Drawing, pose: Pose, camera: Camera, surface: Surface) -> None:
     """A picture, ready to be looked at."""
-    if way.backend:
-        params = backend(way.backend).params(way.params)
-        draw(bench.renderer, Request(pose, camera, way.backend, params, LOOK), surface)
+    if drawing.backend:
+        params = backend(drawing.backend).params(drawing.params)
+        draw(bench.renderer, Request(pose, camera, drawing.backend, params, LOOK), surface)
         bench.renderer.gpu.ctx.finish()
     else:
         view = view_of(Request(pose, camera), surface.size)
-        draw_words(words.words_of(pose, view, LOOK, words.Params(**way.params)))
+        draw_words(words.words_of(pose, view, LOOK, words.Params(**drawing.params)))
 
 
 def _surface(

@@ -78,7 +78,7 @@ def measure_fits(bench: Bench) -> Iterator[Row]:
 def fitted(noise: float) -> list[dict[str, Any]]:
     """Parameters whose fits are looked at: with hidden neighbours and without; under noise, of more.
 
-    As many as told, and as few of these as tell the plane ("adaptive").
+    As many as stated, and as few of these as determine the plane ("adaptive").
     """
     ks = (10, 20, 30) if noise else (10,)
     fixed = [{"k": k, "hidden_neighbors": True, "adaptive": False} for k in ks]
@@ -158,7 +158,7 @@ def changes(first: VisibleNormals, second: VisibleNormals) -> tuple[Angles, NDAr
     a share of it (P,)."""
     _, at, there = np.intersect1d(first.rows, second.rows, assume_unique=True, return_indices=True)
     before, after = (
-        found.radii[places].astype(np.float64) for found, places in ((first, at), (second, there))
+        found.radii[at_rows].astype(np.float64) for found, at_rows in ((first, at), (second, there))
     )
     grown = np.abs(after - before) / np.maximum(np.maximum(before, after), np.finfo(np.float32).tiny)
     return _off(first.normals[at], second.normals[there]), grown

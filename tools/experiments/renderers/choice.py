@@ -13,7 +13,7 @@ import numpy as np
 
 from experiments.suite import Part, Suite
 from experiments.tables import Column, Row, StoredRun, Table
-from viewer.bench.calibrating import SCENES, measure_ways, way
+from viewer.bench.calibrating import SCENES, configuration_of, measure_ways
 from viewer.bench.run import Bench, BenchSettings
 from viewer.choice.choose import best
 from viewer.choice.goal import PIXELS, Goal
@@ -32,15 +32,15 @@ _SMALLEST = 0.1  # pixels: smaller errors are as good as this
 def judged(rows: Sequence[Row], kind: str, bound: float, name: str) -> dict[str, Any] | None:
     """Outcome of the choices for one goal, of rows of `measure_choices`; None where there was none.
 
-    views: with a choice. possible: of them, those in which a way keeps the bound. kept: of these, those in
-    which the chosen one does. ratio, mean_ratio: median and geometric mean of the chosen one's error, or
-    time, in parts of that of the best that keeps the bound. near: how many of the kept are within 1.2 of it.
-    """
+    views: with a choice. possible: of them, those in which a configuration meets the limit. met: of these,
+    those in which the chosen one does. ratio, mean_ratio: median and geometric mean of the chosen one's
+    error, or time, in parts of that of the best that keeps the bound. near: how many of the met are within
+    1.2 of it."""
     bounded, other = ("ms", "error") if kind == "time" else ("error", "ms")
     views, ratios = 0, []
-    for ways in _views(rows):
-        chosen = next((row for row in ways if name in row["chosen"]), None)
-        keeping = [row for row in ways if row[bounded] <= bound]
+    for configurations in _views(rows):
+        chosen = next((row for row in configurations if name in row["chosen"]), None)
+        keeping = [row for row in configurations if row[bounded] <= bound]
         views += chosen is not None
         if chosen is not None and keeping:
             best = max(min(row[other] for row in keeping), _SMALLEST)
@@ -48,22 +48,22 @@ def judged(rows: Sequence[Row], kind: str, bound: float, name: str) -> dict[str,
             ratios.append(ratio if chosen[bounded] <= bound else np.nan)
     if not views:
         return None
-    kept = [ratio for ratio in ratios if np.isfinite(ratio)]
+    met = [ratio for ratio in ratios if np.isfinite(ratio)]
     return {
         "goal": name,
         "kind": kind,
         "views": views,
         "possible": len(ratios),
-        "kept": len(kept),
-        "near": sum(ratio <= NEAR for ratio in kept),
-        "ratio": round(float(np.median(kept)), 4) if kept else None,
-        "mean_ratio": round(float(np.exp(np.mean(np.log(kept)))), 4) if kept else None,
+        "kept": len(met),
+        "near": sum(ratio <= NEAR for ratio in met),
+        "ratio": round(float(np.median(met)), 4) if met else None,
+        "mean_ratio": round(float(np.exp(np.mean(np.log(met)))), 4) if met else None,
     }
 
 
 def _views(rows: Sequence[Row]) -> Iterator[list[Row]]:
-    for _, ways in groupby(rows, key=lambda row: (row["scene"], row["seed"], row["view"])):
-        yield list(ways)
+    for _, configurations in groupby(rows, key=lambda row: (row["scene"], row["seed"], row["view"])):
+        yield list(configurations)
 
 
 def measure_choices(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row]:
@@ -75,11 +75,14 @@ def measure_choices(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Ro
 
 
 def with_choices(rows: Sequence[Row], model: Model) -> list[Row]:
-    """The rows of one view, with the names of the goals that each way is chosen for."""
+    """The rows of one view, with the names of the goals that each configuration is chosen for."""
     seen = ScanInView(**rows[0]["seen"])
-    known = [way(row) for row in rows if row["key"] in model]
+    known = [configuration_of(row) for row in rows if row["key"] in model]
     chosen = {str(goal): best(known, seen, goal, model).way for goal in GOALS} if known else {}
-    return [{**row, "chosen": [name for name, taken in chosen.items() if taken == way(row)]} for row in rows]
+    return [
+        {**row, "chosen": [name for name, taken in chosen.items() if taken == configuration_of(row)]}
+        for row in rows
+    ]
 
 
 def _stored(rows: Sequence[Row]) -> Iterator[Row]:
@@ -93,9 +96,9 @@ def _stored(rows: Sequence[Row]) -> Iterator[Row]:
 def _choices(runs: Sequence[StoredRun]) -> Iterator[Row]:
     """A line for each limit on one machine."""
     for row in runs[0]["rows"]:
-        kept = 100 * row["kept"] / row["possible"] if row["possible"] else None
+        met = 100 * row["kept"] / row["possible"] if row["possible"] else None
         near = 100 * row["near"] / row["kept"] if row["kept"] else None
-        yield {**row, "share": kept if row["kept"] else None, "near": near}
+        yield {**row, "share": met if row["kept"] else None, "near": near}
 
 
 EXPERIMENT = Suite(

@@ -50,7 +50,7 @@ class Peer(Protocol):
         """Show these alone, as points of a pixel where radius is 0, else as splats of that radius."""
 
     def replace(self, positions: Array, colors: Array) -> None:
-        """Show other points in the place of those that are shown, as many."""
+        """Show other points instead of those that are shown, as many."""
 
     def picture(self, eye: tuple[float, float, float]) -> Array:
         """Draw, and read back: (height, width, 3 or 4) uint8."""

@@ -111,11 +111,11 @@ class Case:
         """Make the arrays that are shown, and return where."""
         cloud = even_sphere(self.count, "random") if self.splats else dented_sphere(self.count, seed)
         colors = np.clip(cloud.positions * 0.4 + 0.5, 0, 1)
-        kept = folder / f"{self.count}-{self.splats}-{seed}"
-        kept.mkdir(exist_ok=True)
-        np.save(kept / "positions.npy", cloud.positions)
-        np.save(kept / "colors.npy", colors.astype(np.float32))
-        return str(kept)
+        arrays = folder / f"{self.count}-{self.splats}-{seed}"
+        arrays.mkdir(exist_ok=True)
+        np.save(arrays / "positions.npy", cloud.positions)
+        np.save(arrays / "colors.npy", colors.astype(np.float32))
+        return str(arrays)
 
 
 def eye_at(turn: int) -> tuple[float, float, float]:

@@ -1,9 +1,9 @@
 """How long tracking landmarks takes through a scan without shared topology.
 
-Frames of the demo are sampled anew, each at other places, and written as NPZ; 21 landmarks, set in the first
-frame, are tracked from there by a process of its own on two cores, with a cache of 64 MB. Time to the first
-frame that is known, and to the last one; processor time of all threads; and the most memory that the process
-held, beside what it had when it began. --folder stores the frames for another run."""
+Frames of the demo are sampled anew, each at other positions, and written as NPZ; 21 landmarks, set in the
+first frame, are tracked from there by a process of its own on two cores, with a cache of 64 MB. Time to the
+first frame that is known, and to the last one; processor time of all threads; and the most memory that the
+process held, beside what it had when it began. --folder stores the frames for another run."""
 
 from __future__ import annotations
 
@@ -52,9 +52,11 @@ def landmarks_in(source: ResampledDemo, folder: Path) -> list[Landmark]:
     cloud = find_source(folder).load(0)
     assert isinstance(cloud, PointCloud)
     spacing, placed = typical_spacing(cloud), []
-    for name, place in zip(PLACES, path_of(truth_places(), [0.0], source.demo.motion)[0], strict=True):
-        row, _ = nearest_row(cloud, place)
-        placed.append(Landmark(name).with_key(SurfacePoint(0, 0.0, vector(place), row, spacing, 0, _EXACT)))
+    for name, position in zip(PLACES, path_of(truth_places(), [0.0], source.demo.motion)[0], strict=True):
+        row, _ = nearest_row(cloud, position)
+        placed.append(
+            Landmark(name).with_key(SurfacePoint(0, 0.0, vector(position), row, spacing, 0, _EXACT))
+        )
     return placed
 
 

@@ -155,8 +155,8 @@ def orbit(app: RunningApp) -> None:
 def open_next(app: RunningApp) -> None:
     """Go to the next scan, and wait until it is there or cannot be."""
     app.screen.do("key", "Next")
-    before, told = app.state.scan, len(app.notes)
-    app.see(lambda state: state.scan != before or any("Cannot open" in note for note in app.notes[told:]))
+    before, seen = app.state.scan, len(app.notes)
+    app.see(lambda state: state.scan != before or any("Cannot open" in note for note in app.notes[seen:]))
 
 
 def estimate(app: RunningApp) -> None:

@@ -1,1 +1,1 @@
-"""What is told of a benchmark: rows of results, plots, pictures, one page."""
+"""The report of a benchmark: rows of results, plots, pictures, one page."""

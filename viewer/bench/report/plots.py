@@ -282,8 +282,8 @@ def _grid(
     with matplotlib.rc_context(_STYLE):
         figure = Figure((width * _COLUMNS, height * rows + top), layout=layout)
         FigureCanvasAgg(figure)
-        for place, panel in enumerate(panels):
-            draw(figure.add_subplot(rows, columns, place + 1), panel)
+        for number, panel in enumerate(panels):
+            draw(figure.add_subplot(rows, columns, number + 1), panel)
         if handles:
             figure.legend(handles=handles, loc="upper left", ncols=per_line, fontsize=9, borderaxespad=0.1)
         figure.draw_without_rendering()
@@ -332,10 +332,12 @@ def _at_edge(axes: Axes, row: Row, metric: Metric, look: dict[str, Any]) -> None
         _default(axes, row, value, look)
         return
     time, below = METRICS["gpu_ms"].of(row), value < low
-    place: Any = {"xy": (time, 0 if below else 1), "xycoords": axes.get_xaxis_transform()}
-    axes.plot(*place["xy"], **look, transform=place["xycoords"], markersize=8, clip_on=False, zorder=3)
+    position: Any = {"xy": (time, 0 if below else 1), "xycoords": axes.get_xaxis_transform()}
+    axes.plot(*position["xy"], **look, transform=position["xycoords"], markersize=8, clip_on=False, zorder=3)
     text, offset = f"{value:.2g} {'↓' if below else '↑'}", (0, 7 if below else -13)
-    axes.annotate(text, **place, xytext=offset, textcoords="offset points", ha="center", fontsize=7, zorder=4)
+    axes.annotate(
+        text, **position, xytext=offset, textcoords="offset points", ha="center", fontsize=7, zorder=4
+    )
 
 
 def _front(axes: Axes, rows: list[Row], metric: Metric) -> None:

@@ -27,12 +27,12 @@ def in_lattice(meshes: Sequence[Mesh], counts: tuple[int, int, int]) -> Mesh:
     counts: how many along x, y and z.
     """
     step = _GAP * np.max([mesh.bounds.high - mesh.bounds.low for mesh in meshes], axis=0)
-    places = np.indices(counts).reshape(3, -1).T * step
-    chosen = [meshes[number % len(meshes)] for number in range(len(places))]
+    positions = np.indices(counts).reshape(3, -1).T * step
+    chosen = [meshes[number % len(meshes)] for number in range(len(positions))]
     return _joined(
         chosen,
-        [1.0] * len(places),
-        [place - m.bounds.center for m, place in zip(chosen, places, strict=True)],
+        [1.0] * len(positions),
+        [position - m.bounds.center for m, position in zip(chosen, positions, strict=True)],
     )
 
 
@@ -50,8 +50,8 @@ def with_sheets() -> tuple[AnalyticScene, Mesh]:
     sheets = [Cuboid(center=(side * 0.45, 1.25, 0.0), half=_EAR) for side in (-1, 1)]
     sheets += [Cuboid(center=(1.3, _APART * number, 0.2), half=_FINGER) for number in range(-2, 3)]
     meshes = [sphere_mesh(), *(_stretched(cube_mesh(), sheet.half) for sheet in sheets)]
-    places = [np.zeros(3), *(np.array(sheet.center) for sheet in sheets)]
-    return AnalyticScene((Sphere(), *sheets)), _joined(meshes, [1.0] * len(meshes), places)
+    positions = [np.zeros(3), *(np.array(sheet.center) for sheet in sheets)]
+    return AnalyticScene((Sphere(), *sheets)), _joined(meshes, [1.0] * len(meshes), positions)
 
 
 def outside_sheets(scene: AnalyticScene, cloud: PointCloud) -> PointCloud:

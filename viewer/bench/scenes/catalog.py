@@ -57,8 +57,8 @@ class _Request:
 class _Scene:
     """How a scene is made. needs: what of the data folder; counts: whether it comes in any number of points.
 
-    count: how many it has unless told; None: that is known when it is read. noise: what the scanner's is
-    unless told; None: there is no virtual scanner.
+    count: how many it has unless stated; None: that is known when it is read. noise: what the scanner's is
+    unless stated; None: there is no virtual scanner.
     """
 
     make: Callable[[_Request], Subject]
@@ -97,7 +97,7 @@ def _still(request: _Request, credit: str = "", up: str = "+y", inside_out: bool
 
 
 def _file(request: _Request) -> Subject:
-    """A mesh file that a user names: read at once, so that what is wrong with it is told at once."""
+    """A mesh file that a user names: read at once, so that an error in it appears at once."""
     made = _still(request)
     try:
         made.moment(0)

@@ -24,7 +24,7 @@ from .subjects import Moment
 
 # The head is nearer than this, the room behind it begins at a metre.
 _ROOM = 0.75  # m
-# The frame that looks as the reference does, turned: with the middles of both together it finds its place.
+# The frame that looks as the reference does, turned: with the middles of both together it finds its position.
 _FIRST = 9
 _REACHES = (0.05, 0.02, 0.005)  # m, how far partners may be
 _EVERY = 8  # pixels that are registered

@@ -30,7 +30,7 @@ _CHUNK = 1 << 20  # points made at a time, so that float64 copies stay small
 def evenly(number: NDArray[np.integer], shift: NDArray[np.float64] | float = 0.0) -> NDArray[np.float64]:
     """Points (N, 2) of a sequence (Roberts 2018) that covers the unit square evenly as far as it is followed.
 
-    number: (N,), their places in it. shift: (2,), where it starts.
+    number: (N,), their numbers in it. shift: (2,), where it starts.
     """
     return (number[:, None] * _R2 + shift) % 1
 
@@ -53,21 +53,21 @@ def on_square(count: int, rows: slice = _ALL) -> Arrays:
 
 def on_cube(count: int, rows: slice = _ALL) -> Arrays:
     """The cube -1..1, its sides evenly covered, by turns. rows: which points."""
-    place, side = np.divmod(_numbers(count, rows), 6)
+    number, side = np.divmod(_numbers(count, rows), 6)
     every, axis = np.arange(len(side)), side // 2
     normals = np.zeros((len(side), 3))
     normals[every, axis] = 1 - 2 * (side % 2)
     positions = normals.copy()
-    positions[every, (axis + 1) % 3], positions[every, (axis + 2) % 3] = (2 * evenly(place) - 1).T
+    positions[every, (axis + 1) % 3], positions[every, (axis + 2) % 3] = (2 * evenly(number) - 1).T
     return _points(positions, normals, np.sqrt(24 / count))
 
 
 def on_torus(count: int, rows: slice = _ALL, *, ring: float = 1.0, tube: float = 0.4) -> Arrays:
     """A torus about the y axis, evenly covered. rows: which points."""
-    turn, place = evenly(_numbers(count, rows)).T
+    turn, share = evenly(_numbers(count, rows)).T
     # The area of a slice of the tube grows with its distance from the axis: invert its integral.
     table = np.linspace(0, 2 * np.pi, 4097)
-    angle = np.interp(place, (ring * table + tube * np.sin(table)) / (2 * np.pi * ring), table)
+    angle = np.interp(share, (ring * table + tube * np.sin(table)) / (2 * np.pi * ring), table)
     outward = np.stack([np.cos(2 * np.pi * turn), np.zeros(len(turn)), np.sin(2 * np.pi * turn)], axis=1)
     normals = outward * np.cos(angle)[:, None] + np.array([0, 1, 0]) * np.sin(angle)[:, None]
     return _points(outward * ring + normals * tube, normals, np.sqrt(4 * np.pi**2 * ring * tube / count))
@@ -87,7 +87,7 @@ def wall(columns: int, rows: int, spacing: float, wave: float = 0.0) -> Arrays:
 def rings(count: int, around: int) -> Arrays:
     """A cylinder about the y axis, four units high, one in radius, in rings of ellipses that just close it.
 
-    count: of rings. around: points of each. `axes` in place of `radii`, as `PointCloud` has them.
+    count: of rings. around: points of each. `axes` instead of `radii`, as `PointCloud` has them.
     """
     turn, level = np.meshgrid(np.arange(around) * 2 * np.pi / around, (np.arange(count) + 0.5) / count - 0.5)
     normals = np.column_stack([np.cos(turn).ravel(), 0 * turn.ravel(), np.sin(turn).ravel()])
@@ -164,7 +164,8 @@ def on_mesh(mesh: Mesh, count: int, seed: int = 0) -> PointCloud:
 
 
 def _at(mesh: Mesh, faces: NDArray, weights: NDArray) -> tuple[NDArray, NDArray, NDArray | None]:
-    """Absolute positions, unit normals and colours at places of barycentric weights (3, N) on faces (N,)."""
+    """Absolute positions, unit normals and colours at positions of barycentric weights (3, N) on faces
+    (N,)."""
     points, corners = mesh.points, mesh.faces[faces]
     flat = normals = mesh.areas(faces)
     if points.normals is not None:

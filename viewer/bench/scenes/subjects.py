@@ -51,7 +51,7 @@ class Subject:
     credit: str = ""
 
     def moment(self, index: int) -> Moment:
-        """The moment of this index; the last two are kept. Raises InputError where there is none."""
+        """The moment of this index; the last two are cached. Raises InputError where there is none."""
         if not 0 <= index < self.moments:
             raise InputError(f"there is no moment {index}", self.name, f"It has 0 to {self.moments - 1}")
         return self._latest(index)

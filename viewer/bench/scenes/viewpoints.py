@@ -73,18 +73,18 @@ def pod_viewpoints(
     """
     shift = np.random.default_rng(seed).random(2)
     cameras = []
-    for pair, place in enumerate(evenly(np.arange((count + 1) // 2), shift)):
+    for pair, position in enumerate(evenly(np.arange((count + 1) // 2), shift)):
         view = views[pair % len(views)]
-        camera = pod_camera(view, sample_near(view, place), zoom, size, up)
+        camera = pod_camera(view, sample_near(view, position), zoom, size, up)
         cameras += [camera, camera.orbited(_ASIDE, 0)]
     return cameras[:count]
 
 
-def sample_near(view: RangeView, place: NDArray[np.float64]) -> Rays:
-    """The world position (3,) of the sample nearest to a place in the box around all of them, 0 to 1."""
+def sample_near(view: RangeView, position: NDArray[np.float64]) -> Rays:
+    """The world position (3,) of the sample nearest to a position in the box around all of them, 0 to 1."""
     pixels = np.argwhere(view.valid())
     low, high = pixels.min(axis=0), pixels.max(axis=0)
-    nearest = np.square(pixels - (low + place * (high - low))).sum(axis=1).argmin()
+    nearest = np.square(pixels - (low + position * (high - low))).sum(axis=1).argmin()
     alone = np.zeros_like(view.mask)
     alone[tuple(pixels[nearest])] = True
     return replace(view, mask=alone).positions()[0]

@@ -70,8 +70,8 @@ def _rest() -> _Rest:
     skin, skin_faces = _surface(head.skin, _SKIN_LINES)
     eyes, eye_faces = _surface(head.eyes, _EYE_LINES)
     parts = [
-        projected(solid, places.T, _NEWTON_STEPS, _LONGEST_STEP)
-        for solid, places in ((head.skin, skin), (head.eyes, eyes))
+        projected(solid, positions.T, _NEWTON_STEPS, _LONGEST_STEP)
+        for solid, positions in ((head.skin, skin), (head.eyes, eyes))
     ]
     positions, normals = (np.concatenate(rows, axis=1) for rows in zip(*parts, strict=True))
     return _Rest(

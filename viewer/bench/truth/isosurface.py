@@ -12,7 +12,9 @@ from ...scan.faces import Triangles
 
 _SKIPPED = 4  # lines from one of the coarse grid to the next
 
-Lines = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]  # ascending places along x, y, z
+Lines = tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]  # ascending positions along x, y, z
 
 
 def isosurface(grid: NDArray[np.float32], lines: Lines) -> tuple[Rays, Triangles]:
@@ -27,8 +29,10 @@ def isosurface(grid: NDArray[np.float32], lines: Lines) -> tuple[Rays, Triangles
     at, faces, _, _ = marching_cubes(
         np.where(known, grid, 1), 0.0, gradient_direction="descent", mask=known, allow_degenerate=False
     )
-    places = [np.interp(column, np.arange(len(line)), line) for column, line in zip(at.T, lines, strict=True)]
-    return np.stack(places, axis=1), faces.astype(np.uint32)
+    positions = [
+        np.interp(column, np.arange(len(line)), line) for column, line in zip(at.T, lines, strict=True)
+    ]
+    return np.stack(positions, axis=1), faces.astype(np.uint32)
 
 
 def grid_values(

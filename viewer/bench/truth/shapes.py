@@ -44,7 +44,7 @@ class AnalyticSurface(ABC):
 
 @dataclass(frozen=True, eq=False)
 class AnalyticScene:
-    """A scene of shapes; the face of a hit is the shape's place in the list."""
+    """A scene of shapes; the face of a hit is the shape's number in the list."""
 
     shapes: tuple[AnalyticSurface, ...]
 

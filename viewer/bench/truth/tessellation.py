@@ -25,11 +25,11 @@ def sphere_mesh() -> Mesh:
 def torus_mesh(ring: float = 1.0, tube: float = 0.4) -> Mesh:
     """A torus about the y axis."""
 
-    def place(turn: NDArray, angle: NDArray) -> tuple[Rays, Rays]:
+    def at(turn: NDArray, angle: NDArray) -> tuple[Rays, Rays]:
         normals = _around(turn, 2 * np.pi * angle)
         return ring * _around(turn, np.full_like(angle, np.pi / 2)) + tube * normals, normals
 
-    return _grid(place)
+    return _grid(at)
 
 
 def square_mesh() -> Mesh:
@@ -48,15 +48,15 @@ def _around(turn: NDArray, tilt: NDArray) -> Rays:
     return np.stack([out * np.cos(2 * np.pi * turn), np.cos(tilt), out * np.sin(2 * np.pi * turn)], axis=1)
 
 
-def _grid(place: Callable[[NDArray, NDArray], tuple[Rays, Rays]]) -> Mesh:
-    """The image of the unit square. place: gives positions and normals, (N, 3) each."""
+def _grid(at: Callable[[NDArray, NDArray], tuple[Rays, Rays]]) -> Mesh:
+    """The image of the unit square. at: gives positions and normals, (N, 3) each."""
     around, across = _FINE
     u, v = np.meshgrid(np.linspace(0, 1, around + 1), np.linspace(0, 1, across + 1))
     corner = np.arange(across)[:, None] * (around + 1) + np.arange(around)
     corner = corner.ravel()
     up = around + 1
     quads = np.stack([corner, corner + 1, corner + 1 + up, corner + up], axis=1)
-    return _mesh(*place(u.ravel(), v.ravel()), quads)
+    return _mesh(*at(u.ravel(), v.ravel()), quads)
 
 
 def _sides(sides: list[tuple[int, float]], offset: float) -> Mesh:
