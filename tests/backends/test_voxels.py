@@ -409,7 +409,7 @@ def test_the_depth_says_why_subdivision_ended(draw: Draw) -> None:
     twins = np.concatenate([CLOUD.positions, CLOUD.positions + np.float32(1e-7)])
     cloud = PointCloud.from_arrays(twins, normals=np.concatenate([CLOUD.normals] * 2))  # type: ignore[list-item]
     surface = voxels(draw, cloud, CAMERAS["perspective"], delta=0.0)
-    assert "level 21" in surface.stats.chosen["depth"]
+    assert "deepest level, 21" in surface.stats.chosen["depth"]
     assert "depth" not in voxels(draw, CLOUD, CAMERAS["perspective"]).stats.chosen
 
 

@@ -117,7 +117,7 @@ def test_only_a_backend_that_finds_it_draws_it(draw: Draw, monkeypatch: pytest.M
         drawn(draw, "#1")
     monkeypatch.setitem(backends(), "finding", finding.BACKEND)
     with pytest.raises(
-        InputError, match=r"not found by the backend points, but by finding.*--backend finding"
+        InputError, match=r"the backend points does not compute 'slope', but finding can.*--backend finding"
     ):
         draw(CLOUD, CAMERA, SIZE, "points", look)
     request = Request(Pose(0, 0.0, "x", CLOUD), CAMERA, finding.BACKEND, look=look)
@@ -128,7 +128,7 @@ def test_another_number_than_was_found_is_refused(draw: Draw) -> None:
     surface = drawn(draw, "slope")
     shown = surface.image(replace(FLAT, color_by="slope", color_map="vik"))
     assert (shown != surface.image(replace(FLAT, color_by="depth"))).any()
-    with pytest.raises(InputError, match="'gap' was not found for this picture"):
+    with pytest.raises(InputError, match="'gap' was not computed for this picture"):
         surface.image(replace(FLAT, color_by="gap"))
 
 

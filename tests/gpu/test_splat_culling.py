@@ -25,6 +25,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting import culling, splat_culling
 from viewer.splatting.amplify import Points
+from viewer.splatting.splats import Splats
 from viewer.view import View
 
 SIZE = (120, 80)
@@ -318,8 +319,8 @@ def test_chunks_that_face_away_hold_no_splat_that_faces_the_eye(
     surface.start(gpu_pose, View.of(camera, SIZE, np.zeros(3), cloud.bounds()))
     told = gpu_pose.keep(splat_culling.SplatChunks)
     told.measure(Points(gpu_pose, True, count))
-    limits = splat_culling.SplatLimits(1.0, 0.0, 0.7, 0.05, 1.0, cull_back=True)
-    told.test(surface, 0, limits.margins(told.boxes.slack, True, 0))
+    splats = Splats(1.0, 0.0, 0.7, True, mask_limit=1.0, falloff=1.0, enlarge=1.0, epsilon=1.0)
+    told.test(surface, 0, splat_culling.splat_margins(splats, 0.05, told.boxes.slack, True, 0))
     is_away = (told.boxes.seen(surface) & 8).astype(bool).repeat(chunk)
     faces_eye = ~surface.view.faces_away(cloud.positions, normals)
     assert not (is_away & faces_eye).any()
@@ -415,10 +416,10 @@ def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, per
         told = pose.keep(splat_culling.SplatChunks)
         told.measure(Points(pose, True, count))
         epsilon = (1.0, 30.0)[number % 2]
-        limits = splat_culling.SplatLimits(
-            rng.uniform(0.5, 2), 0.03, 0.7, 0.05, epsilon, cull_back=number != 1
-        )
-        margins = limits.margins(told.boxes.slack, number % 2 == 0, 5 * number)
+        scale, culls = rng.uniform(0.5, 2), number != 1
+        splats = Splats(scale, 0.03, 0.7, culls, mask_limit=1.0, falloff=1.0, enlarge=1.0, epsilon=epsilon)
+        is_even = number % 2 == 0
+        margins = splat_culling.splat_margins(splats, 0.05, told.boxes.slack, is_even, 5 * number)
         twin = Twin(surface.view, margins, told)
         before = 16 * rng.integers(0, 2, told.boxes.chunks).astype(np.uint32)
         surface.keep(culling.SeenChunks).of(told.boxes).write(before)

@@ -27,7 +27,7 @@ from ..splatting import passes
 from ..splatting.amplify import FEEDS, Points, amplify
 from ..splatting.fastest import instancing_for
 from ..splatting.gaps import GapRadii
-from ..splatting.splat_culling import SplatLimits, draw_unhidden, may_cull
+from ..splatting.splat_culling import draw_unhidden, may_cull
 from ..splatting.splats import FRAGMENT, SURFEL, Splats
 from ..splatting.subpixel import average, splat_subpixel, subpixel_share
 from ..splatting.tiles import FALLBACK, most_listed, splat
@@ -193,15 +193,11 @@ class Surfels(Backend):
         stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
         if stays and params.passes in _HIDING and may_cull(pose):
             points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)
-            limits = SplatLimits(
-                radius_scale=larger * params.radius_scale,
-                uniform_radius=sizes.uniform,
-                least_radius=larger * margin,
-                largest=sizes.largest,
-                epsilon=params.epsilon,
-                cull_back=params.cull_back,
+            splats = _splats(params, sizes.uniform)
+            limits = replace(
+                splats, radius_scale=larger * splats.radius_scale, least_radius=larger * splats.least_radius
             )
-            draw_unhidden(points, surface, limits, draw_points)
+            draw_unhidden(points, surface, limits, sizes.largest, draw_points)
         else:
             points = Points.of(pose, surface, frame.share, sizes.own, larger * margin, larger * reach)
             splats = _splats(params, sizes.uniform)

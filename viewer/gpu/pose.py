@@ -240,11 +240,8 @@ class GpuPose:
     def adopt(self, passed: GpuPose) -> None:
         """Take the arrays that a pose has on the GPU which goes, where this one has the same: else they would
         go with it."""
-        points = self.pose.points
-        if not isinstance(points, PointCloud):
-            return
         for name, shared in passed._shared.items():
-            is_same = name != "positions" and shared.values is getattr(points, name)
+            is_same = name != "positions" and shared.values is getattr(self.pose.overview, name)
             if is_same and name not in self._arrays:
                 self._take_shared(name, shared.values)
 

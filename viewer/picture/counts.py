@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,10 +17,35 @@ from ..view import View
 from .sample import is_sampled
 
 _CHUNK = 1 << 20  # points counted at a time
+Part = tuple[NDArray[np.int64], NDArray, NDArray | None]  # rows, positions, normals
+
+
+class Counted(NamedTuple):
+    """The points of a scan, to be counted."""
+
+    total: int
+    dropped: int  # not finite
+    numbered: int  # rows that they are numbered by
+    origin: NDArray[np.float64]
+    parts: Callable[[], Iterator[Part]]  # some points at a time
+
+
+def cloud_counted(cloud: PointCloud) -> Counted:
+    """The points of a cloud."""
+    return Counted(len(cloud), cloud.dropped, len(cloud), cloud.origin, partial(_parts, cloud))
+
+
+def samples_counted(points: RangePoints) -> Counted:
+    """The points of range views, which are not merged, and have no normals here."""
+
+    def parts() -> Iterator[Part]:
+        return ((*part, None) for part in points.parts())
+
+    return Counted(points.count, 0, int(points.firsts[-1]), points.overview.origin, parts)
 
 
 def count_points(
-    points: PointCloud | RangePoints,
+    points: Counted,
     view: View,
     rows: NDArray[np.uint32],
     share: float,
@@ -29,22 +56,16 @@ def count_points(
     all), "outside" (the centre is not in the picture or not between near and far), "away" (they face
     away from the eye; only where such points were left out) and "hidden" (the rest).
 
-    points: those of range views are looked at without being merged, and have no normals. rows: (H, W), which
+    rows: (H, W), which
     point each pixel shows, or sample of range views; 0xFFFFFFFF where none. faces_away: whether points that
     face away were left out.
     """
-    if isinstance(points, PointCloud):
-        count, dropped, numbered, parts = len(points), points.dropped, len(points), _parts(points)
-        origin = points.origin
-    else:
-        count, dropped, numbered = points.count, 0, int(points.firsts[-1])
-        parts = ((*part, None) for part in points.parts())
-        origin = points.overview.origin
-    moved = origin - view.origin
-    shown = np.zeros(numbered, bool)
+    count, dropped = points.total, points.dropped
+    moved = points.origin - view.origin
+    shown = np.zeros(points.numbered, bool)
     shown[rows[rows != NOTHING]] = True
     seen = hidden = left_out = away = 0
-    for numbers, positions, normals in parts:
+    for numbers, positions, normals in points.parts():
         checkpoint(seen / count)
         seen += len(numbers)
         others = ~shown[numbers]
@@ -72,7 +93,7 @@ def count_points(
     }
 
 
-def _parts(cloud: PointCloud) -> Iterator[tuple[NDArray[np.int64], NDArray, NDArray | None]]:
+def _parts(cloud: PointCloud) -> Iterator[Part]:
     """Rows, positions and normals of a part of the points at a time."""
     for start in range(0, len(cloud), _CHUNK):
         part = slice(start, min(start + _CHUNK, len(cloud)))

@@ -31,6 +31,7 @@ _COLOR_CODES = {"plain": 0, "own": 1, "normal": 2, "value": 3, "id": 4}
 _VALUE_CODES = {"depth": 0, "height": 1, "scalar": 2}
 _MOST = float(np.finfo(np.float32).max)
 _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
+_CHANNEL_TEXTURES = {"color": Texture.COLORS, "normal": Texture.NORMALS}
 
 
 @dataclass(frozen=True)
@@ -53,85 +54,136 @@ class _Shading:
     eye_dome_radius: int
 
 
+@dataclass(frozen=True)
+class _Recipe:
+    """How a surface is shaded in a look."""
+
+    look: Look
+    color: str  # where colours come from, one of _COLOR_CODES
+    value: str | None  # the number that gives colours, one of _VALUE_CODES
+    light: str  # one of _LIGHT_CODES
+    eye_dome: bool
+    by_level: bool
+    by_log: bool
+
+    @property
+    def read(self) -> tuple[str, ...]:
+        """The channels that shading reads."""
+        is_lit = self.light != "flat" or self.color == "normal"
+        return (*(["color"] if self.color == "own" else []), *(["normal"] if is_lit else []))
+
+
 def shade(surface: Surface, look: Look) -> None:
     """Shade into `surface.picture`. Raises InputError for what the scan does not have."""
-    pose, gpu = surface.pose, surface.gpu
-    cloud = pose.overview
-    source, surface.look = value_source(look, surface.layers.names(cloud.scalars), surface.finds), look
-    value = source if source in (None, "depth", "height") else "scalar"
-    if value == "height" and surface.samples is not None:
-        value = "scalar"  # which have no positions
-    by_level = look.color_by == "level"
-    color = "value" if source is not None else "own" if look.color_by in ("auto", "level") else look.color_by
-    if color == "own" and cloud.colors is None and not surface.is_own("color"):
-        color = "plain"
-    if surface.is_lit:
-        color, by_level, look = "own", False, replace(look, light="flat", eye_dome=False)
-    # Photographs have the light that they were taken in, and what depth cameras measure is rougher than that.
-    photographed = surface.samples is not None and color == "own" and not by_level
-    has_normals = cloud.normals is not None or "normals" in surface.needs or surface.is_own("normal")
-    lit = has_normals and not photographed
-    light = look.light if look.light != "auto" else "head" if lit else "flat"
-    unlit = look.light == "auto" and light == "flat" and not photographed
-    eye_dome = unlit if look.eye_dome is None else look.eye_dome
-    lit = light != "flat" or color == "normal"
-    read = [name for name, is_read in (("color", color == "own"), ("normal", lit)) if is_read]
-    from_rows = [name for name in read if not surface.is_own(name)]
-    by_sample = surface.samples is not None and bool(from_rows)
-    has_ids = cloud.ids is not None and surface.samples is None
-    surface.color_range = None if source is None else value_range(surface, look)
-    kind = surface.value_kind
-    by_log = surface.color_range is not None and kind is not None and kind.goes_by_log(*surface.color_range)
-    program = gpu.compute(
-        "shade/shade.comp",
-        {
-            "COLOR_BY": _COLOR_CODES[color],
-            "VALUE": _VALUE_CODES[value or "scalar"],
-            "BY_LOG": int(by_log),
-            "LIGHT": _LIGHT_CODES[light],
-            "EYE_DOME": int(eye_dome),
-            "TURNED": int(not surface.layers.world_from_pose.is_identity),
-            "HAS_IDS": int(has_ids),
-            **surface.sample_defines(by_sample),
-            "LEVEL_COLORS": len(LEVEL_COLORS) if by_level else 0,
-            "OWN_LEVEL": int(by_level and surface.is_own("level")),
-            **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
-        },
-        params=_shading(surface, look, by_log),
-    )
+    surface.look, gpu = look, surface.gpu
+    recipe = _recipe(surface, look)
+    params = _shading(surface, recipe.look, recipe.by_log)
+    program = gpu.compute("shade/shade.comp", _defines(surface, recipe), params=params)
     surface.bind_view()
     shown = surface.list_shown()
     with gpu.timers.measure("shade"):
         surface.bind_textures()
-        for name, texture in (("color", Texture.COLORS), ("normal", Texture.NORMALS)):
-            if name in read and surface.is_own(name):
-                surface.own(name).bind(texture)
-            elif name in read and surface.samples is None:
-                pose.array(f"{name}s").bind(texture)
-        if by_sample:
-            surface.bind_samples()
-        if surface.is_own("color"):
-            surface.own("color").bind(Texture.OWN_COLORS)
-        if surface.is_own("value"):
-            surface.own("value").bind(Texture.VALUES)
-        elif value == "scalar" and (values := surface.row_values) is not None:
-            values.bind(Texture.VALUES)
-        elif value == "height":
-            pose.array("positions").bind(Texture.POSITIONS)
-        if color == "id" and has_ids:
-            pose.array("ids").bind(Texture.IDS)
-        if value is not None:
-            gpu.keep(_color_map, look.color_map).bind(Texture.COLOR_MAP)
-        if by_level:
-            gpu.keep(_level_colors, LEVEL_COLORS).bind(Texture.COLOR_MAP)
-            if surface.is_own("level"):
-                surface.own("level").bind(Texture.LEVELS)
+        _bind_channels(surface, recipe)
+        _bind_colors(surface, recipe)
         surface.picture.bind_to_storage_buffer(Storage.PICTURE)
-        surface.clear_picture(look.background)
+        surface.clear_picture(recipe.look.background)
         shown.run(program)
-    if look.holes:
+    if recipe.look.holes:
         _paint_holes(surface)
     surface.shaded_by = shade
+
+
+def _recipe(surface: Surface, look: Look) -> _Recipe:
+    """Resolve a look for a surface, and note the range of its colour map there."""
+    source = value_source(look, surface.layers.names(surface.pose.overview.scalars), surface.finds)
+    value = source if source in (None, "depth", "height") else "scalar"
+    if value == "height" and not surface.kind.has_positions:
+        value = "scalar"
+    surface.color_range = None if source is None else value_range(surface, look)
+    kind = surface.value_kind
+    by_log = surface.color_range is not None and kind is not None and kind.goes_by_log(*surface.color_range)
+    color, by_level = _color_source(surface, look, source), look.color_by == "level"
+    if surface.is_lit:
+        color, by_level, look = "own", False, replace(look, light="flat", eye_dome=False)
+    # Photographs have the light that they were taken in, and depth cameras measure normals too roughly.
+    photographed = surface.kind.is_photograph and color == "own" and not by_level
+    light = _light(surface, look, photographed)
+    is_unlit = look.light == "auto" and light == "flat" and not photographed
+    eye_dome = is_unlit if look.eye_dome is None else look.eye_dome
+    return _Recipe(look, color, value, light, eye_dome, by_level, by_log)
+
+
+def _color_source(surface: Surface, look: Look, source: str | None) -> str:
+    """The source of colours, one of _COLOR_CODES. source: of the number that gives them."""
+    if source is not None:
+        return "value"
+    if look.color_by not in ("auto", "level", "own"):
+        return look.color_by
+    has_colors = surface.pose.overview.colors is not None or surface.is_own("color")
+    return "own" if has_colors else "plain"
+
+
+def _light(surface: Surface, look: Look, photographed: bool) -> str:
+    """The light, one of _LIGHT_CODES."""
+    if look.light != "auto":
+        return look.light
+    stored = surface.pose.overview.normals is not None
+    has_normals = stored or "normals" in surface.needs or surface.is_own("normal")
+    return "head" if has_normals and not photographed else "flat"
+
+
+def _fetches(surface: Surface, recipe: _Recipe) -> bool:
+    """Whether the shader fetches a channel by the row of a pixel."""
+    return any(not surface.is_own(name) for name in recipe.read)
+
+
+def _defines(surface: Surface, recipe: _Recipe) -> dict[str, object]:
+    return {
+        "COLOR_BY": _COLOR_CODES[recipe.color],
+        "VALUE": _VALUE_CODES[recipe.value or "scalar"],
+        "BY_LOG": int(recipe.by_log),
+        "LIGHT": _LIGHT_CODES[recipe.light],
+        "EYE_DOME": int(recipe.eye_dome),
+        "TURNED": int(not surface.layers.world_from_pose.is_identity),
+        "HAS_IDS": int(surface.kind.of("ids") is not None),
+        **surface.kind.defines(_fetches(surface, recipe)),
+        "LEVEL_COLORS": len(LEVEL_COLORS) if recipe.by_level else 0,
+        "OWN_LEVEL": int(recipe.by_level and surface.is_own("level")),
+        **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
+    }
+
+
+def _bind_channels(surface: Surface, recipe: _Recipe) -> None:
+    """Bind colours and normals, the backend's own or those of the rows."""
+    for name in recipe.read:
+        texels = surface.own(name) if surface.is_own(name) else surface.kind.texels(name)
+        if texels is not None:
+            texels.bind(_CHANNEL_TEXTURES[name])
+        elif not surface.kind.fetches(name):
+            surface.pose.array(f"{name}s")  # which raises
+    if _fetches(surface, recipe):
+        surface.kind.bind(surface.view)
+    if surface.is_own("color"):
+        surface.own("color").bind(Texture.OWN_COLORS)
+
+
+def _bind_colors(surface: Surface, recipe: _Recipe) -> None:
+    """Bind the numbers that give colours, and the colours that they give."""
+    gpu, pose = surface.gpu, surface.pose
+    if surface.is_own("value"):
+        surface.own("value").bind(Texture.VALUES)
+    elif recipe.value == "scalar" and (values := surface.row_values) is not None:
+        values.bind(Texture.VALUES)
+    elif recipe.value == "height":
+        pose.array("positions").bind(Texture.POSITIONS)
+    if recipe.color == "id" and surface.kind.of("ids") is not None:
+        pose.array("ids").bind(Texture.IDS)
+    if recipe.value is not None:
+        gpu.keep(_color_map, recipe.look.color_map).bind(Texture.COLOR_MAP)
+    if recipe.by_level:
+        gpu.keep(_level_colors, LEVEL_COLORS).bind(Texture.COLOR_MAP)
+        if surface.is_own("level"):
+            surface.own("level").bind(Texture.LEVELS)
 
 
 def _paint_holes(surface: Surface) -> None:

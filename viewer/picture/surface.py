@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import moderngl
 import numpy as np
@@ -55,16 +55,14 @@ class Surface(RenderTarget):
     @property
     def id(self) -> NDArray[np.uint32]:
         """(H, W) uint32, the point's index in the file; 0xFFFFFFFF where none."""
-        if self.samples is not None:
-            return self.row
-        ids = self._of_rows("ids")
+        ids = self.kind.of("ids")
         return self.row if ids is None else self._fetch(ids, np.uint32(NOTHING))
 
     @property
     def octant(self) -> NDArray[np.uint32] | None:
         """(H, W) uint32, the number of the octant, breadth-first; 0xFFFFFFFF where none. None where points
         are drawn."""
-        octants = self._octants
+        octants = self.kind.octants
         return None if octants is None else self._fetch(octants.__getitem__, np.uint32(NOTHING))
 
     @property
@@ -73,17 +71,17 @@ class Surface(RenderTarget):
         if self.is_own("color"):
             rgb = self._read_texels("color", np.uint8)[..., :3]
         else:
-            rgb = self._fetch(self._of_rows("colors"), np.array(rgba(self.look.plain), np.uint8))[..., :3]
+            rgb = self._fetch(self.kind.of("colors"), np.array(rgba(self.look.plain), np.uint8))[..., :3]
         return _LINEAR[np.where(self._covered[..., None], rgb, np.uint8(0))]
 
     @property
     def normal(self) -> NDArray[np.float32]:
         """(H, W, 3) float32, world space, unit length; 0 where unknown."""
-        if self.is_own("normal") or self.samples is not None:
+        if self.is_own("normal") or self.kind.fetches("normal"):
             written = self._read_texels("normal", np.float32)
             fetched = np.where(self._covered[..., None], written, np.float32(0))
         else:
-            fetched = self._fetch(self._of_rows("normals"), np.zeros(3, np.float32))
+            fetched = self._fetch(self.kind.of("normals"), np.zeros(3, np.float32))
         length = np.linalg.norm(fetched, axis=2, keepdims=True)
         usable = np.isfinite(length) & (length > 0)
         along_pose = np.where(usable, fetched / np.where(usable, length, 1), 0).astype(np.float32)
@@ -123,13 +121,7 @@ class Surface(RenderTarget):
         """The points of the scan that are seen round pixel (x, y), each once: (n,) their indices in the file,
         (n, 3) their positions relative to the view's origin. reach: pixels to each side."""
         rows = np.unique(self._around(self.rows.buffer, np.uint32(NOTHING), x, y, reach))
-        rows = rows[rows != NOTHING].astype(np.intp)
-        if self.samples is not None:
-            away = self.samples.overview.origin - self.view.origin
-            return rows, self.samples.of_samples("positions", rows) + away
-        points, scan = self._points_of(rows), self.scan
-        ids = points if scan.ids is None else scan.ids[points]
-        return ids.astype(np.intp), scan.world(points) - self.view.origin
+        return self.kind.file_points(rows[rows != NOTHING].astype(np.intp), self.view)
 
     def _around(self, buffer: moderngl.Buffer, empty: np.generic, x: int, y: int, reach: int) -> NDArray:
         """Words of the pixels round one, in one read; `empty` outside the picture."""
@@ -191,8 +183,8 @@ class Surface(RenderTarget):
 
     def counting(self) -> Callable[[], dict[str, int]]:
         """A function that gives `point_counts` of what is drawn now, on any thread."""
-        points, stats = self._cloud if self.samples is None else self.samples, self.stats
-        return partial(count_points, points, self.view, self.row, stats.share, stats.faces_away)
+        stats = self.stats
+        return partial(count_points, self.kind.counted(), self.view, self.row, stats.share, stats.faces_away)
 
     def found_at(self, row: int) -> dict[str, float]:
         """The number of a row, by name, that the backend gave; empty where it gave none."""
@@ -209,20 +201,12 @@ class Surface(RenderTarget):
 
     def point_of(self, row: int) -> int:
         """The row in `scan` of the point that a row of the surface stands for."""
-        if self.samples is not None:
-            return self.samples.row_of(row)
-        return int(self._stood_for[1][row]) if self._stood_for else row
+        return self.kind.point(row)
 
     def point_at(self, row: int, least: int = 1) -> tuple[PointCloud, int]:
         """A cloud that has the point which a row stands for, and the row of the point there. It has at least
         so many of the nearest points: it is `scan`, or of range views what pixels around see."""
-        if self.samples is None:
-            return self.scan, self.point_of(row)
-        offset = self.samples.of_samples("positions", np.array([row]))[0]
-        cloud = self.samples.around(offset + self.samples.overview.origin, least)
-        found = cloud.row_of(row)
-        assert found is not None
-        return cloud, found
+        return self.kind.cloud_with(row, least)
 
     # --- inside -----------------------------------------------------------------------
 
@@ -249,33 +233,17 @@ class Surface(RenderTarget):
         """(H, W), where something is seen."""
         return np.isfinite(self.depth)
 
-    def _of_rows(self, name: str) -> Callable[[NDArray], NDArray] | None:
-        """Function that gives values (n, ...) of rows (n,): positions, normals, colors, ids or 'scalar:NAME';
-        None where none have any."""
-        scalar = name.removeprefix("scalar:") if name.startswith("scalar:") else None
-        if self.samples is not None:
-            is_there = scalar is not None or getattr(self.pose.overview, name) is not None
-            return partial(self.samples.of_samples, scalar or name) if is_there else None
-        values = getattr(self._cloud, name) if scalar is None else self._cloud.scalars[scalar]
-        return None if values is None else values.__getitem__
-
     def _values_of(self, source: str, rows: NDArray) -> NDArray:
         """Numbers of rows (n,): heights along the look's up, of a layer, or a scalar of the scan."""
         if source in self.layers.scalars:
-            return self.layers.scalars[source][self._points_of(rows)]
-        find = self._of_rows("positions" if source == "height" else f"scalar:{source}")
+            return self.layers.scalars[source][self.kind.points(rows)]
+        find = self.kind.of("positions" if source == "height" else f"scalar:{source}")
         assert find is not None
         if source != "height":
             return find(rows)
         return self.layers.world_from_pose.points(find(rows) + self.pose.pose.origin) @ up_vector(
             self.look.up
         )
-
-    def _points_of(self, rows: NDArray) -> NDArray:
-        """Rows in `scan` of the points that rows (n,) stand for; see `point_of`."""
-        if self.samples is not None:
-            return np.searchsorted(cast(NDArray, self.scan.ids), rows)
-        return self._stood_for[1][rows] if self._stood_for else rows
 
     def _fetch(self, find: Callable[[NDArray], NDArray] | None, unknown: NDArray | np.generic) -> NDArray:
         """Values of each pixel's row, as `find` gives them of some rows; `unknown` where there is no row, or

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 
 import moderngl
@@ -40,6 +40,7 @@ from .culling import (
     counts_of,
     find_farthest,
 )
+from .splats import Splats
 
 _CHUNKS, _CHUNK = 1 << 15, 1 << 5  # about as many, and points of one at least
 # Pixels by which what a chunk covers is larger where it is left out of the next picture at first: so many,
@@ -53,36 +54,21 @@ _NEARLY_ALL = 0.9  # share of the points from which on a list of them is of no u
 _DEAR, _LONGEST_PAUSE = 0.9, 64
 
 
-@dataclass(frozen=True)
-class SplatLimits:
-    """How far splats reach, and which count.
-
-    radius_scale: factor on their radii. uniform_radius: scan units, of those without one of their own.
-    least_radius: pixels. largest: of all radii, scan units. epsilon: how far behind the nearest splat others
-    count, in its radii. cull_back: whether those that face away are left out.
-    """
-
-    radius_scale: float
-    uniform_radius: float
-    least_radius: float
-    largest: float
-    epsilon: float
-    cull_back: bool
-
-    def margins(self, slack: float, trusts: bool, spare: int) -> Margins:
-        """The numbers as the test of chunks has them."""
-        return Margins(
-            slack,
-            SLACK,
-            self.radius_scale,
-            self.uniform_radius,
-            self.least_radius,
-            self.epsilon * self.radius_scale * max(self.largest, self.uniform_radius),
-            self.epsilon * self.least_radius,
-            self.cull_back,
-            trusts,
-            spare,
-        )
+def splat_margins(splats: Splats, largest: float, slack: float, trusts: bool, spare: int) -> Margins:
+    """The numbers of the test of chunks with splats. largest: of all radii, scan units. slack, trusts, spare:
+    see `Margins`."""
+    return Margins(
+        box_slack=slack,
+        pixel_margin=SLACK,
+        radius_scale=splats.radius_scale,
+        uniform_radius=splats.uniform_radius,
+        least_radius=splats.least_radius,
+        behind=splats.epsilon * splats.radius_scale * max(largest, splats.uniform_radius),
+        pixels_behind=splats.epsilon * splats.least_radius,
+        cull_back=splats.cull_back,
+        trusts=trusts,
+        spare_pixels=spare,
+    )
 
 
 def may_cull(pose: GpuPose) -> bool:
@@ -91,14 +77,17 @@ def may_cull(pose: GpuPose) -> bool:
 
 
 def draw_unhidden(
-    points: Points, surface: Surface, limits: SplatLimits, draw: Callable[[Points], bool]
+    points: Points, surface: Surface, splats: Splats, largest: float, draw: Callable[[Points], bool]
 ) -> None:
-    """Draw those of a pose's points that the picture may show. points: all of them. draw: what draws some, up
-    to three times; whether it may have drawn them in another way had there been more."""
+    """Draw those of a pose's points that the picture may show.
+
+    points: all of them. largest: of all radii, scan units. draw: what draws some, up to three times; whether
+    it may have drawn them in another way had there been more.
+    """
     chunks, before = points.pose.keep(SplatChunks), surface.keep(_Pictures)
     chunks.measure(points)
     boxes, trusts = chunks.boxes, before.pause == 0
-    margins = limits.margins(boxes.slack, trusts, before.moved_to(surface))
+    margins = splat_margins(splats, largest, boxes.slack, trusts, before.moved_to(surface))
     chunks.test(surface, START, margins)
     seen = boxes.seen(surface)
     is_late, is_dear = False, draw(chunks.take(points, surface, seen, LAST)) and _leaves_out(seen, LAST)

@@ -99,7 +99,7 @@ def _few(surface: Surface, size: int) -> float:
 
 def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
     """Write points that are far fewer than pixels."""
-    hits = HitCells(surface.start_listed(), size**2)
+    hits = HitCells(surface.start_listed(surface.look.background), size**2)
     scatter(surface.gpu, visits, surface.depths, surface.rows, hits)
     surface.stats.skipped["pixels"] = "few points: they list the pixels that are cleared and shaded"
 

@@ -12,12 +12,11 @@ from ..camera import Camera
 from ..drawing.frame import render_frame
 from ..drawing.renderer import shared_renderer
 from ..drawing.request import Request
+from ..gpu.constants import NOTHING as NOTHING  # the id of a pixel that shows no point
 from ..look import Look
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.pose import Pose, Scanned
-
-NOTHING = 0xFFFFFFFF  # the id of a pixel that shows no point
 
 
 def draw(

@@ -1,0 +1,203 @@
+"""The row of a pixel: a point, a sample of range views, or an octant. No other module tells them apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..gpu import gl
+from ..gpu.chunks import Chunks
+from ..gpu.pose import GpuPose
+from ..scan.points import PointCloud
+from ..scan.range_points import RangePoints
+from ..view import View
+from .counts import Counted, cloud_counted, samples_counted
+
+Find = Callable[[NDArray], NDArray]  # values (n, ...) of rows (n,)
+
+
+class PointRows:
+    """Rows that are points of a pose, in the order of its arrays.
+
+    pose: whose rows they are. scanned: the pose of the scan.
+    """
+
+    has_positions = True  # whether the GPU has their positions as texels
+    is_photograph = False  # whether their colours have the light that they were taken in
+    octants: NDArray[np.uint32] | None = None  # the number of each row's octant, if it is one
+
+    def __init__(self, pose: GpuPose) -> None:
+        self.pose = self.scanned = pose
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return len(self.pose.cloud)
+
+    @property
+    def point_count(self) -> int:
+        """Number of rows that see a point."""
+        return self.count
+
+    def counted(self) -> Counted:
+        """The points to count, for any thread."""
+        return cloud_counted(self.pose.cloud)
+
+    def near(self, view: View, margin: float, reach: float) -> NDArray[np.uint32] | None:
+        """The rows in chunks that a view may show, see `Chunks.rows_in`; None: all may be."""
+        return self.pose.keep(Chunks).rows_in(view, margin, reach)
+
+    # --- on the GPU -------------------------------------------------------------------
+
+    def defines(self, is_used: bool) -> dict[str, object]:
+        """Macros for programs that include range/of_rows.glsl. is_used: whether they fetch by row with it."""
+        return {"SAMPLES": 0}
+
+    def bind(self, view: View) -> None:
+        """Bind the buffers that range/of_rows.glsl reads."""
+
+    def texels(self, name: str) -> gl.BufferTexture | None:
+        """The attribute `color` or `normal` with a texel for each row; None if there is none."""
+        return self.pose.find(f"{name}s")
+
+    def fetches(self, name: str) -> bool:
+        """Whether shaders compute the attribute `color` or `normal` of a row from other data."""
+        return False
+
+    def scalar_texels(self, name: str) -> gl.BufferTexture:
+        """A scalar of the scan with a texel for each row."""
+        return self.pose.array(f"scalar:{name}")
+
+    def layer_texels(self, values: NDArray, zero: float) -> gl.BufferTexture:
+        """Numbers of a layer, relative to zero, with a texel for each row."""
+        return self.pose.layer_texels(values, zero)
+
+    def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
+        """The height along an axis with a texel for each row."""
+        return self.pose.heights(axis)
+
+    # --- on the CPU -------------------------------------------------------------------
+
+    def of(self, name: str) -> Find | None:
+        """Function that gives positions, normals, colors, ids or a scalar ('scalar:NAME') of rows; None if
+        there are none."""
+        cloud, scalar = self.pose.cloud, name.partition("scalar:")[2]
+        values = cloud.scalars[scalar] if scalar else getattr(cloud, name)
+        return None if values is None else values.__getitem__
+
+    def points(self, rows: NDArray) -> NDArray:
+        """Rows of the scan's points that rows (n,) stand for."""
+        return rows
+
+    def point(self, row: int) -> int:
+        """The row of the scan's point that a row stands for."""
+        return int(self.points(np.array([row]))[0])
+
+    def cloud_with(self, row: int, least: int) -> tuple[PointCloud, int]:
+        """A cloud with the point of a row and at least so many of the nearest ones, and its row there."""
+        return self.scanned.stored, self.point(row)
+
+    def file_points(self, rows: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Indices in the file (n,) and positions (n, 3), relative to the view's origin, of the points that
+        rows stand for."""
+        points, scan = self.points(rows), self.scanned.stored
+        ids = points if scan.ids is None else scan.ids[points]
+        return ids.astype(np.intp), scan.world(points) - view.origin
+
+
+class OctantRows(PointRows):
+    """Rows of a pose of octants, which has the scan's origin.
+
+    stand_for: the row of the scan's point by which each is known. octants: the number of each, 0xFFFFFFFF
+    for a row that is none.
+    """
+
+    def __init__(
+        self, pose: GpuPose, scanned: GpuPose, stand_for: NDArray[np.uint32], octants: NDArray[np.uint32]
+    ) -> None:
+        super().__init__(pose)
+        self.scanned, self._stand_for, self.octants = scanned, stand_for, octants
+
+    def layer_texels(self, values: NDArray, zero: float) -> gl.BufferTexture:
+        return self.pose.layer_texels(values, zero, self._stand_for)
+
+    def points(self, rows: NDArray) -> NDArray:
+        return self._stand_for[rows]
+
+
+class SampleRows(PointRows):
+    """Rows that are pixels of a pose's range views, view after view and line after line, whether they see a
+    point or not.
+
+    Their numbers are the ids of the points, and no points are merged for them. Colours are those of the
+    pixels, normals those of the planes through the samples around.
+    """
+
+    has_positions = False
+    is_photograph = True
+
+    def __init__(self, pose: GpuPose) -> None:
+        """Raises InputError if the pose has no range views."""
+        super().__init__(pose)
+        self._samples: RangePoints = pose.range_points
+
+    @property
+    def count(self) -> int:
+        return int(self._samples.firsts[-1])
+
+    @property
+    def point_count(self) -> int:
+        return self._samples.count
+
+    def counted(self) -> Counted:
+        return samples_counted(self._samples)
+
+    def near(self, view: View, margin: float, reach: float) -> None:
+        return None
+
+    def defines(self, is_used: bool) -> dict[str, object]:
+        return {"SAMPLES": 1, **self.pose.samples.defines} if is_used else {"SAMPLES": 0}
+
+    def bind(self, view: View) -> None:
+        self.pose.samples.bind(view)
+
+    def texels(self, name: str) -> None:
+        return None
+
+    def fetches(self, name: str) -> bool:
+        return name == "normal" or self.pose.overview.colors is not None
+
+    def scalar_texels(self, name: str) -> gl.BufferTexture:
+        return self.pose.array(f"sample:{name}")
+
+    def layer_texels(self, values: NDArray, zero: float) -> gl.BufferTexture:
+        return self.pose.layer_texels(values, zero, by_sample=True)
+
+    def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
+        return self.pose.heights(axis, by_sample=True)
+
+    def of(self, name: str) -> Find | None:
+        scalar = name.partition("scalar:")[2]
+        is_there = bool(scalar) or (name != "ids" and getattr(self.pose.overview, name) is not None)
+        return partial(self._samples.of_samples, scalar or name) if is_there else None
+
+    def points(self, rows: NDArray) -> NDArray:
+        return np.searchsorted(cast(NDArray, self.scanned.stored.ids), rows)
+
+    def point(self, row: int) -> int:
+        return self._samples.row_of(row)
+
+    def cloud_with(self, row: int, least: int) -> tuple[PointCloud, int]:
+        offset = self._samples.of_samples("positions", np.array([row]))[0]
+        cloud = self._samples.around(offset + self._samples.overview.origin, least)
+        found = cloud.row_of(row)
+        assert found is not None
+        return cloud, found
+
+    def file_points(self, rows: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        away = self._samples.overview.origin - view.origin
+        return rows, self._samples.of_samples("positions", rows) + away
