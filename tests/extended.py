@@ -3,12 +3,31 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+PAGES = {
+    "backend": "scan4d-dots",
+    "reader": "scan4d-stl",
+    "measure": "scan4d-triangle",
+    "tool": "scan4d-pins",
+}
+MOST_LINES = 100  # of the package of a page
+
+
+def write_package(kind: str, folder: Path) -> Path:
+    """Write the package of the page docs/developing/adding-a-KIND.md into a folder; where it is."""
+    page = (ROOT / "docs" / "developing" / f"adding-a-{kind}.md").read_text(encoding="utf-8")
+    files = re.findall(r"`(scan4d-[\w/.-]+\.\w+)`:\n\n```\w+\n(.*?)```", page, re.DOTALL)
+    assert sum(text.count("\n") for _, text in files) <= MOST_LINES
+    for name, text in files:
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text(text, encoding="utf-8")
+    return folder / PAGES[kind]
 
 
 def write_installed(
@@ -27,6 +46,13 @@ def write_installed(
     (described / "entry_points.txt").write_text("\n".join(lines))
     for module, text in modules.items():
         (target / f"{module}.py").write_text(text)
+
+
+def use_tools(folder: Path, package: str = "acme-tools 1.0") -> str:
+    """Describe the modules of a folder as tools of a package; Python that makes a process find it."""
+    names = {path.stem: f"{folder.name}.{path.stem}" for path in sorted(folder.glob("*.py"))}
+    write_installed(folder.parent, package, {}, {"tools": names})
+    return f"import sys; sys.path.insert(0, {str(folder.parent)!r})\n"
 
 
 def pip_install(source: Path, target: Path) -> None:

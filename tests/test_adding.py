@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from extended import ROOT, pip_install, run_with
+from extended import PAGES, ROOT, pip_install, run_with, write_package
 from nested import run_pytest
 from numpy.typing import NDArray
 from PIL import Image
@@ -23,20 +23,7 @@ from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.view import View
 
-PAGES = {"backend": "scan4d-dots", "reader": "scan4d-stl", "measure": "scan4d-triangle"}
-MOST_LINES = 100  # of a package
 SIZE = (97, 61)
-
-
-def write_package(kind: str, folder: Path) -> Path:
-    """Write the package of a page into a folder; where it is."""
-    page = (ROOT / "docs" / "developing" / f"adding-a-{kind}.md").read_text(encoding="utf-8")
-    files = re.findall(r"`(scan4d-[\w/.-]+\.\w+)`:\n\n```\w+\n(.*?)```", page, re.DOTALL)
-    assert sum(text.count("\n") for _, text in files) <= MOST_LINES
-    for name, text in files:
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
-    return folder / PAGES[kind]
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +48,7 @@ def test_its_own_test_passes(kind: str, packages: dict[str, Path], target: Path)
     assert done.returncode == 0, done.stdout + done.stderr
     passed = re.search(r"(\d+) passed", done.stdout)
     assert passed, done.stdout
-    assert int(passed[1]) >= {"backend": 19, "reader": 1, "measure": 6}[kind]
+    assert int(passed[1]) >= {"backend": 19, "reader": 1, "measure": 6, "tool": 6}[kind]
 
 
 def test_doctor_lists_the_packages(target: Path) -> None:

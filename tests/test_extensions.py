@@ -103,7 +103,7 @@ def test_doctor_shows_where_each_comes_from_and_what_cannot_be_used(target: Path
         "'not_there_at_all')",
         "The backend 'points' of taking-pack 3.0 is not used: Scan4D has one of this name. Rename its entry",
         "The backend 'nothing' of taking-pack 3.0 is not used: acme-good 1.2 has one of this name",
-        "The reader 'other' of taking-pack 3.0 is not used: PLY reads '.ply' already. Use other suffixes",
+        "The reader 'other' of taking-pack 3.0 is not used: PLY already reads '.ply'. Use other suffixes",
         "The measure 'other' of taking-pack 3.0 is not used: there is a measure 'distance' already",
     ]
     for text in expected:

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from viewer.backends import backends
 from viewer.commands import command_names
+from viewer.testing.tools import KNOWN
 
 PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 
@@ -131,16 +132,7 @@ def libraries(names: Iterable[str]) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
-TOOLS_KNOW = {
-    "commands",
-    "tool_context",
-    "read_dialog",
-    "save_dialog",
-    "scene.canvas",
-    "tools",
-    "ui",
-    "widgets",
-}  # of the window
+TOOLS_KNOW = {*KNOWN}  # of the window
 
 # Modules of the window that know the whole app: what runs it. It may only shrink.
 KNOW_THE_APP = {"__init__", "app", "loop"}
@@ -166,7 +158,8 @@ def test_imports_point_down_the_layers() -> None:
 
 
 FOUND = re.compile(
-    r"(importlib\.)?import_module\((f'\{(__name__|__package__|package|tools\.__name__)\}\.\{|extension\.module)"
+    r"(importlib\.)?import_module\("
+    r"(f'\{(__name__|__package__|package)\}\.\{|extension\.module|tools\.tool_modules\(\)\[|module\))"
 )
 
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from extended import pip_install, use_tools, write_package
 from PIL import Image
-from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, Screen, running_app
+from virtual_screen import PANEL, PATIENCE, SIZE, RunningApp, Screen, running_app
 
 from viewer import cli
 from viewer.document.recording import Recording
@@ -19,7 +20,6 @@ from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
 YELLOW = (0xF2, 0xC1, 0x4E)
-USE = "import viewer.app.tools\nviewer.app.tools.__path__.append({!r})\n"
 
 
 @pytest.fixture
@@ -64,12 +64,9 @@ def close(app: RunningApp) -> None:
 
 @pytest.mark.slow
 def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Path) -> None:
-    page = (ROOT / "docs/developing/adding-a-tool.md").read_text()
-    (code,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
-    (tmp_path / "tools" / "pins").mkdir(parents=True)
-    (tmp_path / "tools" / "pins" / "__init__.py").write_text(code)
-    use = USE.format(str(tmp_path / "tools"))
-    settings = write_settings(tmp_path, {"pins": {"texts": False}})
+    target = tmp_path / "installed"
+    pip_install(write_package("tool", tmp_path), target)
+    use = f"import sys; sys.path.insert(0, {str(target)!r})\n"
     with running_app(screen, tmp_path, scan, before=use) as app:
         x, y = middle(app)
         assert count(app, YELLOW) == 0
@@ -77,7 +74,7 @@ def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Pat
         app.settle()
         click(app, x, y)
         one = count(app, YELLOW)
-        assert one > 20, "a text is pinned"
+        assert one > 20, "a position is pinned"
         click(app, x + 100, y + 60)
         assert count(app, YELLOW) == pytest.approx(2 * one, rel=0.2)
         screen.do("key", "ctrl+z")
@@ -100,7 +97,6 @@ def test_the_tool_of_the_documentation(screen: Screen, tmp_path: Path, scan: Pat
         assert count(app, YELLOW) == one, "Escape has put the pins away"
         close(app)
     assert "Traceback" not in app.log()
-    assert json.loads(settings.read_text())["tools"] == {"pins": {"texts": False}}
 
 
 FAILING = {
@@ -189,18 +185,18 @@ def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
     keys = write_failing(tmp_path / "tools")
     before = {"at_import": {"kept": 1}, "gone": {"kept": 2}}
     settings = write_settings(tmp_path, before)
-    with running_app(screen, tmp_path, scan, before=USE.format(str(tmp_path / "tools"))) as app:
+    with running_app(screen, tmp_path, scan, before=use_tools(tmp_path / "tools")) as app:
         x, y = middle(app)
         for name in ("in_command", "in_work", "in_result"):
             screen.do("key", keys[name].lower())
-            app.told(f"{name} is switched off")
+            app.told(f"switched off {name} ")
         app.do(("key", keys["in_escape"].lower()), ("key", "Escape"))
-        app.told("in_escape is switched off")
+        app.told("switched off in_escape ")
         screen.do("key", keys["in_prompt"].lower())
-        app.told("in_prompt is switched off")
+        app.told("switched off in_prompt ")
         screen.do("key", keys["in_click"].lower())
         click(app, x, y)
-        app.told("in_click is switched off")
+        app.told("switched off in_click ")
         click(app, x, y)
 
         app.do(("key", keys["in_command"].lower()), ("key", "m"))
@@ -211,7 +207,8 @@ def test_a_tool_that_fails_is_told_once_and_switched_off_and_all_else_goes_on(
         app.see(clicking=None)
         close(app)
     found = (
-        re.fullmatch(r"(\w+[\w ]*) is switched off until the next start: (.*)", note) for note in app.notes
+        re.fullmatch(r"Scan4D switched off (.+?)(?: of acme-tools 1\.0)? until the next start: (.*)", note)
+        for note in app.notes
     )
     told = [match.groups() for match in found if match]
     assert len(told) == len(FAILING), "each once"
@@ -243,8 +240,7 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     other = tmp_path / "others"
     other.mkdir()
     (other / "first.py").write_text("raise ValueError('not the first')\n")
-    (folder / "_hidden.py").write_text("raise ValueError('no tool')\n")
-    use = USE.format(str(folder)) + USE.format(str(other))
+    use = use_tools(folder) + use_tools(other, "other-tools 2.0")
     with running_app(screen, tmp_path, scan, before=use) as app:
         for _ in range(2):
             screen.do("key", "alt+a")
@@ -253,16 +249,16 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
         app.see(clicking="measuring")
         close(app)
     told = "\n".join(app.notes)
-    assert "The tool 'second': M is set for both 'measure' and 'act_second'. 'act_second' has none" in told
-    assert "third is switched off until the next start: unknown modifier key 'Hyper'" in told
-    assert "fourth is switched off until the next start: there is a command 'measure' already" in told
-    assert "fifth is switched off until the next start: TypeError: COMMANDS['Tools'] is a Command" in told
+    assert "The tool 'second': M is set for both 'measure' and 'act_second'. 'act_second' has no keys" in told
+    off = "of acme-tools 1.0 until the next start"
+    assert f"switched off third {off}: unknown modifier key 'Hyper'" in told
+    assert f"switched off fourth {off}: a command 'measure' exists already" in told
+    assert f"switched off fifth {off}: TypeError: COMMANDS['Tools'] must be a tuple of commands" in told
     assert told.count("a button pressed wrongly") == 1, "once while it lasts"
-    assert f"The tool 'first' in {other} is not used: {folder} has one of this name" in told
+    assert "The tool 'first' of other-tools 2.0 is not used: acme-tools 1.0 has one of this name" in told
     assert "not the first" not in told
-    assert "sixth is switched off" not in told
-    assert "no tool" not in told
-    assert "first is switched off" not in told
+    assert "switched off sixth" not in told
+    assert "switched off first" not in told
 
 
 @pytest.mark.slow
@@ -275,13 +271,14 @@ def test_a_tool_that_leaves_imgui_unbalanced_is_named_and_the_window_goes_on(
     for name, calls in names.items():
         hooks = "".join(f"    def {hook}(self, *_): {UNBALANCED[calls]}\n" for hook in ("panel", "overlay"))
         (folder / f"{name}.py").write_text(HEAD.format(name=name) + hooks)
-    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
+    with running_app(screen, tmp_path, scan, before=use_tools(folder)) as app:
         screen.do("key", "m")
         app.see(clicking="measuring")
         close(app)
     told = [note for note in app.notes if "failed" in note or "switched off" in note]
     assert sorted(told) == [
-        f"{name} is switched off until the next start: RuntimeError: {calls} were not called equally often"
+        f"Scan4D switched off {name} until the next start: RuntimeError: {calls} were not called equally "
+        "often"
         for name, calls in names.items()
     ]
 
@@ -301,15 +298,13 @@ def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
         code = HEAD.format(name=name) + pin.format("position" if name == "array" else "place")
         keys = TAIL.format(name=name, key=f"Alt+{name[0]}")
         (folder / f"{name}.py").write_text(KEEPING.format(name=name, kind=kind) + code + keys)
-    with running_app(screen, tmp_path, scan, before=USE.format(str(folder))) as app:
-        app.told(r"listed is switched off until the next start: TypeError: Kept\.all cannot be kept as list")
+    with running_app(screen, tmp_path, scan, before=use_tools(folder)) as app:
+        app.told(r"switched off listed of acme-tools .*: TypeError: Kept\.all cannot be kept as list")
         screen.do("key", "alt+p")
         click(app, *middle(app))
         screen.do("key", "alt+a")
         click(app, *middle(app))
-        app.told(
-            r"array is switched off .*: TypeError: array\.all\[0\]\.position is to be a tuple, not array"
-        )
+        app.told(r"switched off array .*: TypeError: array\.all\[0\]\.position is to be a tuple, not array")
         close(app)
     assert not [note for note in app.notes if "not kept" in note]
     (kept,) = (tmp_path / "config" / "scan4d" / "scans").glob("*.json")
@@ -382,7 +377,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
 ) -> None:
     (tmp_path / "tools").mkdir()
     (tmp_path / "tools" / "laying.py").write_text(LAYING)
-    with running_app(screen, tmp_path, scan, before=USE.format(str(tmp_path / "tools"))) as app:
+    with running_app(screen, tmp_path, scan, before=use_tools(tmp_path / "tools")) as app:
         x, y = middle(app)
         press(app, "alt+c")
         color, before, _ = shown(app)
@@ -441,7 +436,7 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         press(app, "ctrl+z")  # pictures have measured lines, too
 
         press(app, "alt+d")
-        app.told("Laying is switched off until the next start: .*'rising' is .*expected 160,000 numbers")
+        app.told("switched off Laying until the next start: .*'rising' is .*expected 160,000 numbers")
         assert (pixels(saved_picture(app)) != pixels(moved)).any(), "where the scan has it"
         press(app, "shift+r")
         app.see(is_replaying=False)

@@ -9,14 +9,16 @@ from scenes import rarely
 from whole_files import write_scans
 
 from viewer.analysis.measures.kinds import measure_kinds
+from viewer.app.tools import tool_names
 from viewer.backends import backends
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.testing import Check, backend_checks, measure_checks, reader_checks
+from viewer.testing import Check, backend_checks, measure_checks, reader_checks, tool_checks
 from viewer.testing.backends import SIZES
 
 BACKENDS = [check for name in backends() for check in backend_checks(name)]
 READERS = [check for suffix in formats.known_suffixes() for check in reader_checks(suffix)]
+TOOLS = [check for name in tool_names() for check in tool_checks(name)]
 MEASURES = [check for kind in measure_kinds() for check in measure_checks(kind)]
 SUFFIXES = sorted({*formats.known_suffixes()} - {".laz"})
 _RARE = tuple(f"odd_size_{width}x{height}" for width, height in SIZES[2:])  # which repeat what others show
@@ -65,7 +67,13 @@ def test_measures(check: Check) -> None:
     check()
 
 
+@pytest.mark.parametrize("check", TOOLS, ids=str)
+def test_tools(check: Check) -> None:
+    check()
+
+
 def test_names_that_nothing_has_are_refused() -> None:
-    for suite, name in ((backend_checks, "dotz"), (reader_checks, ".zip"), (measure_checks, "distanse")):
+    suites = {backend_checks: "dotz", reader_checks: ".zip", measure_checks: "distanse", tool_checks: "pin"}
+    for suite, name in suites.items():
         with pytest.raises(InputError, match=f"unknown .* '{name}'"):
             suite(name)

@@ -12,12 +12,16 @@ from typing import Any
 
 from imgui_bundle import ImVec2
 
+from ..analysis.measures.kinds import measure_kinds
+from ..backends import backends
 from ..document.part import Part
 from ..document.schema import Values, is_object, structured, unread, usable
 from ..errors import InputError
+from ..extensions import extension_problems, installed_extensions, package_of
 from ..output.labels import Box, LabelPlaces
 from ..output.overlays import NOTHING_DRAWN, DrawnMarks
 from ..rigid import STILL, Rigid
+from ..scan.formats import known_suffixes
 from ..scan.layers import Layers
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -50,7 +54,8 @@ class Slot:
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context
-        self.title = context.name
+        package = package_of(tools.tool_modules()[context.name])
+        self.title = f"{context.name} of {package}" if package else context.name
         self.tool: Any = None
         self.mistakes: dict[str, str] = {}
 
@@ -123,12 +128,8 @@ class Toolbox(WindowPart):
                 self._open(slot)
             except Exception as error:
                 self._switch_off(slot, error)
-        for name, (used, *others) in tools.folders_of_tools().items():
-            for folder in others:
-                self.note_of_scan(
-                    f"Scan4D does not use the tool '{name}' in {folder}, because {used} has one with "
-                    "this name. Rename it."
-                )
+        for problem in _problems_of_packages():
+            self.note_of_scan(problem)
 
     def _context(self, name: str) -> ToolContext:
         return ToolContext(
@@ -408,13 +409,20 @@ def _checked_place(place: Rigid) -> Rigid:
     return place
 
 
+def _problems_of_packages() -> list[str]:
+    """Messages on backends, readers, measures and tools of other packages that cannot be used."""
+    if installed_extensions():
+        backends(), known_suffixes(), measure_kinds()
+    return list(extension_problems().values())
+
+
 def _imported(name: str) -> Any:
     """The module of a tool. Raises TypeError where a part of the document is not declared as it has to be;
     no file is read by the parts of a module that fails.
     """
     before = dict(Part.kinds)
     try:
-        module = importlib.import_module(f"{tools.__name__}.{name}")
+        module = importlib.import_module(tools.tool_modules()[name])
         for part_name in Part.kinds.keys() - before:
             Part.kinds[part_name].check_declared()
     except BaseException:

@@ -18,5 +18,6 @@ from .backends import backend_checks
 from .check import Check
 from .measures import measure_checks
 from .readers import reader_checks
+from .tools import tool_checks
 
-__all__ = ["Check", "backend_checks", "measure_checks", "reader_checks"]
+__all__ = ["Check", "backend_checks", "measure_checks", "reader_checks", "tool_checks"]

@@ -1,4 +1,6 @@
-"""The window's tools: what a user takes up to work on a scan; a folder or file each, found by scanning this.
+"""The window's tools: a folder or file each in this folder, or in another package (viewer/extensions.py).
+
+A tool is what a user takes up to work on a scan.
 
 A tool's module has
 
@@ -44,25 +46,20 @@ What a user would be sorry to lose is in the document (`context.document`, `cont
 way in the Tool. A tool that raises, or leaves widgets begun, is told and switched off until the next start,
 all else goes on; only an InputError in a command, a click, a widget of `panel` or `dialog` or in what was run
 beside the window is the user's mistake, and told alone. Names that begin with an underscore are no tools. No
-list of tools exists anywhere else; a folder that is appended to this package's `__path__` is scanned too, and
-of two tools of one name the first folder's is used and the other told.
+other list of tools exists.
 """
 
 from __future__ import annotations
 
-import pkgutil
+from ...extensions import extensions_of, names_in
 
 
 def tool_names() -> tuple[str, ...]:
-    """The names of all tools, in alphabetical order in each folder. None of their modules is imported."""
-    return tuple(folders_of_tools())
+    """The names of all tools: Scan4D's own in alphabetical order, then those of other packages."""
+    return tuple(tool_modules())
 
 
-def folders_of_tools() -> dict[str, list[str]]:
-    """Tool's name -> the folders that have one of this name. The first is used."""
-    found: dict[str, list[str]] = {}
-    for folder in dict.fromkeys(__path__):
-        for module in pkgutil.iter_modules([folder]):
-            if not module.name.startswith("_"):
-                found.setdefault(module.name, []).append(folder)
-    return found
+def tool_modules() -> dict[str, str]:
+    """Name -> dotted name of the module, of all tools. None is imported."""
+    own = {name: f"{__name__}.{name}" for name in names_in(__path__)}
+    return own | {each.name: each.module for each in extensions_of("tools", own)}
