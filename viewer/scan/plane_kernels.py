@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -184,34 +186,93 @@ def _agreement(normals: NDArray[np.float32], around: NDArray[np.int64], total: i
     return (xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + yz * yz + zx * zx)) / (total * total)
 
 
+class NestedFits(NamedTuple):
+    """Planes through the nearest counts[0], counts[1], ... neighbours of P points, see `fit_nested`."""
+
+    counts: NDArray[np.int64]  # (J,), ascending, J > 2
+    normals: NDArray[np.float32]  # (P, J, 3)
+    widths: NDArray[np.float64]  # (P, J, 3), squared, ascending
+
+
+class TurnLimits(NamedTuple):
+    """Mean squares of the angle by which noise may turn a normal."""
+
+    quiet: float  # of the fewest neighbours that tell a surface: below it, these are taken
+    settled: float  # of the reference that others are compared with
+
+
+@compiled
+def _fewest(fits: NestedFits, around: NDArray[np.int64], scratch: NDArray[np.float64]) -> int:
+    """The first of the numbers of neighbours that tells a surface at some points, which are judged together.
+
+    scratch: (K,) at least as many as the points.
+    """
+    counts, normals, widths = fits
+    last, total = len(counts) - 1, len(around)
+    for i in range(total):
+        scratch[i] = _noise(widths[around[i]], counts, 0, 2)
+    least_round = _ROUND if _median(scratch, total) < 0.0 else 0.0
+    agreeing = _agreement(normals, around, total, min(last, _MORE)) - _DISAGREEING
+    first = 0
+    while first < last - 2:
+        for i in range(total):
+            widest = widths[around[i], first, 2]
+            scratch[i] = widths[around[i], first, 1] / widest if widest > 0.0 else 0.0
+        is_round = _median(scratch, total) >= least_round
+        if is_round and _agreement(normals, around, total, first) >= agreeing:
+            break
+        first += 1
+    return first
+
+
+@compiled
+def _settle_reference(
+    fits: NestedFits, around: NDArray[np.int64], first: int, limits: TurnLimits,
+    turned: NDArray[np.float64], scratch: NDArray[np.float64],
+) -> int:  # fmt: skip
+    """The least number of neighbours from `first` on that noise hardly turns, see `choose`.
+
+    turned: (J,) gets by how much noise turns the normals of each number; only of the first where that is
+    quiet.
+    """
+    counts, _, widths = fits
+    last, total, reference = len(counts) - 1, len(around), first
+    for _ in range(_ROUNDS):
+        fewer = min(reference, last - 2)
+        for i in range(total):
+            scratch[i] = _noise(widths[around[i]], counts, fewer, fewer + 2)
+        noise, before = _median(scratch, total), reference
+        for j in range(first, last + 1):
+            turned[j] = 0.0
+            for i in range(total):
+                turned[j] += _turned(noise, widths[around[i], j], counts[j]) / total
+            if turned[first] < limits.quiet:
+                break
+        while turned[first] >= limits.quiet and reference < last and turned[reference] >= limits.settled:
+            reference += 1
+        if reference == before:
+            break
+    return reference
+
+
 @compiled
 def choose(
-    rows: NDArray[np.integer],
-    near: NDArray[np.int32],
-    places: NDArray[np.int32],
-    counts: NDArray[np.int64],
-    normals: NDArray[np.float32],
-    widths: NDArray[np.float64],
-    quiet: float,
-    settled: float,
-    chosen: NDArray[np.float32],
-    further: NDArray[np.bool_],
-) -> None:
-    """The normals (M, 3) of as many neighbours as give the least error around each point, and whether more
-    than counts[-1] may give less, (M,).
+    rows: NDArray[np.integer], near: NDArray[np.int32], places: NDArray[np.int32], fits: NestedFits,
+    limits: TurnLimits, chosen: NDArray[np.float32], further: NDArray[np.bool_],
+) -> None:  # fmt: skip
+    """Fill the normals (M, 3) of as many neighbours as give the least error around each point, and whether
+    more than counts[-1] may give less, (M,).
 
     The error of a number of neighbours is what noise leaves of it, and how far it turns normals from those of
-    the least number that noise turns by less than `settled` (the mean square of the angle); less what noise
-    tells of that turn (Mallows' C_p). All are means over the points around. Where noise turns those of
-    the fewest that tell a surface by less than `quiet`, these are taken.
+    the least number that noise turns by less than `settled`; less what noise tells of that turn (Mallows'
+    C_p). All are means over the points around.
 
     rows: (M,). near: (M, K), rows of the points around, of which those with a place count. places: (N,), by
-    row, in normals (P, J, 3) and squared widths (P, J, 3), as `fit_nested` has them for counts (J,), J > 2;
-    or -1.
+    row, in the fits; or -1.
     """
+    counts, normals, _ = fits
     last = len(counts) - 1
-    around = np.empty(near.shape[1], np.int64)
-    noises = np.empty(near.shape[1])
+    around, scratch = np.empty(near.shape[1], np.int64), np.empty(near.shape[1])
     turned = np.empty(len(counts))
     for m in range(len(rows)):
         total = 0
@@ -220,36 +281,10 @@ def choose(
             if place >= 0:
                 around[total] = place
                 total += 1
-        for i in range(total):
-            noises[i] = _noise(widths[around[i]], counts, 0, 2)
-        least_round = _ROUND if _median(noises, total) < 0.0 else 0.0
-        agreeing = _agreement(normals, around, total, min(last, _MORE)) - _DISAGREEING
-        first = 0
-        while first < last - 2:
-            for i in range(total):
-                widest = widths[around[i], first, 2]
-                noises[i] = widths[around[i], first, 1] / widest if widest > 0.0 else 0.0
-            is_round = _median(noises, total) >= least_round
-            if is_round and _agreement(normals, around, total, first) >= agreeing:
-                break
-            first += 1
-        reference, is_quiet = first, False
-        for _ in range(_ROUNDS):
-            fewer = min(reference, last - 2)
-            for i in range(total):
-                noises[i] = _noise(widths[around[i]], counts, fewer, fewer + 2)
-            noise, before = _median(noises, total), reference
-            for j in range(first, last + 1):
-                turned[j] = 0.0
-                for i in range(total):
-                    turned[j] += _turned(noise, widths[around[i], j], counts[j]) / total
-                if turned[first] < quiet:
-                    break
-            is_quiet = turned[first] < quiet
-            while not is_quiet and reference < last and turned[reference] >= settled:
-                reference += 1
-            if reference == before:
-                break
+        together = around[:total]
+        first = _fewest(fits, together, scratch)
+        reference = _settle_reference(fits, together, first, limits, turned, scratch)
+        is_quiet = turned[first] < limits.quiet
         best, least = reference, np.inf
         for j in range(reference, first + 1 if is_quiet else last + 1):
             away = 0.0

@@ -104,21 +104,12 @@ def _chosen(
     if len(counts) < _LEAST_TOLD:
         return normals[in_part[rows], 0], np.zeros(len(rows), bool)
     chosen, further = np.empty((len(rows), 3), np.float32), np.empty(len(rows), bool)
+    fits = plane_kernels.NestedFits(counts, normals, widths)
+    limits = plane_kernels.TurnLimits(_QUIET, _SETTLED)
 
     def choose(first: int, last: int) -> None:
         part, some = slice(first, last), rows[first:last]
-        plane_kernels.choose(
-            some,
-            around[some],
-            in_part,
-            counts,
-            normals,
-            widths,
-            _QUIET,
-            _SETTLED,
-            chosen[part],
-            further[part],
-        )
+        plane_kernels.choose(some, around[some], in_part, fits, limits, chosen[part], further[part])
 
     _share(len(rows), choose)
     return chosen, further if most < len(points) else np.zeros(len(rows), bool)

@@ -206,14 +206,13 @@ class DeformableBody:
 
         yields: whether stretched edges, as at joints, hold less.
         """
-        from .body_kernels import settle_nodes
+        from .body_kernels import BodyEdges, NodeTargets, edge_products, settle_nodes
 
         places, products = pose.places.copy(), np.empty_like(pose.turns)
         holds = self._holds(pose) if yields else np.ones(len(self._edges))
-        settle_nodes(
-            self._firsts, self._others, self._edges, pose.turns, stiffness, pulls, wanted, holds, _STEPS,
-            places, products,
-        )  # fmt: skip
+        edges = BodyEdges(self._firsts, self._others, self._edges, holds)
+        settle_nodes(edges, pose.turns, stiffness, NodeTargets(pulls, wanted), _STEPS, places)
+        edge_products(edges, places, products)
         return BodyPose(places, rotations(products))
 
     def _holds(self, pose: BodyPose) -> Float:

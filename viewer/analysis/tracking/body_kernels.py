@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from .surface_kernels import Cells, fit_at, nearest_within
+from .surface_kernels import Cells, fit_at, nearest_within, parabola_height
 
 _FACING = 0.5  # cosine of the angle between the normals of a node and of the surface that it is drawn to
 _ENOUGH = 1e-10  # of the squared residual of a solution, at which it is one
@@ -76,8 +78,7 @@ def pull_across(
                 cosine += f[2, k] * turns[n, k, q] * normals[n, q]
         if u * u + v * v > held.reaches[row] ** 2 or abs(cosine) < _FACING:
             continue
-        height = p[0, 0] + (p[0, 1] + p[0, 3] * u + p[0, 4] * v) * u + (p[0, 2] + p[0, 5] * v) * v
-        off = w - height
+        off = w - parabola_height(p[0], u, v)
         weight = max(0.0, 1.0 - (off / reach) ** 2) ** 2
         for k in range(3):
             wanted[n, k] -= off * f[2, k]
@@ -85,28 +86,33 @@ def pull_across(
                 pulls[n, k, q] = weight * f[2, k] * f[2, q]
 
 
+class BodyEdges(NamedTuple):
+    """Edges between the N nodes of a body: those of node n are the rows firsts[n] to firsts[n + 1]."""
+
+    firsts: NDArray[np.int64]  # (N + 1,)
+    others: NDArray[np.int64]  # (E,), the nodes that they lead to
+    edges: Float  # (E, 3), from node to node at rest
+    holds: Float  # (E,), the share of the body's stiffness that each edge keeps
+
+
+class NodeTargets(NamedTuple):
+    """Positions that are wanted of the nodes of a body."""
+
+    pulls: Float  # (N, 3, 3), weights
+    wanted: Float  # (N, 3)
+
+
 @compiled
 def settle_nodes(
-    firsts: NDArray[np.int64],
-    others: NDArray[np.int64],
-    edges: Float,
-    turns: Float,
-    stiffness: float,
-    pulls: Float,
-    wanted: Float,
-    holds: Float,
-    most: int,
-    places: Float,
-    products: Float,
+    body: BodyEdges, turns: Float, stiffness: float, targets: NodeTargets, most: int, places: Float
 ) -> None:
-    """Move nodes, as they are turned, to where they are held best by those beside them and by what is wanted.
+    """Move nodes, as they are turned, to where their edges and targets hold them best.
 
-    firsts: (N + 1,), others: (E,), edges: (E, 3): beside node n at rest, in the rows firsts[n] to firsts[n +
-    1], are others, at edges from it. turns: (N, 3, 3). stiffness: of the body; holds: (E,), the share of it
-    that each edge keeps. pulls: (N, 3, 3), weights of places that are wanted, (N, 3). places: (N, 3), near
-    them, get the solution (conjugate gradients, Hestenes and Stiefel 1952) after so many steps at most;
-    products: (N, 3, 3), the sums of the edges' products now and at rest.
+    turns: (N, 3, 3). stiffness: of the body. places: (N, 3), near them, get the solution after at most so
+    many steps of conjugate gradients (Hestenes and Stiefel 1952).
     """
+    firsts, others, edges, holds = body
+    pulls, wanted = targets
     count = len(places)
     left, ahead, image = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     before, wished = 0.0, 1e-300
@@ -149,8 +155,14 @@ def settle_nodes(
             for k in range(3):
                 ahead[n, k] = left[n, k] + after / before * ahead[n, k]
         before = after
+
+
+@compiled
+def edge_products(body: BodyEdges, places: Float, products: Float) -> None:
+    """Fill the sums (N, 3, 3) of the products of each node's edges, now and at rest. places: (N, 3)."""
+    firsts, others, edges, holds = body
     products[:] = 0.0
-    for n in range(count):
+    for n in range(len(places)):
         for e in range(firsts[n], firsts[n + 1]):
             for k in range(3):
                 for q in range(3):

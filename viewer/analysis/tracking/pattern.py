@@ -11,11 +11,15 @@ From patterns that are found, matches grow over the surface, each point's place 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .surface import MomentSurface
+
+if TYPE_CHECKING:
+    from .pattern_search_kernels import PatternFit, PatternSearch
 
 Float = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -71,7 +75,7 @@ class PointPattern:
     @classmethod
     def around(cls, surface: MomentSurface, place: Float) -> PointPattern | None:
         """The pattern around a place; None where there are too few points, or no surface."""
-        from .pattern_kernels import nearest_of
+        from .pattern_search_kernels import nearest_of
 
         rows = np.empty(_POINTS, np.int32)
         found = nearest_of(surface.held, place[0], place[1], place[2], rows, np.empty(_POINTS))
@@ -86,20 +90,20 @@ class PointPattern:
     ) -> FoundPattern | None:
         """The pattern in another frame, near a place, (3,), and turned about as it is, (3, 3); None where it
         is not found, or fits several places. search: how far it may be, spacings."""
-        found, rows, off, told = self._fitted(surface, place, linear, search)
-        if told[0] > np.log(_CERTAIN) or not self._is_distinct(told[1], told[2]):
+        best, sure = self._fitted(surface, place, linear, search)
+        if sure.log_chance > np.log(_CERTAIN) or not self._is_distinct(sure.information, sure.other):
             return None
         if self._alike is None:  # elsewhere in its own frame
-            self._alike = float(self._fitted(self._own, self.place, np.eye(3), 2 * search)[3][2])
-        if not self._is_distinct(told[1], self._alike):
+            self._alike = self._fitted(self._own, self.place, np.eye(3), 2 * search)[1].other
+        if not self._is_distinct(sure.information, self._alike):
             return None
-        rows = np.where(off <= _MATCHED * np.sqrt(self._area), rows, -1)
-        return self._told(surface, rows, found[1])
+        rows = np.where(best.off <= _MATCHED * np.sqrt(self._area), best.rows, -1)
+        return self._told(surface, rows, best.linear)
 
     def followed(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
         """The pattern in another frame, where some of its points are known, (n,), others are -1; None where
         too few next to the place are. linear: (3, 3), about how it is turned."""
-        from .pattern_kernels import fill_pattern
+        from .pattern_search_kernels import fill_pattern
 
         if (rows[:_NEXT] >= 0).sum() < _NEXT // 2:
             return None
@@ -111,26 +115,22 @@ class PointPattern:
 
     def _fitted(
         self, surface: MomentSurface, place: Float, linear: Float, search: float
-    ) -> tuple[tuple[Float, Float], Rows, Float, Float]:
-        """Fit the pattern near a place: the place and map of the best fit, the rows, how far each is off, and
-        what `find_pattern` tells."""
-        from .pattern_kernels import find_pattern
+    ) -> tuple[PatternFit, PatternSearch]:
+        """Fit the pattern near a place: the best fit, and how sure it is."""
+        from .pattern_search_kernels import PatternArrays, find_pattern, no_fit
 
-        linear, place = np.array(linear, np.float64), np.array(place, np.float64)
-        count = len(self._offsets)
-        rows, off, told = np.full(count, -1), np.full(count, np.inf), np.empty(3)
+        best = no_fit(len(self._offsets))
+        best.linear[:], best.position[:] = linear, place
         reach = min(search * self._spacing, _FARTHEST * np.sqrt(self._area))
-        find_pattern(
-            self._offsets, self._frame, self._area, surface.held, reach, linear, place, rows, off, told
-        )
-        return (place, linear), rows, off, told
+        pattern = PatternArrays(self._offsets, self._frame, self._area)
+        return best, find_pattern(pattern, surface.held, best, reach)
 
     def _is_distinct(self, information: float, other: float) -> bool:
         return information - other >= _DISTINCT * len(self._offsets)
 
     def _weighted(self, surface: MomentSurface, rows: Rows, linear: Float) -> tuple[Float, Float]:
         """Fit the place and map of the pattern to the points that are known, the nearest above all."""
-        from .pattern_kernels import fit_map
+        from .pattern_fit_kernels import fit_map
 
         linear, place = linear.copy(), np.full(3, np.nan)
         weights = (rows >= 0) * self._closeness
@@ -141,7 +141,7 @@ class PointPattern:
 
     def _told(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
         """Drop points that are far off, and compute the covariance of the place from the others."""
-        from .pattern_kernels import FREE
+        from .pattern_fit_kernels import FREE
 
         place, linear = self._weighted(surface, rows, linear)
         targets = surface.held.points[rows]
@@ -187,7 +187,7 @@ class RecurringPoints:
             if self._around is None:
                 break
         if self._around is not None:
-            from .pattern_kernels import prove_matches
+            from .pattern_growth_kernels import prove_matches
 
             prove_matches(before.held, now.held, self._around, self._grown, self.maps, self.matches)
 
@@ -225,7 +225,7 @@ class RecurringPoints:
         """Grow matches from the pattern around a place, where it is found near another one."""
         from scipy.spatial import cKDTree
 
-        from .pattern_kernels import grow_matches
+        from .pattern_growth_kernels import MatchGrowth, grow_matches
 
         pattern = PointPattern.around(self._before, place)
         if pattern is None or self._grown[pattern.rows[0]] >= 0:
@@ -243,7 +243,11 @@ class RecurringPoints:
             nearest = cKDTree(here.points).query(here.points, min(_BESIDE, len(here.points)))[1]
             self._around = nearest.astype(np.int32)
         self._queued = grow_matches(
-            here, there, self._around, self._grown, self._taken, self.maps, self._queue, self._queued
+            here,
+            there,
+            self._around,
+            MatchGrowth(self._grown, self._taken, self.maps, self._queue),
+            self._queued,
         )
 
 
