@@ -137,12 +137,14 @@ def test_correspondences_are_signed_distances_to_the_surface() -> None:
     flat = surface(0, is_colored=False, is_flat=True)
     patch = patch_of(flat, np.zeros(3), 6.0, 200)
     assert patch is not None
-    matches = no_correspondences(len(patch.local), 0)
+    matches = no_correspondences(len(patch.local), 1)
     moved = MovedPatch(np.array([0.0, 0.0, 0.4]), np.eye(3), np.zeros(12))
     found, reach = find_correspondences(patch, flat.held, moved, 3 * SPACING, matches)
     assert found == matches.is_matched.sum() > 0.9 * len(patch.local)
     assert reach > 0
-    distances = matches.distances[matches.is_matched] * np.sign(matches.normals[matches.is_matched, 2])
+    distances = matches.residuals[matches.is_matched, 0] * np.sign(
+        matches.gradients[matches.is_matched, 0, 2]
+    )
     assert np.abs(distances - 0.4).max() < 0.1
     none, _ = find_correspondences(
         patch, flat.held, MovedPatch(np.array([0.0, 0.0, 90.0]), np.eye(3), np.zeros(12)), 1.0, matches
@@ -158,7 +160,7 @@ def test_factors_are_derivatives_of_the_residuals(free: int) -> None:
         find_correspondences,
         no_correspondences,
     )
-    from viewer.analysis.tracking.factor_kernels import RIGID, add_factors, factor, unknowns
+    from viewer.analysis.tracking.factor_kernels import RIGID, add_factors, unknowns
     from viewer.analysis.tracking.robust_kernels import weigh
 
     before, after = surface(0), surface(1)
@@ -166,7 +168,7 @@ def test_factors_are_derivatives_of_the_residuals(free: int) -> None:
     patch = patch_of(before, path[0], 8.0, 150)
     assert patch is not None
     moved = MovedPatch(path[1] + 0.1, np.eye(3), np.zeros(12))
-    matches = no_correspondences(len(patch.local), 3)
+    matches = no_correspondences(len(patch.local), 4)
     find_correspondences(patch, after.held, moved, 4 * SPACING, matches)
     weigh(matches, np.full(4, 1e-3))
     is_free = np.arange(12) < free
@@ -174,11 +176,10 @@ def test_factors_are_derivatives_of_the_residuals(free: int) -> None:
     assert count == RIGID + free
     system, side = np.zeros((count, count)), np.zeros((count, 1))
     add_factors(patch, moved, matches, is_free, system, side)
-    expected = np.zeros(3)
-    for i in np.flatnonzero(matches.is_matched):
-        for term in range(4):
-            weight, residual, there, own = factor(patch, matches, i, term)
-            if matches.weights[i, 0] > 0:
-                expected -= weight * residual * 0.5 * (np.array(there) + own)
+    weights = patch.closeness[:, None] * matches.weights[:, :1] * np.ones((1, 4)) / matches.scales**2
+    weights[:, 1:] *= matches.weights[:, 1:]
+    middle = 0.5 * (matches.gradients + matches.own_gradients)
+    rows = matches.is_matched
+    expected = -((weights * matches.residuals)[rows, :, None] * middle[rows]).sum(axis=(0, 1))
     np.testing.assert_allclose(side[:3, 0], expected, rtol=1e-9)
     assert np.linalg.eigvalsh(np.tril(system) + np.tril(system, -1).T).min() > -1e-9 * np.abs(system).max()

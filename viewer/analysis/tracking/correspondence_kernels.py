@@ -37,31 +37,33 @@ class MovedPatch(NamedTuple):
 
 
 class Correspondences(NamedTuple):
-    """The counterparts of the n points of a patch on a surface, of C channels of colour that are compared.
+    """The counterparts of the n points of a patch on a surface.
 
-    Values of points that are not matched have no meaning.
+    Of each there are 1 + C residuals: 0 is the distance above the surface; the others are the colours of C
+    channels on the surface, less those of the patch. Values of points that are not matched have no meaning.
     """
 
     is_matched: NDArray[np.bool_]  # (n,)
     arms: Float  # (n, 3), from the patch's centre to each point, as it is moved
-    distances: Float  # (n,), of the points above the surface
-    normals: Float  # (n, 3) of the surface
-    own_normals: Float  # (n, 3) of the patch, as it is moved
-    color_steps: Float  # (n, C): colours of the surface less those of the patch
-    gradients: Float  # (n, C, 3) of colours on the surface
-    own_gradients: Float  # (n, C, 3) of the patch, as it is moved
-    scales: Float  # (1 + C,), standard deviations of distances and steps, see `robust_kernels`
-    weights: Float  # (n, 1 + C), robust weights of distances and steps
+    residuals: Float  # (n, 1 + C)
+    gradients: Float  # (n, 1 + C, 3) on the surface: its normal, and how colours grow
+    own_gradients: Float  # (n, 1 + C, 3) of the patch, as it is moved
+    scales: Float  # (1 + C,), standard deviations of residuals, see `robust_kernels`
+    weights: Float  # (n, 1 + C), robust weights
 
 
 @compiled
-def no_correspondences(count: int, channels: int) -> Correspondences:
+def no_correspondences(count: int, residuals: int) -> Correspondences:
     """Room for the correspondences of so many points."""
     return Correspondences(
-        np.empty(count, np.bool_), np.empty((count, 3)), np.empty(count), np.empty((count, 3)),
-        np.empty((count, 3)), np.empty((count, channels)), np.empty((count, channels, 3)),
-        np.empty((count, channels, 3)), np.empty(1 + channels), np.empty((count, 1 + channels)),
-    )  # fmt: skip
+        np.empty(count, np.bool_),
+        np.empty((count, 3)),
+        np.empty((count, residuals)),
+        np.empty((count, residuals, 3)),
+        np.empty((count, residuals, 3)),
+        np.empty(residuals),
+        np.empty((count, residuals)),
+    )
 
 
 @compiled
@@ -91,50 +93,52 @@ def find_correspondences(
     search: how far that may be, scan units. Gives how many points are matched, and the sum of the reaches of
     their parabolas.
     """
+    is_matched, arms, residuals, gradients, own_gradients, _, _ = out  # taken out once: it counts references
+    points, frames, parabolas, reaches = surface.points, surface.frames, surface.parabolas, surface.reaches
+    own_normals, colors, slopes, position = patch.normals, patch.colors, patch.gradients, moved.position
     axes = np.empty((3, 3))
     moved_axes(patch, moved.rotation, axes)
     local = deformed_points(patch, moved.deformation)
     is_signed = len(surface.normals) > 0
     found, reach = 0, 0.0
     for i in range(len(local)):
-        out.is_matched[i] = False
+        is_matched[i] = False
         for k in range(3):
-            out.arms[i, k] = along_axis(local[i], axes, k)
-        x, y, z = out.arms[i, 0], out.arms[i, 1], out.arms[i, 2]
-        x, y, z = moved.position[0] + x, moved.position[1] + y, moved.position[2] + z
+            arms[i, k] = along_axis(local[i], axes, k)
+        x, y, z = position[0] + arms[i, 0], position[1] + arms[i, 1], position[2] + arms[i, 2]
         row = nearest_within(surface, x, y, z, search)
         if row < 0 or not fit_at(surface, row):
             continue
-        f, p = surface.frames[row], surface.parabolas[row]
-        x, y, z = x - surface.points[row, 0], y - surface.points[row, 1], z - surface.points[row, 2]
+        f, p = frames[row], parabolas[row]
+        x, y, z = x - points[row, 0], y - points[row, 1], z - points[row, 2]
         u = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z
         v = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z
         w = f[2, 0] * x + f[2, 1] * y + f[2, 2] * z
-        if u * u + v * v > (_HOLE * (surface.reaches[row] * OWN_SPACING)) ** 2:
+        if u * u + v * v > (_HOLE * (reaches[row] * OWN_SPACING)) ** 2:
             continue
         slope_u, slope_v = parabola_slopes(p[0], u, v)
         slant = np.sqrt(1.0 + slope_u * slope_u + slope_v * slope_v)
         facing = 0.0
         for k in range(3):
-            own = along_axis(patch.normals[i], axes, k)
-            out.own_normals[i, k] = own
-            out.normals[i, k] = (f[2, k] - slope_u * f[0, k] - slope_v * f[1, k]) / slant
-            facing += own * out.normals[i, k]
+            own = along_axis(own_normals[i], axes, k)
+            own_gradients[i, 0, k] = own
+            gradients[i, 0, k] = (f[2, k] - slope_u * f[0, k] - slope_v * f[1, k]) / slant
+            facing += own * gradients[i, 0, k]
         sign = 1.0
         if not is_signed and facing < 0.0:
             sign, facing = -1.0, -facing
         if facing < _FACING:
             continue
         for k in range(3):
-            out.normals[i, k] *= sign
-        out.distances[i] = sign * (w - parabola_height(p[0], u, v)) / slant
-        for c in range(out.color_steps.shape[1]):
-            out.color_steps[i, c] = parabola_height(p[1 + c], u, v) - patch.colors[i, c]
-            slope_u, slope_v = parabola_slopes(p[1 + c], u, v)
+            gradients[i, 0, k] *= sign
+        residuals[i, 0] = sign * (w - parabola_height(p[0], u, v)) / slant
+        for c in range(1, residuals.shape[1]):
+            residuals[i, c] = parabola_height(p[c], u, v) - colors[i, c - 1]
+            slope_u, slope_v = parabola_slopes(p[c], u, v)
             for k in range(3):
-                out.gradients[i, c, k] = slope_u * f[0, k] + slope_v * f[1, k]
-                out.own_gradients[i, c, k] = along_axis(patch.gradients[i, c], axes, k)
-        out.is_matched[i] = True
+                gradients[i, c, k] = slope_u * f[0, k] + slope_v * f[1, k]
+                own_gradients[i, c, k] = along_axis(slopes[i, c - 1], axes, k)
+        is_matched[i] = True
         found += 1
-        reach += surface.reaches[row]
+        reach += reaches[row]
     return found, reach

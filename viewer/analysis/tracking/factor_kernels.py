@@ -7,8 +7,6 @@ and those modes of deformation that are free. Compiled by numba; see `register_k
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,59 +26,40 @@ def unknowns(is_free: NDArray[np.bool_]) -> int:
 
 
 @inlined
-def point_jacobian(
-    patch: SurfacePatch, i: int, axes: Float, arms: Float, is_free: NDArray[np.bool_], modes: Float,
-    jacobian: Float,
-) -> None:  # fmt: skip
-    """Fill how a patch's point moves with each unknown, (F, 3).
-
-    axes: (3, 3), by row, of the patch as it is moved. arms: (n, 3), from its centre to the points.
-    modes: (12, 3), scratch.
-    """
-    x, y, z = arms[i, 0], arms[i, 1], arms[i, 2]
+def rigid_jacobian(x: float, y: float, z: float, jacobian: Float) -> None:
+    """Fill how a point, (x, y, z) from the centre, moves with shift and turn: the first rows of (F, 3)."""
     for k in range(3):
         for q in range(3):
             jacobian[k, q] = 1.0 if k == q else 0.0
     jacobian[3, 0], jacobian[3, 1], jacobian[3, 2] = 0.0, -z, y
     jacobian[4, 0], jacobian[4, 1], jacobian[4, 2] = z, 0.0, -x
     jacobian[5, 0], jacobian[5, 1], jacobian[5, 2] = -y, x, 0.0
-    if len(jacobian) == RIGID:
-        return
-    deformation_modes(patch.local[i, 0] / patch.radius, patch.local[i, 1] / patch.radius, modes)
+
+
+@inlined
+def modes_jacobian(
+    u: float, v: float, radius: float, axes: Float, is_free: NDArray[np.bool_], modes: Float, jacobian: Float
+) -> None:
+    """Fill how a point of a patch, at (u, v) radii from its centre, moves with each mode: the other rows.
+
+    axes: (3, 3), by row, of the patch as it is moved. modes: (12, 3), scratch.
+    """
+    deformation_modes(u, v, modes)
     n = RIGID
     for b in range(MODES):
         if is_free[b]:
             for k in range(3):
-                jacobian[n, k] = patch.radius * (
+                jacobian[n, k] = radius * (
                     modes[b, 0] * axes[0, k] + modes[b, 1] * axes[1, k] + modes[b, 2] * axes[2, k]
                 )
             n += 1
 
 
-class Factor(NamedTuple):
-    """A residual of a point, and how it grows with the point's position."""
-
-    weight: float
-    residual: float
-    there: tuple[float, float, float]  # by the surface
-    own: tuple[float, float, float]  # by the patch
-
-
 @inlined
-def factor(patch: SurfacePatch, matches: Correspondences, i: int, term: int) -> Factor:
-    """The factor of a point's distance, term 0, or of its step in channel n - 1, term n."""
-    weight = patch.closeness[i] * matches.weights[i, 0]
-    if term == 0:
-        a, b = matches.normals, matches.own_normals
-        return Factor(
-            weight / matches.scales[0] ** 2, matches.distances[i],
-            (a[i, 0], a[i, 1], a[i, 2]), (b[i, 0], b[i, 1], b[i, 2]),
-        )  # fmt: skip
-    c, d, e = term - 1, matches.gradients, matches.own_gradients
-    return Factor(
-        weight * matches.weights[i, term] / matches.scales[term] ** 2, matches.color_steps[i, c],
-        (d[i, c, 0], d[i, c, 1], d[i, c, 2]), (e[i, c, 0], e[i, c, 1], e[i, c, 2]),
-    )  # fmt: skip
+def factor_weight(closeness: float, weights: Float, i: int, term: int, scale: float) -> float:
+    """The weight of a residual; a colour counts as far as its distance does. weights: (n, 1 + C)."""
+    weight = closeness * weights[i, 0]
+    return (weight if term == 0 else weight * weights[i, term]) / scale**2
 
 
 @compiled
@@ -96,15 +75,22 @@ def add_factors(
     axes, modes = np.empty((3, 3)), np.empty((MODES, 3))
     jacobian, along = np.zeros((count, 3)), np.empty(count)
     moved_axes(patch, moved.rotation, axes)
-    for i in range(len(patch.local)):
-        if not (matches.is_matched[i] and matches.weights[i, 0] > 0.0):
+    is_matched, arms, residuals, gradients, own_gradients, scales, weights = matches
+    local, radius, closeness = patch.local, patch.radius, patch.closeness
+    for i in range(len(local)):
+        if not (is_matched[i] and weights[i, 0] > 0.0):
             continue
-        point_jacobian(patch, i, axes, matches.arms, is_free, modes, jacobian)
-        for term in range(len(matches.scales)):
-            weight, residual, there, own = factor(patch, matches, i, term)
+        u, v = local[i, 0] / radius, local[i, 1] / radius
+        rigid_jacobian(arms[i, 0], arms[i, 1], arms[i, 2], jacobian)
+        if count > RIGID:
+            modes_jacobian(u, v, radius, axes, is_free, modes, jacobian)
+        for term in range(len(scales)):
+            weight = factor_weight(closeness[i], weights, i, term, scales[term])
             if weight == 0.0:
                 continue
-            x, y, z = 0.5 * (there[0] + own[0]), 0.5 * (there[1] + own[1]), 0.5 * (there[2] + own[2])
+            ax, ay, az = gradients[i, term, 0], gradients[i, term, 1], gradients[i, term, 2]
+            bx, by, bz = own_gradients[i, term, 0], own_gradients[i, term, 1], own_gradients[i, term, 2]
+            x, y, z, residual = 0.5 * (ax + bx), 0.5 * (ay + by), 0.5 * (az + bz), residuals[i, term]
             for p in range(count):
                 along[p] = jacobian[p, 0] * x + jacobian[p, 1] * y + jacobian[p, 2] * z
                 side[p, 0] -= weight * along[p] * residual
@@ -126,21 +112,26 @@ def information(
     found, jacobian = np.zeros((count, count)), np.zeros((count, 3))
     along_there, along_own = np.empty(count), np.empty(count)
     moved_axes(patch, moved.rotation, axes)
-    for i in range(len(patch.local)):
-        if not (matches.is_matched[i] and matches.weights[i, 0] > 0.0):
+    is_matched, arms, _, gradients, own_gradients, scales, weights = matches
+    local, radius, closeness = patch.local, patch.radius, patch.closeness
+    for i in range(len(local)):
+        if not (is_matched[i] and weights[i, 0] > 0.0):
             continue
-        point_jacobian(patch, i, axes, matches.arms, is_free, modes, jacobian)
-        for term in range(len(matches.scales)):
-            weight, _, there, own = factor(patch, matches, i, term)
+        u, v = local[i, 0] / radius, local[i, 1] / radius
+        rigid_jacobian(arms[i, 0], arms[i, 1], arms[i, 2], jacobian)
+        if count > RIGID:
+            modes_jacobian(u, v, radius, axes, is_free, modes, jacobian)
+        for term in range(len(scales)):
+            weight = factor_weight(closeness[i], weights, i, term, scales[term])
             if weight == 0.0:
                 continue
             if term == 0:
                 weight /= alike
+            ax, ay, az = gradients[i, term, 0], gradients[i, term, 1], gradients[i, term, 2]
+            bx, by, bz = own_gradients[i, term, 0], own_gradients[i, term, 1], own_gradients[i, term, 2]
             for p in range(count):
-                along_there[p] = (
-                    jacobian[p, 0] * there[0] + jacobian[p, 1] * there[1] + jacobian[p, 2] * there[2]
-                )
-                along_own[p] = jacobian[p, 0] * own[0] + jacobian[p, 1] * own[1] + jacobian[p, 2] * own[2]
+                along_there[p] = jacobian[p, 0] * ax + jacobian[p, 1] * ay + jacobian[p, 2] * az
+                along_own[p] = jacobian[p, 0] * bx + jacobian[p, 1] * by + jacobian[p, 2] * bz
                 for q in range(p + 1):
                     found[p, q] += (
                         0.5 * weight * (along_there[p] * along_own[q] + along_own[p] * along_there[q])

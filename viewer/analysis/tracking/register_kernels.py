@@ -62,7 +62,7 @@ def register_patch(
     count = unknowns(is_free)
     start, turned = moved.position.copy(), np.zeros(3)
     system, side = np.empty((count, count)), np.empty((count, 1))
-    matches = no_correspondences(len(patch.local), len(rules.least_scales) - 1)
+    matches = no_correspondences(len(patch.local), len(rules.least_scales))
     failed = Registration(0, np.full((3, 3), np.nan), 0.0, 0.0, np.nan)
     rounds, is_last = 0, False
     while True:
@@ -192,7 +192,7 @@ def _judged(
         middle += is_near
         if matches.is_matched[i]:
             matched += closeness * weight
-            squares += closeness * weight * matches.distances[i] ** 2
+            squares += closeness * weight * matches.residuals[i, 0] ** 2
             middle_matched += is_near * (weight > _BELONGS)
     return Registration(
         rounds, covariance, matched / total,

@@ -39,21 +39,14 @@ def weigh(matches: Correspondences, least: Float) -> None:
 
     least: (1 + C,), deviations that residuals have at least.
     """
-    count, channels = matches.color_steps.shape
-    residuals, rows = np.empty(count), np.flatnonzero(matches.is_matched)
-    for n in range(len(rows)):
-        residuals[n] = matches.distances[rows[n]]
-    residuals = residuals[: len(rows)]
-    scale = max(robust_scale(residuals, 0.0), least[0])
-    matches.scales[0] = scale
-    for n in range(len(rows)):
-        matches.weights[rows[n], 0] = tukey_weight(residuals[n], scale)
-    for c in range(channels):
+    is_matched, _, residuals, _, _, scales, weights = matches
+    rows = np.flatnonzero(is_matched)
+    values = np.empty(len(rows))
+    for term in range(len(scales)):
         for n in range(len(rows)):
-            residuals[n] = matches.color_steps[rows[n], c]
-        shift = np.median(residuals)
-        scale = max(robust_scale(residuals, shift), least[1 + c])
-        matches.scales[1 + c] = scale
+            values[n] = residuals[rows[n], term]
+        shift = np.median(values) if term > 0 else 0.0
+        scales[term] = max(robust_scale(values, shift), least[term])
         for n in range(len(rows)):
-            matches.color_steps[rows[n], c] -= shift
-            matches.weights[rows[n], 1 + c] = tukey_weight(residuals[n] - shift, scale)
+            residuals[rows[n], term] = values[n] - shift
+            weights[rows[n], term] = tukey_weight(values[n] - shift, scales[term])
