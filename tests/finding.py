@@ -93,7 +93,7 @@ class Finding(plain.PointSquares):
         if (name := surface.wanted) is not None:
             values = np.full(len(pose.cloud), UNSEEN)
             values[rows[is_seen]] = numbers(pose.cloud)[name][rows[is_seen]]
-            surface.give(surface.keep(_Found).write(values))
+            surface.give(surface.cached(_Found).write(values))
         return refinable
 
 

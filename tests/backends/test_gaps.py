@@ -38,7 +38,7 @@ TURNS = np.arange(8) * np.pi / 4
 def found(renderer: Renderer, cloud: PointCloud, *, steps: bool = False) -> NDArray[np.float32]:
     """The radii (N,), 0 where a point has none."""
     pose = renderer.resident(Pose(0, 0.0, "gaps", cloud))
-    gaps = pose.keep(GapRadii)
+    gaps = pose.cached(GapRadii)
     while not gaps.find(pose, wait=not steps):
         assert gaps.texels is None
     if gaps.texels is None:

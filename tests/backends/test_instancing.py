@@ -317,7 +317,7 @@ def test_lists_belong_to_the_surface_and_follow_the_poses(renderer: Renderer) ->
         pose = Pose(0, 0.0, "test", sphere(count))
         params = backend("surfels").params({"instancing": "tiles"})
         render_frame(renderer, Request(pose, CAMERAS["perspective"], "surfels", params), surface)
-        lists = surface.keep(TileLists)
+        lists = surface.cached(TileLists)
         assert lists.length, "those that were drawn with"
         sizes.append(lists.nbytes)
         assert surface.nbytes >= sizes[-1] >= 40 * count

@@ -17,7 +17,7 @@ from viewer.camera import Camera
 from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
-from viewer.splatting.packed import WAYS
+from viewer.splatting.packed import VARIANTS
 from viewer.splatting.packed import draw_splats as draw_all
 
 # As the surfels backend draws them, which makes none smaller.
@@ -26,7 +26,7 @@ Draw = Callable[..., Surface]
 CLOUDS = {"round": CLOUD, "elliptical": ELLIPSES}
 LOOK = Look(light="head")
 every_cloud = pytest.mark.parametrize("cloud", CLOUDS.values(), ids=CLOUDS)
-every_way = pytest.mark.parametrize("way", WAYS)
+every_way = pytest.mark.parametrize("way", VARIANTS)
 every_number = pytest.mark.parametrize("passes", ["one", "two"])
 
 

@@ -21,7 +21,7 @@ from viewer.gpu import gl
 from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
-from viewer.splatting.packed import WAYS, _ByRow, draw_splats
+from viewer.splatting.packed import VARIANTS, _ByRow, draw_splats
 
 Draw = Callable[..., Surface]
 SIZE = (320, 240)
@@ -31,7 +31,7 @@ ROW_OF_BALLS = PointCloud.from_arrays(
     np.concatenate([sphere(1500, center=center).world() for center in CENTERS])
 )
 ALONG_IT = Camera((-1.2, 0.1, 4.5), (0.0, 0.3, -2.4), fov_y=45)
-every_way = pytest.mark.parametrize("way", WAYS)
+every_way = pytest.mark.parametrize("way", VARIANTS)
 every_number = pytest.mark.parametrize("passes", ["one", "two"])
 
 
@@ -97,7 +97,7 @@ def test_all_ways_agree(draw: Draw, projection: str, elliptical: bool, passes: s
     splats = packed.estimate(ROW_OF_BALLS, camera, SIZE)
     two = passes == "two"
     first, *others = (
-        splatted(draw, ROW_OF_BALLS, splats, camera, elliptical, instancing=way, two=two) for way in WAYS
+        splatted(draw, ROW_OF_BALLS, splats, camera, elliptical, instancing=way, two=two) for way in VARIANTS
     )
     for other in others:
         assert (first.row != other.row).mean() < 1e-3
@@ -110,7 +110,7 @@ def test_tiles_that_are_not_shown_again_are_those_that_stay(draw: Draw) -> None:
     refined = splatted(draw, ROW_OF_BALLS, splats, ALONG_IT, instancing="tiles")
     counts = refined.stats.counted["refined tiles"]()
     assert 0 < counts["again"] < 0.8 * counts["in"]
-    texels = refined.keep(_ByRow).reserve("radii", len(ROW_OF_BALLS), gl.R32F)
+    texels = refined.cached(_ByRow).reserve("radii", len(ROW_OF_BALLS), gl.R32F)
     radii = np.frombuffer(texels.buffer.read(), np.uint32)
     words = splats.words.copy()
     words[splats.rows, 1] = radii[splats.rows]
@@ -137,7 +137,7 @@ def test_large_splats_among_small_ones(draw: Draw, passes: str) -> None:
             packed.backend(splats, partial(draw_splats, instancing=way, two=passes == "two")),
             LOOK,
         )
-        for way in WAYS
+        for way in VARIANTS
     ]
     assert "rasterised" in "".join(pictures[0].stats.skipped.values())
     for picture in pictures:

@@ -93,7 +93,7 @@ def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, ord
     surface = Surface(renderer.gpu, SIZE)
     request = request_of(cloud, looking(cloud, 0))
     in_order(renderer, request, surface)
-    boxes = renderer.resident(request.pose).keep(culling.CulledChunks)._boxes
+    boxes = renderer.resident(request.pose).cached(culling.CulledChunks)._boxes
     kinds = set()
     for camera in (
         looking(cloud, 0), looking(cloud, 70, 0.45), looking(cloud, 140, 0.1), looking(cloud, 30, fov_y=9.0),

@@ -45,7 +45,7 @@ from viewer.resources import resource_path
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting.amplify import FEEDS
-from viewer.splatting.packed import WAYS, draw_splats
+from viewer.splatting.packed import VARIANTS, draw_splats
 
 TESTS_OWN = str(Path(__file__).resolve().parents[1])  # where tests have shaders of their own
 SIZE = (96, 64)
@@ -205,7 +205,7 @@ def draw_packed(renderer: Renderer, whole: bool) -> None:
             bare = PointCloud.from_arrays(cloud.positions, colors=colors)
             pose = Pose(0, 0.0, "test", bare)
             camera = Camera.orbit(pose.bounds, **CAMERA)
-            for way, two, refine in product(WAYS, (True, False), (True, False)):
+            for way, two, refine in product(VARIANTS, (True, False), (True, False)):
                 drawing = partial(draw_splats, instancing=way, two=two, refine=refine)
                 render_frame(renderer, Request(pose, camera, packed.backend(few, drawing, ellipses)), surface)
 

@@ -84,7 +84,7 @@ def test_gaps_of_a_pixel_are_closed_and_nothing_else(renderer: Renderer) -> None
         surface = whole(renderer, seen(pose))
         depth, row = closed(surface, step)
         assert (row != surface.row).any()
-        surface.keep(ClosedGaps).close(surface, step)
+        surface.cached(ClosedGaps).close(surface, step)
         np.testing.assert_array_equal(surface.depth, depth)
         np.testing.assert_array_equal(surface.row, row)
 
@@ -111,7 +111,7 @@ def test_a_picture_is_of_what_the_one_before_showed_and_of_those_in_turn(
 ) -> None:
     surface = whole(renderer, seen(pose, point_size=point_size))
     stride = stride_of(SHARE)
-    kept = renderer.resident(pose).keep(KeptPoints)
+    kept = renderer.resident(pose).cached(KeptPoints)
     for step in range(1, 5):
         before = np.unique(surface.row[surface.row != NOTHING])
         turn = kept._turn + 1

@@ -72,13 +72,13 @@ def read(samples: RangeSamples) -> list[list[Image]]:
         own = None if xy is None else xy[part].reshape(*shape, 2)
         return Image(depths[part].reshape(shape), looks[part].reshape(*shape, 4), own)
 
-    return [[image(level) for level in levels] for levels in samples.places]
+    return [[image(level) for level in levels] for levels in samples.view_levels]
 
 
 def read_tiles(samples: RangeSamples) -> list[NDArray[np.float32]]:
     """The tiles of all levels of all views, (N, 4 RANGE_TILE_TEXELS) each."""
     texels = np.frombuffer(samples.tiles.buffer.read(), np.float32).reshape(-1, 4 * RANGE_TILE_TEXELS)
-    places = [level for levels in samples.places for level in levels]
+    places = [level for levels in samples.view_levels for level in levels]
     return [texels[level.first_tile :][: level.tiles] for level in places]
 
 
@@ -313,7 +313,7 @@ def probe(
     samples: RangeSamples, view: View, number: int, level: int, tiles: bool = False, **uniforms: float
 ) -> NDArray:
     """What range_probe.comp finds of each sample, (H, W, 5, 4), or of each tile, (N, 2, 4)."""
-    gpu, place = samples._gpu, samples.places[number][level]
+    gpu, place = samples._gpu, samples.view_levels[number][level]
     block = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
     block.write(ViewBlock.of(view))
     block.bind()
@@ -322,7 +322,7 @@ def probe(
     program = gpu.compute(PROBE, {**samples.defines, "PROBE_TILES": int(tiles)})
     found = gpu.ctx.buffer(reserve=16 * texels * count)
     found.bind_to_storage_buffer(0)
-    gpu.set(program, number=number, level=level, view_count=len(samples.places), target=number)
+    gpu.set(program, number=number, level=level, view_count=len(samples.view_levels), target=number)
     gpu.set(program, **uniforms)
     gpu.dispatch(program, count)
     out = np.frombuffer(found.read(), np.float32).reshape(-1, texels, 4)
@@ -406,7 +406,7 @@ def test_numbers_of_samples_are_decoded(renderer: Renderer) -> None:
     views = (*VIEWS, stepped_view((1, 1)), stepped_view((33, 18)))
     samples = held(renderer.gpu, views)
     before = 0
-    for number, levels in enumerate(samples.places):
+    for number, levels in enumerate(samples.view_levels):
         for level, place in enumerate(levels):
             found = probe(samples, seen_by(VIEWS[0]), number, level)
             assert (found[..., 4, :2] == 1).all()
@@ -532,7 +532,7 @@ def test_no_tile_is_left_out_that_shows_something(
     counts = {"outside": 0, "invisible": 0, "away": 0, "all away": 0, "empty": 0, "tiles": 0}
     for view in some_views(rng, np.median(places, axis=0), 2.0, 24):
         for level in (0, 1, 3):
-            place, number = samples.places[0][level], tiles_of(samples.places[0][level])
+            place, number = samples.view_levels[0][level], tiles_of(samples.view_levels[0][level])
             found, margin = probe(samples, view, 0, level), float(rng.choice([0, 5]))
             there = found[..., 0, 3] > 0
             tiles = probe(samples, view, 0, level, tiles=True, margin=margin)
@@ -570,7 +570,7 @@ def test_pixels_between_samples_are_within_what_is_told(renderer: Renderer) -> N
     samples = held(renderer.gpu, (own,))
     for view in some_views(np.random.default_rng(4), np.median(own.positions(), axis=0), 2.0, 12):
         for level in (0, 2):
-            number, found = tiles_of(samples.places[0][level]), probe(samples, view, 0, level)
+            number, found = tiles_of(samples.view_levels[0][level]), probe(samples, view, 0, level)
             told = probe(samples, view, 0, level, tiles=True)[:, 1].astype(float)
             at, there = found[..., 1, :3].astype(float), found[..., 0, 3] > 0
             depth = -at[..., 2]
@@ -639,7 +639,7 @@ def test_a_pose_without_range_views_has_no_samples(renderer: Renderer) -> None:
 def test_levels_and_bytes(renderer: Renderer) -> None:
     samples = held(renderer.gpu, VIEWS)
     assert samples.levels == 6
-    assert [level.size for level in samples.places[0]] == [
+    assert [level.size for level in samples.view_levels[0]] == [
         (47, 39),
         (24, 20),
         (12, 10),
@@ -652,7 +652,7 @@ def test_levels_and_bytes(renderer: Renderer) -> None:
     large = held(renderer.gpu, (stepped_view((400, 300)),))
     assert large.count == 120_000
     assert large.bytes_per_sample == large.nbytes / large.count < 8 * 4 / 3 + 0.5
-    assert all(level.first % 64 == 0 for levels in samples.places for level in levels)
+    assert all(level.first % 64 == 0 for levels in samples.view_levels for level in levels)
 
 
 def test_far_from_the_world_s_zero_nothing_is_lost(renderer: Renderer) -> None:

@@ -261,7 +261,7 @@ def test_what_never_stays_hidden_is_not_looked_for_each_time(
     for turn in range(12):
         request = request_of(pose, looking(cloud, 180 * (turn % 2 == 0)))
         render_frame(renderer, request, surface)
-        pauses.append(surface.keep(splat_culling._Pictures).pause)
+        pauses.append(surface.cached(splat_culling._Pictures).pause)
         assert_same(renderer, request, surface)
     assert max(pauses) >= 4, pauses
     assert 0 in pauses
@@ -312,12 +312,12 @@ def test_chunks_that_face_away_hold_no_splat_that_faces_the_eye(
     points = rng.normal(size=(count // chunk, 3)).repeat(chunk, axis=0) + 0.2 * rng.normal(size=(count, 3))
     cloud = PointCloud.from_arrays(points, normals=normals, radii=np.full(count, 0.05), origin=np.zeros(3))
     gpu_pose = renderer.resident(Pose(0, 0.0, "cones", cloud))
-    gpu_pose.keep(chunks.Chunks)._order = chunks.in_file_order(cloud)
+    gpu_pose.cached(chunks.Chunks)._order = chunks.in_file_order(cloud)
     kind: Any = "perspective" if perspective else "orthographic"
     surface, eye = Surface(renderer.gpu, SIZE), rng.normal(size=3) * 3
     camera = Camera(tuple(eye), tuple(rng.normal(size=3)), (0, 1, 0), kind, near=0.01, far=100.0)
     surface.start(gpu_pose, View.of(camera, SIZE, np.zeros(3), cloud.bounds()))
-    told = gpu_pose.keep(splat_culling.SplatChunks)
+    told = gpu_pose.cached(splat_culling.SplatChunks)
     told.measure(Points(gpu_pose, True, count))
     splats = Splats(1.0, 0.0, 0.7, True, mask_limit=1.0, falloff=1.0, enlarge=1.0, epsilon=1.0)
     told.test(surface, 0, splat_culling.splat_margins(splats, 0.05, told.boxes.slack, True, 0))
@@ -408,12 +408,12 @@ def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, per
         radii = rng.uniform(0.01, 0.05, count)
         cloud = PointCloud.from_arrays(points, normals=normals, radii=radii, origin=np.zeros(3))
         pose = renderer.resident(Pose(0, 0.0, f"twin {number}", cloud))
-        pose.keep(chunks.Chunks)._order = chunks.in_file_order(cloud)
+        pose.cached(chunks.Chunks)._order = chunks.in_file_order(cloud)
         eye, kind = rng.normal(size=3) * 4, "perspective" if perspective else "orthographic"
         camera = Camera(tuple(eye), tuple(rng.normal(size=3)), (0, 1, 0), kind, near=0.6, far=7.0)
         surface = Surface(renderer.gpu, SIZE)
         surface.start(pose, View.of(camera, SIZE, np.zeros(3), cloud.bounds()))
-        told = pose.keep(splat_culling.SplatChunks)
+        told = pose.cached(splat_culling.SplatChunks)
         told.measure(Points(pose, True, count))
         epsilon = (1.0, 30.0)[number % 2]
         scale, culls = rng.uniform(0.5, 2), number != 1
@@ -422,7 +422,7 @@ def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, per
         margins = splat_culling.splat_margins(splats, 0.05, told.boxes.slack, is_even, 5 * number)
         twin = Twin(surface.view, margins, told)
         before = 16 * rng.integers(0, 2, told.boxes.chunks).astype(np.uint32)
-        surface.keep(culling.SeenChunks).of(told.boxes).write(before)
+        surface.cached(culling.SeenChunks).of(told.boxes).write(before)
         told.test(surface, culling.START, margins)
         first = told.boxes.seen(surface)
         expected = np.array([twin.first_word(place, int(word)) for place, word in enumerate(before)])

@@ -91,7 +91,7 @@ def estimate_normals(
     camera = camera or first_camera(pose.views, bounds, size[0] / size[1], pose.upright)
     view = View.of(camera, size, resident.origin, bounds)
     surface.start(resident, view)
-    found = surface.keep(Neighborhoods)
+    found = surface.cached(Neighborhoods)
     alone = UNKNOWN if expansions is None else 2.0**expansions
     found.find(resident, surface, view, Search(k, hidden_neighbors, False, growth, alone, adaptive=adaptive))
     return _read(resident.cloud, found)

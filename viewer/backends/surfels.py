@@ -40,7 +40,7 @@ _SEEN_THROUGH = (
 )
 
 
-_WAYS = ("tiles", *FEEDS)
+_VARIANTS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
 _HIDING = ("one", *_TWO)  # those in which nothing shows through what lies before it
 # A uniform radius of 1.5 times the spacing closes a surface that is evenly covered.
@@ -121,7 +121,7 @@ class Params:
         "How the GPU draws splats. auto: the fastest way on this device; tiles: in a compute shader; the "
         "others draw quads, from a geometry shader, uniform blocks, buffer textures, vertex attributes or"
         " pulled vertices",
-        choices=("auto", *_WAYS),
+        choices=("auto", *_VARIANTS),
         affects="speed",
         group="Speed",
     )
@@ -235,7 +235,7 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
     """How large discs are, and whether that is known as it shall be: else one size is for all, meanwhile."""
     own, known = frame.params.radius != "uniform", True
     if frame.params.radius == "auto" and pose.stored.axes is None:
-        gaps = pose.keep(GapRadii)
+        gaps = pose.cached(GapRadii)
         if frame.moving and pose.gpu.software and gaps.presumes_none(pose):
             surface.stats.simplified = True
             surface.stats.skipped["gaps"] = "playback runs, and the radii of the last pose left no gaps"
@@ -345,11 +345,13 @@ def _instancing(params: Params, surface: Surface) -> str:
     """How points become splats; in one pass and in two this need not be the same."""
     like = Params(passes="two" if params.passes in _TWO else "one")
 
-    def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
         points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {name: partial(_splat, points, surface, like, name, 0.0) for name in _WAYS}
+        return {name: partial(_splat, points, surface, like, name, 0.0) for name in _VARIANTS}
 
-    return instancing_for(surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _WAYS, ways)
+    return instancing_for(
+        surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _VARIANTS, variants
+    )
 
 
 def _has_radii(cloud: PointCloud, of: Callable[[NDArray], bool] = np.any) -> bool:

@@ -164,7 +164,7 @@ def supersample(renderer: Renderer, request: Request, surface: Surface, *, wait:
     samples = SAMPLES[request.look.quality]
     if samples == 1:
         return False
-    state = surface.keep(_Samples)
+    state = surface.cached(_Samples)
     if state.of is not surface.drawn:
         state.begin(surface)
     if state.mean.count < samples:

@@ -107,23 +107,23 @@ class Bins:
         gpu = self._gpu
         runs = -(-length // _RUN)
         digits = 1 << _DIGIT_BITS
-        places = gpu.buffer(reserve=4 * max(digits * runs, 1))
+        offsets = gpu.buffer(reserve=4 * max(digits * runs, 1))
         other = self._pairs(length)
         shifts = range(0, max((self.cells - 1).bit_length(), 1), _DIGIT_BITS)
         for shift in shifts:
             last = shift == shifts[-1]
-            gl.clear_words(places, 0)
+            gl.clear_words(offsets, 0)
             for step in range(2):
                 program = gpu.compute("bins/sort.comp", {"STEP": step, "LAST": int(last), "RUN": f"{_RUN}u"})
                 gpu.set(program, pair_count=length, shift=shift)
                 pairs.bind(Texture.PAIRS)
-                places.bind_to_storage_buffer(Storage.DIGITS)
+                offsets.bind_to_storage_buffer(Storage.DIGITS)
                 (self.items if last else other).buffer.bind_to_storage_buffer(Storage.SORTED)
                 gpu.dispatch(program, runs)
                 if step == 0:
-                    prefix_sums(gpu, places, digits * runs)
+                    prefix_sums(gpu, offsets, digits * runs)
             pairs, other = other, pairs
-        gpu.discard(pairs, other, places)
+        gpu.discard(pairs, other, offsets)
 
     def _texture(self, words: int) -> gl.BufferTexture:
         return gl.BufferTexture(self._gpu.buffer(reserve=4 * max(words, 1)), gl.R32UI)

@@ -161,7 +161,7 @@ def _scan_level(
         gpu.dispatch(program, -(-count // length))
 
     if blocks > 1:
-        sums = gpu.keep(_block_sums, level)
+        sums = gpu.cached(_block_sums, level)
         run(0)
 
         def bind_sums(_: Program) -> None:

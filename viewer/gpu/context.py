@@ -92,7 +92,7 @@ class Gpu:
         self.max_storage_bytes = gl.max_storage_block_bytes()
         self.max_pixels = self.max_storage_bytes // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
-        self._kept: dict[object, Any] = {}
+        self._cached: dict[object, Any] = {}
         self._discarded: deque[Resource] = deque()
         self._discarded_bytes = 0
         gl.reverse_depth()
@@ -131,7 +131,7 @@ class Gpu:
     ) -> Any:
         declared = None if params is None else type(params)
         given = tuple((defines or {}).items()), tuple((parts or {}).items())
-        program = self.keep(Gpu._compile, names, *given, declared)
+        program = self.cached(Gpu._compile, names, *given, declared)
         if params is not None:
             program.extra.values.write(params)
         return program
@@ -162,12 +162,12 @@ class Gpu:
         program.extra = Built(sources, values)
         return program
 
-    def keep(self, make: Callable[..., T], *args: Hashable) -> T:
+    def cached(self, make: Callable[..., T], *args: Hashable) -> T:
         """Make, once for these arguments, `make(gpu, *args)`: small things that live as long as this."""
         key = (make, *args)
-        if key not in self._kept:
-            self._kept[key] = make(self, *args)
-        return self._kept[key]
+        if key not in self._cached:
+            self._cached[key] = make(self, *args)
+        return self._cached[key]
 
     def activate(self) -> None:
         """Make a headless context the current one, whatever else the process draws with.

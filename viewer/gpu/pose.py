@@ -196,10 +196,10 @@ class GpuPose:
             with self.preparing("upload"):
                 upload = _array_upload(self.gpu, pack(self._centered, *args))
                 upload.go_on(np.inf)
-                self._keep_array(key, upload, texel_format)
+                self._store_array(key, upload, texel_format)
         return self._arrays[key]
 
-    def keep(self, make: Callable[[GpuPose], M]) -> M:
+    def cached(self, make: Callable[[GpuPose], M]) -> M:
         """Make, once, what a backend finds of this pose's points on the GPU. Counted, kept and deleted with
         the arrays."""
         if make not in self._made:
@@ -224,7 +224,7 @@ class GpuPose:
             self._share(name, _shared_arrays(self.gpu).add(name, upload.values, self._arrays[name]))
             self._uploads_of_late.nbytes += upload.nbytes
         else:
-            self._keep_array(name, upload, texel_format)
+            self._store_array(name, upload, texel_format)
         return True
 
     def _take_shared(self, name: str, values: NDArray) -> bool:
@@ -254,7 +254,7 @@ class GpuPose:
             self._samples = RangeSamples(self.gpu, self.range_points.views)
         return self._samples.upload(end)
 
-    def _keep_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
+    def _store_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
         self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
         self._count_upload(upload)
 
@@ -414,7 +414,7 @@ class SharedArrays:
 
 
 def _shared_arrays(gpu: Gpu) -> SharedArrays:
-    return gpu.keep(SharedArrays)
+    return gpu.cached(SharedArrays)
 
 
 def drawn_bounds(pose: Pose, camera: Camera | None = None) -> Bounds:

@@ -118,7 +118,7 @@ class RangeSamples:
     depths: R32F, of level 0 the bits that were read. looks: RGBA8, sRGB; alpha 0: no sample, else 1 to 255 by
     the confidence relative to the view's largest. xy: RG32F, measured x and y in the pod's camera space, None
     where no view has such. tiles: RGBA32F, bounds of 16 x 16 samples of a level each, for
-    shaders/range/tiles.glsl. places: of each view, of each level, where its samples are. levels: of each
+    shaders/range/tiles.glsl. view_levels: of each view, of each level, where its samples are. levels: of each
     view; level k has 2^k times fewer columns and rows, rounded up. defines: macros for programs that include
     range/samples.glsl: what the views have, so that nothing is computed for what none has.
 
@@ -138,7 +138,7 @@ class RangeSamples:
             raise ValueError(f"{levels} levels; at most {RANGE_MOST_LEVELS}")
         self._pods = [_pod(view) for view in views]
         self.levels = levels or min(LEVELS, max(len(sizes(pod.size)) for pod in self._pods))
-        self.places, self._total, self.tile_count = _places(self._pods, self.levels)
+        self.view_levels, self._total, self.tile_count = _view_levels(self._pods, self.levels)
         self._check_size()
         has_xy = any(pod.has_xy for pod in self._pods)
         self.depths = self._texels(gl.R32F, 4 * self._total)
@@ -170,7 +170,7 @@ class RangeSamples:
     @property
     def count(self) -> int:
         """How many samples the views have, there or not."""
-        return sum(levels[0].count for levels in self.places)
+        return sum(levels[0].count for levels in self.view_levels)
 
     @property
     def bytes_per_sample(self) -> float:
@@ -206,7 +206,7 @@ class RangeSamples:
         program = self._gpu.compute("range/heights.comp", self.defines)
         self._bind_read()
         made.buffer.bind_to_storage_buffer(Storage.RANGE_VALUES)
-        for number, (pod, levels) in enumerate(zip(self._pods, self.places, strict=True)):
+        for number, (pod, levels) in enumerate(zip(self._pods, self.view_levels, strict=True)):
             to_world = np.linalg.inv(pod.world_to_camera)
             up = (*(axis @ to_world[:3, :3]), axis @ (to_world[:3, 3] - origin))
             for first in range(0, levels[0].count, _SLICE):
@@ -278,9 +278,9 @@ class RangeSamples:
     def _check_size(self) -> None:
         """Raise InputError for more samples than a driver takes, in all or of a level that shaders write."""
         sample = 8 if any(pod.has_xy for pod in self._pods) else 4
-        written = max((sample * levels[1].count for levels in self.places if self.levels > 1), default=0)
+        written = max((sample * levels[1].count for levels in self.view_levels if self.levels > 1), default=0)
         if self._total > self._gpu.max_points or written > self._gpu.max_storage_bytes:
-            count = sum(levels[0].count for levels in self.places)
+            count = sum(levels[0].count for levels in self.view_levels)
             raise InputError(
                 f"range views of {count:,} pixels in one pose are too many for this driver",
                 hint="Split the scan or make its images smaller",
@@ -290,7 +290,7 @@ class RangeSamples:
 
     def _uploads(self, views: Sequence[RangeView]) -> Iterator[Callable[[], object]]:
         """Steps that upload the samples as they were measured."""
-        for view, levels in zip(views, self.places, strict=True):
+        for view, levels in zip(views, self.view_levels, strict=True):
             width, height = levels[0].size
             most = _most_confidence(view)
             rows = max(1, _SLICE // width)
@@ -310,7 +310,7 @@ class RangeSamples:
 
     def _reductions(self, tiled_from: int = 0) -> Iterator[Callable[[], object]]:
         """Steps that make the coarser levels, and the tiles from a level on."""
-        for number, levels in enumerate(self.places):
+        for number, levels in enumerate(self.view_levels):
             for level, made in enumerate(levels[1:]):
                 runs = made.size[1] * -(-made.size[0] // self._run)
                 at_once = max(1, _SLICE // (4 * self._run))
@@ -323,7 +323,7 @@ class RangeSamples:
 
     def _reduce(self, number: int, level: int, first: int, count: int) -> None:
         """Make runs of samples of the level after this one."""
-        how, made = self.filter, self.places[number][level + 1]
+        how, made = self.filter, self.view_levels[number][level + 1]
         taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
         taken = {"FIRST": how.first, "COUNT": len(how.taps), "TAPS": f"float[]({taps})"}
         program = self._gpu.compute(
@@ -345,7 +345,7 @@ class RangeSamples:
 
     def _bound(self, number: int, level: int, first: int, count: int) -> None:
         """Make tiles of a level."""
-        made = self.places[number][level]
+        made = self.view_levels[number][level]
         program = self._gpu.compute("range/bounds.comp", self.defines)
         self._bind_read()
         self.tiles.buffer.bind_to_storage_buffer(Storage.RANGE_TILES)
@@ -367,8 +367,8 @@ class RangeSamples:
     def _write_table(self, view: View | None) -> None:
         """Write what shaders know of each view, as `range_view` of samples.glsl reads it. view: None leaves
         each in its pod's space."""
-        place = () if view is None else (view.rotation, view.translation, view.origin)
-        key = tuple(values.tobytes() for values in place)
+        seen = () if view is None else (view.rotation, view.translation, view.origin)
+        key = tuple(values.tobytes() for values in seen)
         if key == self._tabled:
             return
         words = np.zeros((len(self._pods), RANGE_ENTRY, 4), np.uint32)
@@ -389,11 +389,11 @@ class RangeSamples:
 
     def _levels_after(self, number: int) -> NDArray[np.uint32]:
         """The levels of a view in the table; those that it lacks begin where the next view does."""
-        rest = self.places[number + 1 :]
+        rest = self.view_levels[number + 1 :]
         after = rest[0][0].first if rest else self._total
         tiles_after = rest[0][0].first_tile if rest else self.tile_count
         rows = np.full((RANGE_MOST_LEVELS, 4), (after, tiles_after, 1, 1), np.uint32)
-        for row, level in zip(rows, self.places[number], strict=False):
+        for row, level in zip(rows, self.view_levels[number], strict=False):
             row[:] = level.first, level.first_tile, *level.size
         return rows
 
@@ -432,17 +432,17 @@ def _lens_steps(view: RangeView) -> int:
     return min(steps_to_undo(x, y, view.distortion, _LAST_STEP), _MOST_STEPS)
 
 
-def _places(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:
+def _view_levels(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:
     """The places of all levels, how many samples there are with what is left free between, and tiles."""
-    places, samples, tiles = [], 0, 0
+    view_levels, samples, tiles = [], 0, 0
     for pod in pods:
         own = []
         for size in sizes(pod.size, levels):
             own.append(SampleLevel(samples, tiles, size))
             samples += -(-own[-1].count // _ALIGNED) * _ALIGNED
             tiles += own[-1].tiles
-        places.append(own)
-    return places, samples, tiles
+        view_levels.append(own)
+    return view_levels, samples, tiles
 
 
 def _most_confidence(view: RangeView) -> float:

@@ -99,11 +99,11 @@ class Source:
     def explain(self, log: str) -> str:
         """A compiler's log with file names in the place of file numbers."""
 
-        def place(match: re.Match[str]) -> str:
+        def location(match: re.Match[str]) -> str:
             index, line = divmod(int(match[1] or match[2]), _LINES)
             return f"{self.files[index]}:{line}" if index < len(self.files) else match[0]
 
-        return _PLACE.sub(place, log)
+        return _PLACE.sub(location, log)
 
 
 def _beside(name: str, included: str) -> str:

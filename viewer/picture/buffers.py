@@ -28,14 +28,14 @@ class PictureBuffers:
 
     depths: float bits, from the view's base, +inf: nothing. rows: the row that a pixel shows, 0xFFFFFFFF:
     none. picture: RGBA8 sRGB. A pixel is covered where its depth is finite; covered: the list of these, as
-    far as it is known. Backends may store what they work with (`keep`), and channels of their own.
+    far as it is known. Backends may store what they work with (`cached`), and channels of their own.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self.gpu = gpu
         self._resources: tuple[Resource, ...] = ()
         self._own: dict[str, gl.BufferTexture] = {}
-        self._kept: dict[Callable[..., Workspace], Workspace] = {}
+        self._cached: dict[Callable[..., Workspace], Workspace] = {}
         self._raster: gl.Raster | None = None
         width, height = size
         if width < 1 or height < 1:
@@ -142,26 +142,26 @@ class PictureBuffers:
         """Copy what was rasterised into the Surface."""
         self.raster().copy_to(self.rows.buffer, self.depths.buffer)
 
-    def keep(self, make: Callable[[Gpu, tuple[int, int]], W]) -> W:
+    def cached(self, make: Callable[[Gpu, tuple[int, int]], W]) -> W:
         """Make, once, of the context and the size, what a backend works with from picture to picture. Counted
         and deleted with the surface."""
-        if make not in self._kept:
-            self._kept[make] = make(self.gpu, self.size)
-        return self._kept[make]  # type: ignore[return-value]
+        if make not in self._cached:
+            self._cached[make] = make(self.gpu, self.size)
+        return self._cached[make]  # type: ignore[return-value]
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         words = 3 + (3 if self._raster else 0) + sum(_CHANNELS[name][1] for name in self._own) // 4
-        kept = sum(workspace.nbytes for workspace in self._kept.values())
+        kept = sum(workspace.nbytes for workspace in self._cached.values())
         return 4 * self.size[0] * self.size[1] * words + self.covered.nbytes + kept
 
     def release(self) -> None:
         """Give up what it holds on the GPU now; otherwise that goes with the object."""
         nbytes = self.nbytes if self._resources else 0
-        everything = (*self._resources, *self._own.values(), *self._kept.values(), self._raster)
+        everything = (*self._resources, *self._own.values(), *self._cached.values(), self._raster)
         self.gpu.discard(*everything, nbytes=nbytes)
-        self._resources, self._own, self._kept, self._raster = (), {}, {}, None
+        self._resources, self._own, self._cached, self._raster = (), {}, {}, None
 
     def __del__(self) -> None:
         self.release()

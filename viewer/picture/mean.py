@@ -44,8 +44,8 @@ class PictureMean:
         with self._gpu.timers.measure("mean"):
             picture.bind_to_storage_buffer(Storage.PICTURE)
             self._sums.bind_to_storage_buffer(Storage.LIGHT_SUMS)
-            self._gpu.keep(_light).bind(Texture.LIGHT)
-            self._gpu.keep(_encoded).bind(Texture.ENCODED)
+            self._gpu.cached(_light).bind(Texture.LIGHT)
+            self._gpu.cached(_encoded).bind(Texture.ENCODED)
             self._gpu.set(program, pixels=self._pixels, count=self.count)
             self._gpu.dispatch(program, self._pixels)
 

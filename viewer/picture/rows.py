@@ -49,7 +49,7 @@ class PointRows:
 
     def near(self, view: View, margin: float, reach: float) -> NDArray[np.uint32] | None:
         """The rows in chunks that a view may show, see `Chunks.rows_in`; None: all may be."""
-        return self.pose.keep(Chunks).rows_in(view, margin, reach)
+        return self.pose.cached(Chunks).rows_in(view, margin, reach)
 
     # --- on the GPU -------------------------------------------------------------------
 

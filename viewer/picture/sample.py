@@ -71,7 +71,7 @@ class Sample:
 
 def sample_of(gpu: Gpu) -> Sample:
     """The sample that all backends on this context share."""
-    return gpu.keep(Sample)
+    return gpu.cached(Sample)
 
 
 class RowList:
@@ -97,7 +97,7 @@ class RowList:
 
 def row_list(gpu: Gpu) -> RowList:
     """The list of rows in view that all backends on this context share."""
-    return gpu.keep(RowList)
+    return gpu.cached(RowList)
 
 
 def _sampled_rows(count: int, share: float) -> NDArray[np.uint32]:

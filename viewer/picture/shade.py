@@ -179,16 +179,16 @@ def _bind_colors(surface: Surface, recipe: _Recipe) -> None:
     if recipe.color == "id" and surface.kind.of("ids") is not None:
         pose.array("ids").bind(Texture.IDS)
     if recipe.value is not None:
-        gpu.keep(_color_map, recipe.look.color_map).bind(Texture.COLOR_MAP)
+        gpu.cached(_color_map, recipe.look.color_map).bind(Texture.COLOR_MAP)
     if recipe.by_level:
-        gpu.keep(_level_colors, LEVEL_COLORS).bind(Texture.COLOR_MAP)
+        gpu.cached(_level_colors, LEVEL_COLORS).bind(Texture.COLOR_MAP)
         if surface.is_own("level"):
             surface.own("level").bind(Texture.LEVELS)
 
 
 def _paint_holes(surface: Surface) -> None:
     """Paint over the background in the picture's holes."""
-    gpu, bits = surface.gpu, surface.keep(_PixelBits)
+    gpu, bits = surface.gpu, surface.cached(_PixelBits)
     with gpu.timers.measure("holes"):
         surface.depths.bind(Texture.DEPTHS)
         surface.take_picture().bind_to_storage_buffer(Storage.PICTURE)

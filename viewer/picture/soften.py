@@ -15,7 +15,7 @@ def soften(surface: Surface) -> None:
     """Close the holes of a pixel or two in the picture of a shaded surface, through which something far
     behind is seen, then replace the picture by its mean over 3 x 3 pixels. Depths and rows stay."""
     gpu, (width, height) = surface.gpu, surface.size
-    before, picture = surface.keep(_Before).texels, surface.take_picture()
+    before, picture = surface.cached(_Before).texels, surface.take_picture()
     with gpu.timers.measure("soften"):
         surface.bind_view()
         surface.bind_textures()

@@ -106,10 +106,10 @@ class Surface(RenderTarget):
     def texel(self, x: int, y: int) -> Texel:
         """One pixel, without copying the others. x: from the left, y: from the top."""
         self.gpu.activate()
-        place = 4 * (y * self.size[0] + x)
-        depth = np.frombuffer(self.depths.buffer.read(4, offset=place), np.float32)[0]
-        row = np.frombuffer(self.rows.buffer.read(4, offset=place), np.uint32)[0]
-        level = self._own["level"].buffer.read(4, offset=place) if self.is_own("level") else bytes(4)
+        offset = 4 * (y * self.size[0] + x)
+        depth = np.frombuffer(self.depths.buffer.read(4, offset=offset), np.float32)[0]
+        row = np.frombuffer(self.rows.buffer.read(4, offset=offset), np.uint32)[0]
+        level = self._own["level"].buffer.read(4, offset=offset) if self.is_own("level") else bytes(4)
         return Texel(float(depth), int(row), int(_levels(depth, row, np.frombuffer(level, np.uint32)[0])))
 
     def depth_around(self, x: int, y: int, reach: int) -> NDArray[np.float32]:

@@ -90,7 +90,7 @@ def draw_filled(
         surface.stats.skipped["hide"] = "polygons already hide what is behind them"
     if not (fills or hides):
         return refinable
-    targets = surface.keep(Targets)
+    targets = surface.cached(Targets)
     if hides:
         targets.reduce(surface, source, channels)
         with surface.gpu.timers.measure("hide"):

@@ -49,10 +49,10 @@ def spread_macros(mode: str, kernel: str, count: int) -> dict[str, object]:
 def add_spread(surface: Surface, visits: Visits, kernel: str, count: int) -> Spread:
     """Add the functions of samples that were scattered. visits: of the samples, by placing.glsl."""
     gpu = surface.gpu
-    made = surface.keep(Spread)
+    made = surface.cached(Spread)
     made.sums.clear()
     surface.depths.bind(Texture.DEPTHS)
-    gpu.keep(_table, int(kernel[0])).bind(Texture.KERNELS)
+    gpu.cached(_table, int(kernel[0])).bind(Texture.KERNELS)
     with gpu.timers.measure("spread"):
         made.sums.add(visits, _fixed(count))
     return made

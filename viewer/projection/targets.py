@@ -28,7 +28,7 @@ class Targets:
         self._sizes = sizes(size, LEVELS)
         cells = sum(width * height for width, height in self._sizes[1:])
         self.keys, self.best = (_texels(gpu, cells, gl.R32UI, 4) for _ in range(2))
-        self._spots = _texels(gpu, cells, gl.RG32F, 8)
+        self._sample_positions = _texels(gpu, cells, gl.RG32F, 8)
         edge = 1 << (LEVELS - 1)
         self.holes = IndexList(gpu, self._sizes[-1][0] * self._sizes[-1][1], edge * edge)
         self._shown = _texels(gpu, cells, gl.RGBA32UI, 16)
@@ -37,7 +37,7 @@ class Targets:
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         return (
-            sum(each.buffer.size for each in (self.keys, self.best, self._spots, self._shown))
+            sum(each.buffer.size for each in (self.keys, self.best, self._sample_positions, self._shown))
             + self.holes.nbytes
         )
 
@@ -45,7 +45,7 @@ class Targets:
         """Bind depths and samples for shaders to fetch."""
         self.keys.bind(Texture.KEYS)
         self.best.bind(Texture.BEST)
-        self._spots.bind(Texture.SPOTS)
+        self._sample_positions.bind(Texture.SPOTS)
         self._shown.bind(Texture.SHOWN)
 
     def reduce(self, surface: Surface, source: SampleSource, channels: Sequence[str]) -> None:
@@ -53,7 +53,7 @@ class Targets:
         gpu = self._gpu
         self.keys.buffer.bind_to_storage_buffer(Storage.KEYS)
         self.best.buffer.bind_to_storage_buffer(Storage.BEST)
-        self._spots.buffer.bind_to_storage_buffer(Storage.SPOTS)
+        self._sample_positions.buffer.bind_to_storage_buffer(Storage.SPOTS)
         self._shown.buffer.bind_to_storage_buffer(Storage.SHOWN)
         with gpu.timers.measure("reduce"):
             for level, (width, height) in enumerate(self._sizes[1:], 1):
@@ -93,7 +93,7 @@ class Targets:
 
     def release(self) -> None:
         """Delete them."""
-        self._gpu.discard(self.keys, self.best, self._spots, self._shown, self.holes)
+        self._gpu.discard(self.keys, self.best, self._sample_positions, self._shown, self.holes)
 
 
 def _texels(gpu: Gpu, count: int, texel_format: int, size: int) -> gl.BufferTexture:

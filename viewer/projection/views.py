@@ -78,7 +78,7 @@ class ViewSource:
         self._pose, self._params, self._view, self._lit = pose, params, surface.view, normals
         self.samples = pose.samples
         self.count = self.samples.count
-        self._tiles = surface.keep(DrawnTiles)
+        self._tiles = surface.cached(DrawnTiles)
         self._tiles.reserve(self.samples.tile_count + _SPARE, len(pose.views))
         self._texels: dict[str, gl.BufferTexture] = {}
         self.samples.reduce(params.reduction)

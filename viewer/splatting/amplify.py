@@ -55,13 +55,13 @@ class Shape:
 class ListedRows(gl.BufferTexture):
     """Rows in any order.
 
-    ascending: gives the same ones ascending; None where they are. places, arranged: where those points stand
-    in an order of their own, and all points in that, as amplify/texels.glsl has them; None where they are
-    read by rows.
+    ascending: gives the same ones ascending; None where they are. order_indices, arranged: the indices of
+    those points in an order of their own, and all points in that order, as amplify/texels.glsl has them; None
+    where points are read by rows.
     """
 
     ascending: Callable[[], gl.BufferTexture] | None = None
-    places: gl.BufferTexture | None = None
+    order_indices: gl.BufferTexture | None = None
     arranged: gl.BufferTexture | None = None
 
 
@@ -115,7 +115,9 @@ class Points:
     @property
     def _listed(self) -> ListedRows | None:
         """The rows where points are read in an order of their own."""
-        return self.rows if isinstance(self.rows, ListedRows) and self.rows.places is not None else None
+        return (
+            self.rows if isinstance(self.rows, ListedRows) and self.rows.order_indices is not None else None
+        )
 
     @property
     def packed(self) -> bool:
@@ -162,10 +164,10 @@ class Points:
         """Bind what amplify/texels.glsl reads."""
         self.pose.gpu.set(program, enlarged=self.enlarged)
         if (listed := self._listed) is not None:
-            assert listed.places is not None
+            assert listed.order_indices is not None
             assert listed.arranged is not None
             listed.arranged.bind(Texture.ARRANGED)
-            listed.places.bind(Texture.DRAWN_ROWS)
+            listed.order_indices.bind(Texture.DRAWN_ROWS)
             return
         if self.packed:
             self._bind("positions")
@@ -201,7 +203,7 @@ def amplify(
     feed: one of FEEDS. fragment: the shape's fragment shader, which writes a row and a depth. params: what
     both find in `<params>`. over: draw over what the surface holds.
     """
-    gpu, feed = surface.gpu, told_feed(points, feed, surface)
+    gpu, feed = surface.gpu, usable_feed(points, feed, surface)
     with gpu.timers.measure("splat"):
         surface.raster().clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -269,12 +271,12 @@ def fitting_feed(points: Points, feed: str) -> str:
     return "tbo" if feed in replaced or (points.buffers and feed == "ubo") else feed
 
 
-def told_feed(points: Points, feed: str, surface: Surface) -> str:
+def usable_feed(points: Points, feed: str, surface: Surface) -> str:
     """The `fitting_feed`; the surface's statistics tell where it is another."""
     fitting = fitting_feed(points, feed)
     if fitting != feed:
-        told = f"{fitting}, in place of {feed}, which brings whole poses as stored"
-        surface.stats.chosen["instancing"] = told
+        reason = f"{fitting}, in place of {feed}, which brings whole poses as stored"
+        surface.stats.chosen["instancing"] = reason
     return fitting
 
 

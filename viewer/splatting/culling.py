@@ -59,8 +59,8 @@ class Margins:
 def culled_chunks(pose: GpuPose) -> CulledChunks | None:
     """The chunks of a pose whose points are in an order of use; None where they are not, or few."""
     counted_alike = (pose.origin == pose.cloud.origin).all()
-    is_of_use = counted_alike and pose.keep(Chunks).take_order() is not None
-    return pose.keep(CulledChunks) if is_of_use else None
+    is_of_use = counted_alike and pose.cached(Chunks).take_order() is not None
+    return pose.cached(CulledChunks) if is_of_use else None
 
 
 class ChunkBoxes:
@@ -72,7 +72,7 @@ class ChunkBoxes:
 
     def __init__(self, pose: GpuPose, size: int | None = None) -> None:
         self._gpu = gpu = pose.gpu
-        self.order = order = pose.keep(Chunks).known
+        self.order = order = pose.cached(Chunks).known
         self.count, self.size = len(pose.cloud), size or order.chunk
         self.chunks = -(-self.count // self.size)
         self.boxes = gl.BufferTexture(gpu.buffer(reserve=24 * self.chunks), gl.RGB32F)
@@ -91,9 +91,9 @@ class ChunkBoxes:
         program = gpu.compute("chunks/cull.comp", given, params=margins)
         with gpu.timers.measure("cull"):
             self.boxes.bind(Texture.BOXES)
-            surface.keep(SeenChunks).of(self).bind_to_storage_buffer(Storage.SEEN)
+            surface.cached(SeenChunks).of(self).bind_to_storage_buffer(Storage.SEEN)
             if step == FIND:
-                surface.keep(_Farthest).texels.bind(Texture.FARTHEST_TILES)
+                surface.cached(_Farthest).texels.bind(Texture.FARTHEST_TILES)
             gpu.dispatch(program, self.chunks)
 
     def bind_rows(self) -> None:
@@ -108,7 +108,7 @@ class ChunkBoxes:
 
     def seen(self, surface: RenderTarget) -> NDArray[np.uint32]:
         """Read what the last step told of each, bits, (C,); waits for the GPU."""
-        return np.frombuffer(surface.keep(SeenChunks).of(self).read(), np.uint32)
+        return np.frombuffer(surface.cached(SeenChunks).of(self).read(), np.uint32)
 
     @property
     def nbytes(self) -> int:
@@ -173,7 +173,7 @@ class CulledChunks:
         few that looking for hidden ones would take longer. margin: as in `start`."""
         if view.holds(pose.bounds.corners() - view.origin):
             return None
-        found = pose.keep(Chunks).shown_in(self._boxes.order, view, margin)
+        found = pose.cached(Chunks).shown_in(self._boxes.order, view, margin)
         if (points := min(len(found) * self._size, self.count)) > most:
             return None
         listed = self._lists[0]
@@ -217,13 +217,13 @@ def counts_of(seen: NDArray[np.uint32]) -> dict[str, int]:
     """How many chunks were shown, hidden by what is before them, or out of view, and how many face away where
     any does. seen: bits of each, (C,)."""
     shown, in_view, away = (int(np.count_nonzero(seen & bit)) for bit in (NOW, IN_VIEW, FACES_AWAY))
-    told = {"shown": shown, "hidden": in_view - shown - away, "outside": len(seen) - in_view}
-    return {**told, "away": away} if away else told
+    counts = {"shown": shown, "hidden": in_view - shown - away, "outside": len(seen) - in_view}
+    return {**counts, "away": away} if away else counts
 
 
 def find_farthest(surface: RenderTarget) -> None:
     """Find the farthest depth of each tile of what was drawn so far."""
-    surface.keep(_Farthest).find(surface)
+    surface.cached(_Farthest).find(surface)
 
 
 class _Farthest:

@@ -1,7 +1,7 @@
-"""Which of several ways is the fastest on this device: measured once, then remembered for this user.
+"""Which of several variants is the fastest on this device: measured once, then remembered for this user.
 
-As long as the file that remembers it stays, a frame has the same bits each time: ways may round differently
-(docs/developing/decisions/007-instancing.md).
+As long as the file that remembers it stays, a frame has the same bits each time. Variants may round
+differently (docs/developing/decisions/007-instancing.md).
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ def fastest(
     gpu: Gpu,
     task: str,
     names: Sequence[str],
-    ways: Callable[[], Mapping[str, Callable[[], object]]],
+    variants: Callable[[], Mapping[str, Callable[[], object]]],
     file: Path | None = None,
 ) -> str:
     """The name of the fastest way of doing a task on this device with this driver.
 
-    names: of the ways. ways: makes them, each to be called several times; only where nothing is
+    names: of the variants. variants: makes them, each to be called several times; only where nothing is
     remembered. One that the driver does not compile is left out. file: what is remembered; None: in
     the user's cache folder. A damaged file counts as none, and one that cannot be written is passed over.
     """
@@ -47,7 +47,7 @@ def fastest(
     key = f"{gpu.device}, {gpu.driver}: {task} by {', '.join(names)}"
     if remembered.get(key) not in names:
         with gpu.timers.paused():
-            times = _times(gpu, ways())
+            times = _times(gpu, variants())
         remembered[key] = min(times, key=lambda name: times[name], default=names[0])
         with suppress(InputError), whole_file(file) as temporary:
             temporary.write_text(json.dumps(remembered, indent=1), encoding="utf-8")
@@ -60,17 +60,17 @@ def instancing_for(
     on_software: str,
     task: str,
     names: Sequence[str],
-    ways: Callable[[GpuPose, Surface], Mapping[str, Callable[[], object]]],
+    variants: Callable[[GpuPose, Surface], Mapping[str, Callable[[], object]]],
 ) -> str:
     """Resolve a parameter `instancing`. Where it is "auto", and told in the statistics: `on_software` on
-    software drivers, on others what is the `fastest` of the ways, which are made for a trial."""
+    software drivers, on others what is the `fastest` of the variants, which are made for a trial."""
     if setting != "auto":
         return setting
     gpu, chosen = surface.gpu, on_software
     if not gpu.software:
-        known = gpu.keep(_choices)
+        known = gpu.cached(_choices)
         if task not in known:
-            known[task] = fastest(gpu, task, names, lambda: ways(*_trial(gpu)))
+            known[task] = fastest(gpu, task, names, lambda: variants(*_trial(gpu)))
         chosen = known[task]
         surface.bind_view()  # in place of the trial's
     surface.stats.chosen["instancing"] = chosen
@@ -83,7 +83,7 @@ def _choices(_: Gpu) -> dict[str, str]:
 
 
 def _trial(gpu: Gpu) -> tuple[GpuPose, Surface]:
-    """Splats to try ways on: a sphere of points in random order, and a picture of it begun."""
+    """Splats to try variants on: a sphere of points in random order, and a picture of it begun."""
     i = np.arange(_TRIAL_POINTS) + 0.5
     polar, turn = np.arccos(1 - 2 * i / _TRIAL_POINTS), np.pi * (1 + 5**0.5) * i
     points = np.stack([np.cos(turn) * np.sin(polar), np.cos(polar), np.sin(turn) * np.sin(polar)], axis=1)
@@ -105,17 +105,17 @@ def _read(file: Path) -> dict[str, str]:
     return content if isinstance(content, dict) else {}
 
 
-def _times(gpu: Gpu, ways: Mapping[str, Callable[[], object]]) -> dict[str, float]:
-    """The least seconds of each way, taking turns after one warm-up."""
+def _times(gpu: Gpu, variants: Mapping[str, Callable[[], object]]) -> dict[str, float]:
+    """The least seconds of each variant, taking turns after one warm-up."""
     times: dict[str, float] = {}
     for turn in range(_TURNS + 1):
-        for name, way in ways.items():
+        for name, variant in variants.items():
             if turn and name not in times:
                 continue
             gpu.ctx.finish()
             start = time.perf_counter()
             with suppress(Scan4DError):
-                way()
+                variant()
                 gpu.ctx.finish()
                 seconds = time.perf_counter() - start
                 times[name] = min(times[name], seconds) if turn > 1 else seconds

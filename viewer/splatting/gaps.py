@@ -75,7 +75,7 @@ class GapRadii:
     def presumes_none(self, pose: GpuPose) -> bool:
         """Whether they are not known, and stored radii left no gaps in the last pose that was looked at, as
         of a scan that plays: this does for a picture that moves, of whose time looking takes a third."""
-        return not self._found and pose.stored.radii is not None and pose.gpu.keep(_LastLook).found_none
+        return not self._found and pose.stored.radii is not None and pose.gpu.cached(_LastLook).found_none
 
     def find(self, pose: GpuPose, *, wait: bool) -> bool:
         """Go on with finding them: to the end, or for some of the points. Whether all are there."""
@@ -97,7 +97,7 @@ class GapRadii:
         with _searching(pose) as (search, rows, copies):
             if stored is not None:
                 sample = _sample(pose.stored.positions[rows])
-                last = pose.gpu.keep(_LastLook)
+                last = pose.gpu.cached(_LastLook)
                 last.found_none = not search.leave_gaps(stored[rows], sample)
                 if last.found_none:
                     return
@@ -306,6 +306,6 @@ def _distinct(positions: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray
     ordered = positions[order]
     first = np.ones(len(order), bool)
     first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    place = np.empty(len(order), np.intp)
-    place[order] = np.cumsum(first) - 1
-    return order[first], place
+    group = np.empty(len(order), np.intp)
+    group[order] = np.cumsum(first) - 1
+    return order[first], group

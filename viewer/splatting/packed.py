@@ -1,6 +1,6 @@
 """Packed splats: drawing what a compute pass of another backend made of bare positions (Preiner 2012, 7).
 
-The ways of surfels, in one pass or in two; normals are those of the splats, as the pose has none.
+The variants of surfels, in one pass or in two; normals are those of the splats, as the pose has none.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .passes import blend, blend_by_tiles
 from .splats import FRAGMENT, SURFEL, Splats
 from .tiles import FALLBACK, show_all, show_smaller, show_with, tile_lists
 
-WAYS = ("tiles", "tbo", "pull")  # how packed points become splats
+VARIANTS = ("tiles", "tbo", "pull")  # how packed points become splats
 _SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it
 _SPARE = 4  # times the rows that there is room for, beyond which room is given up
 _FALLOFF = 4.0  # of the Gaussian mask, which ends where the splat does
@@ -40,9 +40,9 @@ def draw_splats(
 ) -> None:
     """Draw points whose `buffers` have "splats" and "looks".
 
-    instancing: one of `WAYS`, or "auto", what is fastest on this device. radius_scale: factor on radii. two:
-    whether splats that overlap are blended, those at most epsilon radii behind the nearest; else the nearest
-    alone is seen. refine: whether splats of points that others hide are made as small as those.
+    instancing: one of `VARIANTS`, or "auto", what is fastest on this device. radius_scale: factor on radii.
+    two: whether splats that overlap are blended, those at most epsilon radii behind the nearest; else the
+    nearest alone is seen. refine: whether splats of points that others hide are made as small as those.
     """
     splats = _splats(radius_scale, epsilon)
     _draw(points, surface, splats, _instancing(surface, instancing, two), two, refine)
@@ -71,14 +71,14 @@ def _splats(radius_scale: float, epsilon: float) -> Splats:
     )
 
 
-def _draw(points: Points, surface: Surface, splats: Splats, way: str, two: bool, refine: bool) -> None:
+def _draw(points: Points, surface: Surface, splats: Splats, variant: str, two: bool, refine: bool) -> None:
     lists = None
-    if way == "tiles":
+    if variant == "tiles":
         lists = tile_lists(points, surface, splats, looks=two, numbered=refine)
     if lists is not None:
         _draw_by_tiles(points, surface, lists, splats, two, refine)
         return
-    feed = FALLBACK if way == "tiles" else way
+    feed = FALLBACK if variant == "tiles" else variant
     amplify(points, surface, feed, SURFEL, FRAGMENT, splats)
     if refine:
         points = _shrunk(points, surface, splats)
@@ -112,7 +112,7 @@ def _shrunk(points: Points, surface: Surface, splats: Splats, lists: TileLists |
     made small, those behind it still close them, and one depth map more is enough.
     """
     gpu = surface.gpu
-    by_row, count = surface.keep(_ByRow), len(points.pose.cloud)
+    by_row, count = surface.cached(_ByRow), len(points.pose.cloud)
     radii = by_row.reserve("radii", count, gl.R32F)
     defines = {"TILES": int(lists is not None), **points.defines}
     program = gpu.compute("surfels/packed/shrink.comp", defines, params=splats)
@@ -169,8 +169,10 @@ def take_normals(splats: gl.BufferTexture, surface: Surface) -> None:
 def _instancing(surface: Surface, setting: str, two: bool) -> str:
     """How points become splats; in one pass and in two this need not be the same."""
 
-    def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
         points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {name: partial(_draw, points, surface, _splats(1.0, 1.0), name, two, False) for name in WAYS}
+        return {
+            name: partial(_draw, points, surface, _splats(1.0, 1.0), name, two, False) for name in VARIANTS
+        }
 
-    return instancing_for(surface, setting, "tiles", f"packed splats, {1 + two} passes", WAYS, ways)
+    return instancing_for(surface, setting, "tiles", f"packed splats, {1 + two} passes", VARIANTS, variants)

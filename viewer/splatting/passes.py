@@ -21,7 +21,7 @@ from ..gpu.context import Gpu
 from ..picture.frame_view import FrameView
 from ..picture.surface import Surface
 from ..scan.ranges import robust_range
-from .amplify import Points, draw_shapes, told_feed
+from .amplify import Points, draw_shapes, usable_feed
 from .lists import ALL, NOT_HIDDEN, TOWARDS, TileLists
 from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
@@ -45,7 +45,7 @@ def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> N
     Where the first pass finds nothing, the nearest of the enlarged splats fills the pixel, but not beyond
     the outline.
     """
-    gpu, target, feed = surface.gpu, surface.raster(), told_feed(points, feed, surface)
+    gpu, target, feed = surface.gpu, surface.raster(), usable_feed(points, feed, surface)
     with gpu.timers.measure("visibility"):
         target.clear()
         gpu.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -101,7 +101,7 @@ def splat_over(points: Points, surface: Surface, feed: str, splats: Splats, test
 
     tested: whether what was drawn before hides what is behind it, all of a quad and not its mask alone.
     """
-    gpu, feed = surface.gpu, told_feed(points, feed, surface)
+    gpu, feed = surface.gpu, usable_feed(points, feed, surface)
     with _sums(points, surface) as sums, gpu.timers.measure("over"):
         sums.clear()
         sums.clear_depth()
@@ -229,7 +229,7 @@ def _fill_by_tiles(surface: Surface, lists: TileLists, large: Points | None, spl
 def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
     """Sums of each pixel, bound, and what their fragment stages read; ends blending."""
     gpu = surface.gpu
-    sums = surface.keep(_new_sums)
+    sums = surface.cached(_new_sums)
     sums.target.use()
     bind_looks(points, surface)
     surface.rows.bind(Texture.ROWS)
@@ -254,7 +254,7 @@ def _limit(points: Points, surface: Surface, splats: Splats) -> None:
 def _resolve(points: Points, surface: Surface, over: bool) -> None:
     """Turn sums into the surface's own colours and normals."""
     gpu = surface.gpu
-    sums = surface.keep(_new_sums)
+    sums = surface.cached(_new_sums)
     with gpu.timers.measure("resolve"):
         defines = bind_looks(points, surface)
         program = gpu.compute("surfels/passes/resolve.comp", {**defines, "OVER": int(over)})

@@ -73,7 +73,7 @@ def splat_margins(splats: Splats, largest: float, slack: float, trusts: bool, sp
 
 def may_cull(pose: GpuPose) -> bool:
     """Whether chunks of a pose can be left out: it has many points, in an order in which these are small."""
-    return bool((pose.origin == pose.cloud.origin).all()) and pose.keep(Chunks).take_order() is not None
+    return bool((pose.origin == pose.cloud.origin).all()) and pose.cached(Chunks).take_order() is not None
 
 
 def draw_unhidden(
@@ -84,7 +84,7 @@ def draw_unhidden(
     points: all of them. largest: of all radii, scan units. draw: what draws some, up to three times; whether
     it may have drawn them in another way had there been more.
     """
-    chunks, before = points.pose.keep(SplatChunks), surface.keep(_Pictures)
+    chunks, before = points.pose.cached(SplatChunks), surface.cached(_Pictures)
     chunks.measure(points)
     boxes, trusts = chunks.boxes, before.pause == 0
     margins = splat_margins(splats, largest, boxes.slack, trusts, before.moved_to(surface))
@@ -107,8 +107,8 @@ def draw_unhidden(
         seen = seen | _may_show(seen) * np.uint32(NOW)
     before.go_on(is_late, is_dear, seen)
     surface.stats.counted["chunks"] = lambda: counts_of(seen)
-    if told := _told(boxes, seen):
-        surface.stats.skipped["points"] = told
+    if reason := _reason(boxes, seen):
+        surface.stats.skipped["points"] = reason
 
 
 def _may_show(seen: NDArray[np.uint32]) -> NDArray[np.bool_]:
@@ -121,21 +121,21 @@ def _leaves_out(seen: NDArray[np.uint32], bit: int) -> bool:
     return bool((_may_show(seen) & ((seen & bit) == 0)).any())
 
 
-def _told(boxes: ChunkBoxes, seen: NDArray[np.uint32]) -> str:
+def _reason(boxes: ChunkBoxes, seen: NDArray[np.uint32]) -> str:
     """How many points were left out and why; empty where none were."""
     outside = (seen & IN_VIEW) == 0
     away = (seen & FACES_AWAY) != 0
     hidden = ~outside & ~away & ((seen & NOW) == 0)
     causes = {"out of view": outside, "facing away": away, "hidden": hidden}
     counts = {cause: boxes.points_of(np.flatnonzero(chunks)) for cause, chunks in causes.items()}
-    told = [f"{cause} {count:,}" for cause, count in counts.items() if count]
-    if not told:
+    reason = [f"{cause} {count:,}" for cause, count in counts.items() if count]
+    if not reason:
         return ""
     total = f"{sum(counts.values()):,} of {boxes.count:,} are in chunks"
     return (
         f"{total} out of view"
         if sum(counts.values()) == counts["out of view"]
-        else f"{total}: {', '.join(told)}"
+        else f"{total}: {', '.join(reason)}"
     )
 
 
@@ -217,18 +217,18 @@ class SplatChunks:
         if boxes.rows is None and count > _NEARLY_ALL * boxes.count:
             return points
         self._listed.write(found.astype(np.uint32))
-        rows = gpu.keep(_Rows).reserve(count)
+        rows = gpu.cached(_Rows).reserve(count)
         program = gpu.compute("chunks/rows.comp", {"CHUNK": boxes.size, **self._defines(points)})
         with gpu.timers.measure("rows"):
             self._listed.texels.bind(Texture.LISTED)
             boxes.bind_rows()
             rows.buffer.bind_to_storage_buffer(Storage.DRAWN_ROWS)
             if self._arranged is not None:
-                rows.places, rows.arranged = gpu.keep(_Places).reserve(count), self._arranged
-                rows.places.buffer.bind_to_storage_buffer(Storage.DRAWN_PLACES)
+                rows.order_indices, rows.arranged = gpu.cached(_Places).reserve(count), self._arranged
+                rows.order_indices.buffer.bind_to_storage_buffer(Storage.DRAWN_PLACES)
             gpu.dispatch(program, count)
         if boxes.rows is not None:
-            rows.ascending = self._ascending.rows_of(surface.keep(SeenChunks).of(boxes), bit)
+            rows.ascending = self._ascending.rows_of(surface.cached(SeenChunks).of(boxes), bit)
         return replace(points, rows=rows, count=count)
 
     @property
@@ -258,7 +258,7 @@ class _Rows:
             self._gpu.discard(self._rows)
             self._rows = ListedRows(self._gpu.buffer(reserve=nbytes + nbytes // 8 // 4 * 4), gl.R32UI)
         rows = self._rows
-        rows.ascending = rows.places = rows.arranged = None
+        rows.ascending = rows.order_indices = rows.arranged = None
         return rows
 
 

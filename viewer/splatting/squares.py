@@ -106,7 +106,7 @@ def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
 
 def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before: Before) -> None:
     """Write the points that a picture before showed, and the share of all whose turn it is."""
-    kept, stride, count = pose.keep(KeptPoints), stride_of(share), len(pose.cloud)
+    kept, stride, count = pose.cached(KeptPoints), stride_of(share), len(pose.cloud)
     listed, turn, turns = kept.list_shown(before.target), kept.next_turn(), -(-count // stride)
     stats = surface.stats
     stats.share, stats.left_out = 1 / stride, count - turns
@@ -127,7 +127,7 @@ def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before:
     for visits in both:
         take_items(pose.gpu, visits, surface.depths, surface.rows)
     if _touching(pose, surface.view) <= size:
-        surface.keep(ClosedGaps).close(surface, _STEP * pose.stored.remember(_reach))
+        surface.cached(ClosedGaps).close(surface, _STEP * pose.stored.remember(_reach))
 
 
 def _enlarged(size: int, pose: GpuPose, surface: Surface) -> int:

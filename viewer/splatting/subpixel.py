@@ -46,7 +46,7 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     usual = largest = splats.uniform_radius
     if points.use_radii:
         if "radii" in points.buffers:
-            gaps = pose.keep(GapRadii)
+            gaps = pose.cached(GapRadii)
             own = gaps.usual, gaps.largest
         else:
             own = pose.cloud.remember(_radii_up_to)
@@ -89,7 +89,7 @@ def average(points: Points, surface: Surface, splats: Splats) -> None:
     covered = surface.list_covered()
     bound = bind_looks(points, surface)
     limits, make = (_COLORED_LIMITS, _colored_sums) if bound["HAS_COLORS"] else (_LIMITS, _plain_sums)
-    sums = surface.keep(make)
+    sums = surface.cached(make)
     fixed = FixedPoint(limits, (1.0,) * len(limits), _MOST)
 
     def bind(program: Program) -> None:

@@ -84,7 +84,7 @@ def tile_lists(
     """
     reason = _unfit(points, surface)
     if not reason:
-        lists = surface.keep(TileLists)
+        lists = surface.cached(TileLists)
         fits = lists.fill(points, surface, splats, side, looks=looks, numbered=numbered)
         if sends and not fits:
             surface.clear()

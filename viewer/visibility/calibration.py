@@ -59,9 +59,9 @@ def copies(cloud: PointCloud) -> NDArray[np.uint32]:
     words = _words(cloud.positions)
     order = words.argsort(kind="stable")
     again = words[order[1:]] == words[order[:-1]]
-    place = np.concatenate(([0], np.cumsum(~again)))
+    group = np.concatenate(([0], np.cumsum(~again)))
     # Places of higher numbers have less in the upper half: there the least begins anew.
-    lot = np.minimum(lots(order.astype(np.uint32)), NOTHING - 1) | (place[-1] - place).astype(np.uint64) << 32
+    lot = np.minimum(lots(order.astype(np.uint32)), NOTHING - 1) | (group[-1] - group).astype(np.uint64) << 32
     least = np.minimum.accumulate(lot).astype(np.uint32)
     found = np.full(len(words), NOTHING, np.uint32)
     found[order[1:][again]] = least[:-1][again]
@@ -130,8 +130,8 @@ def calibrate(
     paper. radius: R, scan units; None: from `depth`. drawn: share of the points that are looked at.
     """
     coarse = sectors.divided(_COARSE)
-    spots = coarse.spots(strided(cloud.positions) + (cloud.origin - origin))
-    cells = coarse.sector_of(spots)
+    sector_positions = coarse.sector_positions(strided(cloud.positions) + (cloud.origin - origin))
+    cells = coarse.sector_of(sector_positions)
     share = max(len(np.unique(cells[cells != NOTHING])), 1) / coarse.count
     count = max(body_of(cloud).count * drawn, 1.0)
     inside = -1 / math.expm1(math.log1p(-_OCCUPIED) / count)  # eq. 5
@@ -142,7 +142,7 @@ def calibrate(
     apart = 2 * found.angle  # alpha
     if math.isinf(found.distance):
         return EyeCalibration(found.weighted(4 * depth / apart), math.inf, share, spacing)
-    distances = found.distances(spots[np.isfinite(spots[:, 2])])
+    distances = found.distances(sector_positions[np.isfinite(sector_positions[:, 2])])
     surface = float(distances.mean()) if len(distances) else found.unit
     if len(distances):  # near points lie farther apart
         spacing *= surface / max(float(np.quantile(distances, _NEAREST)), _LEAST * surface)

@@ -34,9 +34,9 @@ class Candidates:
     """Candidates of the sectors around an eye, and what is visible, on the GPU.
 
     rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. keys: R32UI, its key.
-    spots: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector that it
-    lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where it is on the hull of
-    the flipped candidates around it, or lies in no sector, so that nothing is known that hides it. state:
+    sector_positions: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector
+    that it lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where it is on the
+    hull of the flipped candidates around it, or lies in no sector, so that nothing known hides it. state:
     another object after each `find`. sectors: what `rows` are of; shaders that include hpr/sectors.glsl take
     it as `params`, with `defines`.
 
@@ -59,7 +59,7 @@ class Candidates:
         self.rows, self.keys, self._stamps, self._found, self._occupied = (
             texels(sectors.count, gl.R32UI, 1) for _ in range(5)
         )
-        self.spots = texels(points, gl.RGB32F, 3)
+        self.sector_positions = texels(points, gl.RGB32F, 3)
         self.homes = texels(points, gl.RG32UI, 2)
         self.visible = texels(points, gl.R32UI, 1)
         self._todo, self._changed = (IndexList(gpu, sectors.count) for _ in range(2))
@@ -72,7 +72,7 @@ class Candidates:
     def nbytes(self) -> int:
         """Bytes held on the GPU: 24 a sector and up to 4 of cells, 28 a point."""
         held = (self.rows, self.keys, self._stamps, self._found, self._occupied)
-        by_row = (self.spots, self.homes, self.visible)
+        by_row = (self.sector_positions, self.homes, self.visible)
         return sum(each.buffer.size for each in (*held, *by_row)) + sum(
             each.nbytes for each in (self._todo, self._changed, self._near)
         )
@@ -112,7 +112,7 @@ class Candidates:
         def bind(program: Program) -> None:
             positions.bind(Texture.POSITIONS)
             self.homes.bind(Texture.HOMES)
-            self.spots.buffer.bind_to_storage_buffer(Storage.POINT_SPOTS)
+            self.sector_positions.buffer.bind_to_storage_buffer(Storage.POINT_SPOTS)
             self.homes.buffer.bind_to_storage_buffer(Storage.HOMES)
             self._occupied.buffer.bind_to_storage_buffer(Storage.OCCUPIED)
             if among is not None:
@@ -157,7 +157,7 @@ class Candidates:
             gpu.compute("hpr/propagate.comp", {**step, **self.defines}, params=self.sectors)
             for step in ({"TAKE": 0}, {"TAKE": 1, "LAST": 0}, {"TAKE": 1, "LAST": 1})
         )
-        self.spots.bind(Texture.SPOTS)
+        self.sector_positions.bind(Texture.SPOTS)
         self.keys.bind(Texture.KEYS)
         self.rows.bind(Texture.BEST)
         self._found.bind(Texture.FOUND)
@@ -188,7 +188,7 @@ class Candidates:
             self.homes.bind(Texture.HOMES)
             self.rows.bind(Texture.BEST)
             self.keys.bind(Texture.KEYS)
-            self.spots.bind(Texture.SPOTS)
+            self.sector_positions.bind(Texture.SPOTS)
             self._near.clear()
             self._near.bind()
             gpu.set(near, point_count=self.looked_at, stride=stride)
@@ -215,7 +215,7 @@ class Candidates:
         """Delete all of it."""
         for each in (self.rows, self.keys, self._stamps, self._found, self._occupied):
             each.release()
-        for each in (self.spots, self.homes, self.visible):
+        for each in (self.sector_positions, self.homes, self.visible):
             each.release()
         for listed in (self._todo, self._changed, self._near):
             listed.release()

@@ -124,14 +124,14 @@ class Covering:
         """Find how far away points are, and beyond which distance those of a cell are hidden."""
         gpu = self._gpu
         cells = sectors.divided(max(round(1 / (_FRONT * spacing)), 1)).weighted(0.0)
-        spots = self._texels("spots", self.points, gl.RGB32F, 3)
+        sector_positions = self._texels("sector_positions", self.points, gl.RGB32F, 3)
         homes = self._texels("homes", self.points, gl.RG32UI, 2)
         keys = self._texels("keys", cells.count, gl.R32UI, 1)
         limits = self._texels("limits", cells.count, gl.R32F, 1)
 
         def bind(program: Program) -> None:
             positions.bind(Texture.POSITIONS)
-            spots.buffer.bind_to_storage_buffer(Storage.POINT_SPOTS)
+            sector_positions.buffer.bind_to_storage_buffer(Storage.POINT_SPOTS)
             homes.buffer.bind_to_storage_buffer(Storage.HOMES)
             _bind_sample(sample)
             gpu.set(program, clip=clip[0], sides=tuple(chain.from_iterable(clip[1:])))
@@ -165,7 +165,7 @@ class Covering:
             gl.clear_words(self.visible.buffer, 0)  # of those that are not looked at
         self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
         self._held["homes"].bind(Texture.HOMES)
-        self._held["spots"].bind(Texture.SPOTS)
+        self._held["sector_positions"].bind(Texture.SPOTS)
         self._held["limits"].bind(Texture.LIMITS)
         _bind_sample(sample)
         if repeated is not None:
@@ -186,7 +186,7 @@ class Covering:
 
         def bind(_: Program) -> None:
             near.bind()
-            self._held["spots"].bind(Texture.SPOTS)
+            self._held["sector_positions"].bind(Texture.SPOTS)
 
         defines = {"FARTHEST": _FARTHEST, **sampled}
         visits = Visits("hpr/cover_cells.glsl", near.capacity, bind, defines, cells, near)
@@ -198,7 +198,7 @@ class Covering:
         program = gpu.compute(
             "hpr/cover_discs.comp", {"REACH": REACH, "WINDOW": _WINDOW, **defines}, params=cells
         )
-        self._held["spots"].bind(Texture.SPOTS)
+        self._held["sector_positions"].bind(Texture.SPOTS)
         spacings.bind(Texture.SPACINGS)
         self._bins.items.bind(Texture.LISTED)
         discs.buffer.bind_to_storage_buffer(Storage.SIGHTS)

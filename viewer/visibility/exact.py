@@ -148,12 +148,12 @@ class LowerSide:
         less = kernel(seen.distance, seen.beyond, float(np.linalg.norm(seen.middle)))
         squared = (across**2).sum(axis=1)
         heights = (squared / (1 + np.sqrt(1 + squared)) + less) / (1 - less)
-        places = np.concatenate([_scaled(across), _scaled(heights[:, None])], axis=1)
+        scaled = np.concatenate([_scaled(across), _scaled(heights[:, None])], axis=1)
         # Above all, in the middle, it makes a body of what is flat, and is no part of the lower side.
-        above = np.append(places[:, :2].mean(axis=0), 5.0)
-        beside = np.pad(_missing_axes(places[:, :2]), ((0, 0), (0, 1)), constant_values=2.0)
+        above = np.append(scaled[:, :2].mean(axis=0), 5.0)
+        beside = np.pad(_missing_axes(scaled[:, :2]), ((0, 0), (0, 1)), constant_values=2.0)
         beside[:, :2] += above[:2]
-        body = np.concatenate([places, beside, above[None]])
+        body = np.concatenate([scaled, beside, above[None]])
         triangles = _triangles(body)
         first, second, third = (body[column, :2] for column in triangles.T)
         (x, y), (far_x, far_y) = (second - first).T, (third - first).T
@@ -192,11 +192,11 @@ def flipped_triangles(seen: SeenPoints, kernel: Kernel) -> tuple[Floats, NDArray
     return flipped, _triangles(np.concatenate([flipped, np.zeros((1, 3)), _missing_axes(flipped)]))
 
 
-def _triangles(places: Floats) -> NDArray[np.intp]:
+def _triangles(scaled: Floats) -> NDArray[np.intp]:
     """The triangles (T, 3) of a convex hull, counterclockwise from outside."""
     from open3d import geometry, utility
 
-    hull, rows = geometry.PointCloud(utility.Vector3dVector(places)).compute_convex_hull()
+    hull, rows = geometry.PointCloud(utility.Vector3dVector(scaled)).compute_convex_hull()
     return np.asarray(rows, np.intp)[np.asarray(hull.triangles)]
 
 

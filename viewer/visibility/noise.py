@@ -45,7 +45,7 @@ class Noise:
 
 
 def noise_of(cloud: PointCloud) -> Noise:
-    """The noise of a cloud, the median of some places; none where there are few points. Found once."""
+    """The noise of a cloud, the median at some places; none where there are few points. Found once."""
     return cloud.remember(_noise)
 
 
@@ -55,8 +55,8 @@ def _noise(cloud: PointCloud) -> Noise:
         return noise
     if body_of(cloud).count < len(cloud):
         cloud = PointCloud(positions=cloud.positions[copies(cloud) == NOTHING], origin=cloud.origin)
-    places = min(max(_LOOKED_AT // len(cloud), _PLACES[0]), _PLACES[1])
-    rows = np.linspace(0, len(cloud) - 1, places).astype(int).tolist()
+    count = min(max(_LOOKED_AT // len(cloud), _PLACES[0]), _PLACES[1])
+    rows = np.linspace(0, len(cloud) - 1, count).astype(int).tolist()
     for nearest in _NEAREST:
         if 2 * nearest > len(cloud):
             break
@@ -98,12 +98,12 @@ def _moved_to_planes(points: NDArray[np.float64], edge: float, farthest: float) 
     reaches."""
     from .noise_kernels import move_to_planes
 
-    places = (points - np.median(points, axis=0)) / edge + _MOST_CELLS
-    rows = np.flatnonzero(((places > 1) & (places < 2 * _MOST_CELLS - 1)).all(axis=1))
-    cells = np.floor(places[rows]).astype(np.int64)
+    in_cells = (points - np.median(points, axis=0)) / edge + _MOST_CELLS
+    rows = np.flatnonzero(((in_cells > 1) & (in_cells < 2 * _MOST_CELLS - 1)).all(axis=1))
+    cells = np.floor(in_cells[rows]).astype(np.int64)
     codes = (cells[:, 0] << 42) + (cells[:, 1] << 21) + cells[:, 2]
     order = codes.argsort(kind="stable")
     firsts = np.flatnonzero(np.diff(codes[order], prepend=-1, append=-1))
     moves = np.zeros((len(points), 3))
-    move_to_planes(places, rows[order], firsts, codes[order][firsts[:-1]], _ENOUGH, farthest / edge, moves)
+    move_to_planes(in_cells, rows[order], firsts, codes[order][firsts[:-1]], _ENOUGH, farthest / edge, moves)
     return points + edge * moves

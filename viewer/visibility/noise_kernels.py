@@ -45,7 +45,7 @@ def _shift(sums: NDArray[np.float64], x: float, y: float, z: float, shifted: NDA
 
 @compiled
 def move_to_planes(
-    places: NDArray[np.float64],
+    in_cells: NDArray[np.float64],
     rows: NDArray[np.intp],
     firsts: NDArray[np.intp],
     codes: NDArray[np.int64],
@@ -55,7 +55,7 @@ def move_to_planes(
 ) -> None:
     """Moves of points (N, 3) to the planes of least squares through those around, weighted by a B-spline.
 
-    places: (N, 3), in edges of cells from the corner of the first. rows: of points in the order of their
+    in_cells: (N, 3), in edges of cells from the corner of the first. rows: of points in the order of their
     cells, of which `firsts` (M + 1,) are the first ones of each, and codes (M,) the cells, ascending: x, y
     and z, 21 bits each, none 0. What has fewer than `enough` around, by their weights, stays. farthest: that
     one is moved, edges.
@@ -67,7 +67,11 @@ def move_to_planes(
         _middle(codes[cell], middle)
         sums = cells[cell]
         for row in rows[firsts[cell] : firsts[cell + 1]]:
-            x, y, z = places[row, 0] - middle[0], places[row, 1] - middle[1], places[row, 2] - middle[2]
+            x, y, z = (
+                in_cells[row, 0] - middle[0],
+                in_cells[row, 1] - middle[1],
+                in_cells[row, 2] - middle[2],
+            )
             sums[0] += 1.0
             sums[1] += x
             sums[2] += y
@@ -87,13 +91,17 @@ def move_to_planes(
         for number in range(27):
             x, y, z = number // 9 - 1, number // 3 % 3 - 1, number % 3 - 1
             code = codes[cell] + (x << (2 * _BITS)) + (y << _BITS) + z
-            place = np.searchsorted(codes, code)
-            if place < count and codes[place] == code:
-                _shift(cells[place], x, y, z, around[found])
+            at = np.searchsorted(codes, code)
+            if at < count and codes[at] == code:
+                _shift(cells[at], x, y, z, around[found])
                 steps[found, 0], steps[found, 1], steps[found, 2] = x, y, z
                 found += 1
         for row in rows[firsts[cell] : firsts[cell + 1]]:
-            x, y, z = places[row, 0] - middle[0], places[row, 1] - middle[1], places[row, 2] - middle[2]
+            x, y, z = (
+                in_cells[row, 0] - middle[0],
+                in_cells[row, 1] - middle[1],
+                in_cells[row, 2] - middle[2],
+            )
             sums[:] = 0.0
             for i in range(found):
                 weight = _weight(x - steps[i, 0]) * _weight(y - steps[i, 1]) * _weight(z - steps[i, 2])

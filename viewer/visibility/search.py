@@ -54,7 +54,7 @@ def mark_visible(pose: GpuPose, frame: FrameView, surface: Surface) -> gl.Buffer
 
     The pose has points.
     """
-    return surface.keep(SeenPicture).look(pose, frame, surface, SearchSettings()).visible
+    return surface.cached(SeenPicture).look(pose, frame, surface, SearchSettings()).visible
 
 
 class _Search:
@@ -97,7 +97,7 @@ class _Search:
             self._covering = Covering(self._gpu, len(pose.cloud))
         self._covering.find(
             steady_points(pose),
-            pose.keep(Spacings).texels,
+            pose.cached(Spacings).texels,
             found.sectors,
             found.spacing / found.sectors.edge,
             _clearance(pose),
@@ -273,7 +273,7 @@ def visible_points(
     search = chosen_search(found, sectors, steps)
     gpu.activate()
     gpu.collect()
-    asked = gpu.keep(_Asked)
+    asked = gpu.cached(_Asked)
     pose = asked.pose_of(cloud)
     rows = (asked.hull(pose, search) if mode == HULL else asked.uncovered(pose, found)).visible_rows()
     return rows if cloud.ids is None else cloud.ids[rows]

@@ -135,13 +135,13 @@ class Sectors:
 
     # --- the twin of the shader -------------------------------------------------------
 
-    def distances(self, spots: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distances of spots from the eye, (N,), scan units."""
+    def distances(self, sector_positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Distances of sector_positions from the eye, (N,), scan units."""
         if self.mapping == "cube":
-            return self.unit * np.linalg.norm(spots, axis=1)
-        return self.distance + self.unit * spots[:, 2]
+            return self.unit * np.linalg.norm(sector_positions, axis=1)
+        return self.distance + self.unit * sector_positions[:, 2]
 
-    def spots(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
+    def sector_positions(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
         """Spots of positions on the GPU, (N, 3); NaN where there is none, behind the eye or at it."""
         columns = np.array(self.to_sectors)
         offsets = positions.astype(np.float64) @ columns[:3, :3] + columns[3, :3]
@@ -152,13 +152,13 @@ class Sectors:
             ahead = 1 + self.closeness * forward
             far = np.sqrt(ahead**2 + self.closeness**2 * (aside**2).sum(axis=1))
             farther = (self.closeness * (offsets**2).sum(axis=1) + 2 * forward) / (far + 1)
-            spots = np.column_stack([self.lateral * aside / ahead[:, None], farther])
-            spots[~(ahead > 0)] = np.nan
-            return spots
+            sector_positions = np.column_stack([self.lateral * aside / ahead[:, None], farther])
+            sector_positions[~(ahead > 0)] = np.nan
+            return sector_positions
 
-    def sector_of(self, spots: NDArray[np.float64]) -> NDArray[np.uint32]:
-        """The sectors that spots are in, (N,); NOTHING where in none."""
-        face, tangents = self._on_face(spots)
+    def sector_of(self, sector_positions: NDArray[np.float64]) -> NDArray[np.uint32]:
+        """The sectors that sector_positions are in, (N,); NOTHING where in none."""
+        face, tangents = self._on_face(sector_positions)
         with np.errstate(invalid="ignore"):
             angles = np.arctan(self.tangent * tangents) / self.tangent if self.tangent else tangents
             at = np.floor((angles / self.half_angle + 1) * (self.edge / 2))
@@ -171,21 +171,23 @@ class Sectors:
         sectors[outside] = NOTHING
         return sectors
 
-    def _on_face(self, spots: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def _on_face(
+        self, sector_positions: NDArray[np.float64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         if self.mapping == "grid":
-            return np.zeros(len(spots), np.int64), spots[:, :2]
-        size = np.abs(spots)
+            return np.zeros(len(sector_positions), np.int64), sector_positions[:, :2]
+        size = np.abs(sector_positions)
         axis = np.nan_to_num(size, nan=-1.0).argmax(axis=1)
-        rows = np.arange(len(spots))
-        forward = spots[rows, axis]
+        rows = np.arange(len(sector_positions))
+        forward = sector_positions[rows, axis]
         behind = forward < 0
-        first, second = spots[rows, (axis + 1) % 3], spots[rows, (axis + 2) % 3]
+        first, second = sector_positions[rows, (axis + 1) % 3], sector_positions[rows, (axis + 2) % 3]
         right, down = np.where(behind, second, first), np.where(behind, first, second)
         return 2 * axis + behind, np.column_stack([right, down]) / np.abs(forward)[:, None]
 
     def directions(self, sectors: NDArray[np.uint32]) -> NDArray[np.float64]:
-        """The directions of sectors' middles, (N, 3): (1, right, down) in the terms of spots (grid), unit
-        vectors (cube)."""
+        """The directions of sectors' middles, (N, 3): (1, right, down) like `sector_positions` (grid),
+        or unit vectors (cube)."""
         numbers = sectors.astype(np.int64)
         at = np.column_stack([numbers % self.edge, numbers // self.edge % self.edge])
         angles = self.half_angle * ((2 * at + 1) / self.edge - 1)
@@ -224,7 +226,7 @@ class Sectors:
         column, line = (right + edge - 1) // 2, (down + edge - 1) // 2
         return ((2 * axis + behind) * edge + line) * edge + column
 
-    def keys(self, spots: NDArray[np.float64], sectors: NDArray[np.uint32]) -> NDArray[np.float64]:
+    def keys(self, sector_positions: NDArray[np.float64], sectors: NDArray[np.uint32]) -> NDArray[np.float64]:
         """Keys, which are least for the point whose flip is farthest along a sector's direction, (N,).
 
         A point at rho u from the eye is flipped to (2R - rho) u, whose projection on d is
@@ -234,17 +236,17 @@ class Sectors:
         """
         directions = self.directions(sectors)
         if self.mapping == "cube":
-            far = np.linalg.norm(spots, axis=1)
-            q = ((spots / far[:, None] - directions) ** 2).sum(axis=1)
+            far = np.linalg.norm(sector_positions, axis=1)
+            q = ((sector_positions / far[:, None] - directions) ** 2).sum(axis=1)
             return self.weight * q + far * (1 - q / 2)
         t2 = self.tangent**2
-        point, aside = spots[:, :2], directions[:, 1:]
+        point, aside = sector_positions[:, :2], directions[:, 1:]
         apart = point - aside
         turn = point[:, 0] * apart[:, 1] - point[:, 1] * apart[:, 0]
         both = np.sqrt((1 + t2 * (point**2).sum(axis=1)) * (1 + t2 * (aside**2).sum(axis=1)))
         squared = (apart**2).sum(axis=1) + t2 * turn**2
         q = 2 * squared / (both * (both + 1 + t2 * (point * aside).sum(axis=1)))  # |u - d|^2 / t2
-        return self.weight * q + spots[:, 2] * (1 - t2 * q / 2)
+        return self.weight * q + sector_positions[:, 2] * (1 - t2 * q / 2)
 
 
 def _columns(axes: NDArray[np.float64], base: NDArray[np.float64], unit: float) -> Mat4:

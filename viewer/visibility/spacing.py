@@ -19,7 +19,7 @@ from .noise import noise_of, steady_positions
 ENOUGH = 6  # points in a ball that tell how far apart they lie
 _BALL = 2.0  # its radius, in usual distances between points; it is doubled where there are too few
 _LEVELS = 6
-_PER_PLACE = 4  # points, in the table of voxels
+_PER_CELL = 4  # points, in the table of voxels
 
 
 def copies_in(pose: GpuPose) -> gl.BufferTexture | None:
@@ -66,8 +66,8 @@ class Spacings:
 
     def _find(self, pose: GpuPose) -> None:
         gpu, count, repeated = pose.gpu, len(pose.cloud), copies_in(pose)
-        places = 1 << max(count // _PER_PLACE, 1).bit_length()
-        bins, todo, sparse = Bins(gpu, places), IndexList(gpu, count), IndexList(gpu, count)
+        cells = 1 << max(count // _PER_CELL, 1).bit_length()
+        bins, todo, sparse = Bins(gpu, cells), IndexList(gpu, count), IndexList(gpu, count)
         todo.write(np.arange(count, dtype=np.uint32))
         edge = 2 * _BALL * pose.stored.remember(_usual)
         for level in range(_LEVELS):
@@ -75,7 +75,7 @@ class Spacings:
                 break
 
             def bind(program: Program, per_voxel: float = 1 / (edge * 2**level)) -> None:
-                gpu.set(program, per_voxel=per_voxel, table_mask=places - 1)
+                gpu.set(program, per_voxel=per_voxel, table_mask=cells - 1)
                 steady_points(pose).bind(Texture.POSITIONS)
                 if repeated is not None:
                     repeated.bind(Texture.COPIES)

@@ -54,7 +54,7 @@ class Encoded:
 def encoded(renderer: Renderer, request: Request, size: tuple[int, int]) -> Encoded:
     surface = Surface(renderer.gpu, size)
     render_frame(renderer, request, surface)
-    buffers, count = surface.keep(WordBuffers), len(request.pose.cloud)
+    buffers, count = surface.cached(WordBuffers), len(request.pose.cloud)
 
     def read(name: str, kind: Any, length: int) -> NDArray:
         texels = buffers.reserve(name, 0)

@@ -21,7 +21,8 @@ def test_half_of_the_sectors_inside_the_outline_have_a_point() -> None:
     towards = np.random.default_rng(0).uniform(-1, 1, (20_000, 2))
     points = np.column_stack([towards, np.zeros(len(towards))])
     found = calibrated(points, EYE)
-    home = found.sectors.sector_of(found.sectors.spots(points - PointCloud.from_arrays(points).origin))
+    sectors, origin = found.sectors, PointCloud.from_arrays(points).origin
+    home = sectors.sector_of(sectors.sector_positions(points - origin))
     counts = np.bincount(home[home != NOTHING], minlength=found.sectors.count)
     inside = found.occupied * found.sectors.count
     # The edge is on a scale of four steps an octave.

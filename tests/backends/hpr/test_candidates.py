@@ -56,8 +56,8 @@ def propagated(
     """Rows of all sectors after so many steps in which all of them look at all neighbours, and which sectors
     lie in cells of so many along an edge that a point falls into: the others get nothing."""
     every = np.arange(sectors.count, dtype=np.uint32)
-    spots = sectors.spots(points)
-    home = sectors.sector_of(spots)
+    at_sectors = sectors.sector_positions(points)
+    home = sectors.sector_of(at_sectors)
 
     def cell_of(sector: NDArray[np.uint32]) -> NDArray[np.int64]:
         edge = sectors.edge
@@ -66,7 +66,7 @@ def propagated(
 
     inside = np.isin(cell_of(every), cell_of(home))
     rows, keys = np.full(sectors.count, NOTHING, np.uint32), np.full(sectors.count, np.inf)
-    own = sectors.keys(spots, home)
+    own = sectors.keys(at_sectors, home)
     for row in np.lexsort((np.arange(len(points)), own))[::-1]:
         rows[home[row]], keys[home[row]] = row, own[row]
     for _ in range(steps):
@@ -76,7 +76,7 @@ def propagated(
             looking = np.flatnonzero(inside & (near != NOTHING))
             other = before[near[looking]]
             looking, other = looking[other != NOTHING], other[other != NOTHING]
-            found = sectors.keys(spots[other], every[looking])
+            found = sectors.keys(at_sectors[other], every[looking])
             better = (found < keys[looking]) | ((found == keys[looking]) & (other < rows[looking]))
             rows[looking[better]], keys[looking[better]] = other[better], found[better]
     return rows, inside
@@ -93,12 +93,14 @@ def test_propagation_is_that_of_all_sectors_at_once(find: Find, distance: float,
     expected, inside = propagated(sectors, points, steps, 2**halvings)
     assert inside.any()
     differing = found != expected
-    spots, every = sectors.spots(points), np.arange(sectors.count, dtype=np.uint32)
+    at_sectors, every = sectors.sector_positions(points), np.arange(sectors.count, dtype=np.uint32)
     assert (found[~inside] == NOTHING).all()
     assert differing.mean() < 0.01
     at = np.flatnonzero(differing & (found != NOTHING) & (expected != NOTHING))  # as good as equal
     np.testing.assert_allclose(
-        sectors.keys(spots[found[at]], every[at]), sectors.keys(spots[expected[at]], every[at]), atol=1e-5
+        sectors.keys(at_sectors[found[at]], every[at]),
+        sectors.keys(at_sectors[expected[at]], every[at]),
+        atol=1e-5,
     )
 
 
@@ -108,10 +110,12 @@ def test_until_nothing_changes_each_sector_has_the_best_of_all_points(find: Find
     points = points_in_ball(400)
     sectors = Sectors.around(ZERO, 1.0, np.array([0.0, 0.0, 3.0]), ZERO, 96).weighted(weight)
     candidates = find(points, sectors, UNLIMITED)
-    rows, spots = rows_of(candidates), sectors.spots(points)
+    rows, at_sectors = rows_of(candidates), sectors.sector_positions(points)
     filled = np.flatnonzero(rows != NOTHING).astype(np.uint32)
-    best = np.min([sectors.keys(spots[[row] * len(filled)], filled) for row in range(len(points))], axis=0)
-    found = sectors.keys(spots[rows[filled]], filled)
+    best = np.min(
+        [sectors.keys(at_sectors[[row] * len(filled)], filled) for row in range(len(points))], axis=0
+    )
+    found = sectors.keys(at_sectors[rows[filled]], filled)
     assert len(filled) > 8000
     assert (found - best).max() < 1e-5
 

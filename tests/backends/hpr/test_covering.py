@@ -105,7 +105,7 @@ class Watched:
         covering = Covering(self.pose.gpu, len(self.pose.cloud))
         covering.find(
             self.pose.array("positions"),
-            self.pose.keep(Spacings).texels,
+            self.pose.cached(Spacings).texels,
             self.found.sectors,
             self.found.spacing / self.found.sectors.edge / finer,
             front=front,
@@ -161,7 +161,7 @@ def test_spacings_are_those_of_the_plain_twin(renderer: Renderer) -> None:
     sparse = rng.uniform(3, 9, (200, 3))
     points = np.concatenate([spread(2000), sparse])
     pose = GpuPose(renderer.gpu, Pose(0, 0.0, "", PointCloud.from_arrays(points)))
-    found = np.frombuffer(pose.keep(Spacings).texels.buffer.read(), np.float32)
+    found = np.frombuffer(pose.cached(Spacings).texels.buffer.read(), np.float32)
     np.testing.assert_allclose(found, apart_at(pose.stored.world()), rtol=1e-5)
 
 

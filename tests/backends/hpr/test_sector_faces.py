@@ -124,7 +124,7 @@ def test_faces_larger_than_the_picture(renderer: Renderer, monkeypatch: pytest.M
         scene = Scene.of(renderer, bumpy(1000), camera, edge=40, size=(320, 240))
         drawn(renderer, scene, 10.0).release()
         pictures.append(scene.surface)
-        assert (len(scene.surface.keep(faces_module.FaceLists).large) > 0) == (large < 1 << 30)
+        assert (len(scene.surface.cached(faces_module.FaceLists).large) > 0) == (large < 1 << 30)
     assert np.isfinite(pictures[0].depth).mean() > 0.7
     np.testing.assert_array_equal(pictures[0].depth, pictures[1].depth)
     np.testing.assert_array_equal(pictures[0].row, pictures[1].row)

@@ -87,7 +87,7 @@ def test_neighbors_turn_the_same_way_on_every_face() -> None:
 def solid_angles(sectors: Sectors) -> NDArray[np.float64]:
     """Of random directions, how many are in each sector, (k,)."""
     points = np.random.default_rng(3).normal(size=(200_000, 3))
-    found = sectors.sector_of(sectors.spots(points))
+    found = sectors.sector_of(sectors.sector_positions(points))
     return np.bincount(found, minlength=sectors.count).astype(np.float64)
 
 
@@ -102,7 +102,7 @@ def test_the_grid_covers_the_sphere_and_little_more(distance: float) -> None:
     sectors = sectors_from(distance, 64)
     points = np.random.default_rng(0).normal(size=(20_000, 3))
     points /= np.linalg.norm(points, axis=1)[:, None] * (1 + 1e-6)
-    found = sectors.sector_of(sectors.spots(points))
+    found = sectors.sector_of(sectors.sector_positions(points))
     assert (found != NOTHING).all()
     column, line = found % 64, found // 64
     assert {column.min(), column.max(), line.min(), line.max()} == {0, 63}
@@ -149,12 +149,12 @@ def test_keys_keep_the_order_of_projections(
     candidates = Candidates(gpu, sectors, len(points))
     candidates.find(positions, sectors, 0)
     home, key = np.frombuffer(candidates.homes.buffer.read(), np.uint32).reshape(-1, 2).T
-    spots = np.frombuffer(candidates.spots.buffer.read(), np.float32).reshape(-1, 3)
+    at_sectors = np.frombuffer(candidates.sector_positions.buffer.read(), np.float32).reshape(-1, 3)
     kept = np.flatnonzero(home != NOTHING)
     assert len(kept) == len(points)
-    twin = sectors.spots(points)
+    twin = sectors.sector_positions(points)
     near = np.abs(twin[:, 2]) > 0.05 if sectors.mapping == "grid" else np.ones(len(points), bool)
-    np.testing.assert_allclose(spots[near], twin[near], rtol=2e-5, atol=1e-6)
+    np.testing.assert_allclose(at_sectors[near], twin[near], rtol=2e-5, atol=1e-6)
     agree = sectors.sector_of(twin) == home
     assert agree.mean() > 0.99
     np.testing.assert_allclose(

@@ -37,7 +37,7 @@ def best_weights(renderer: Renderer, views: tuple[RangeView, ...]) -> NDArray[np
     surface = Surface(renderer.gpu, size)
     params = backend("laplacian").params({"detail": 0.5})  # also of one view alone
     render_frame(renderer, Request(Pose.of(0, 0.0, "x", views), camera, "laplacian", params), surface)
-    words = np.frombuffer(surface.keep(Pictures).winners.buffer.read(), np.uint32).reshape(-1, 4)
+    words = np.frombuffer(surface.cached(Pictures).winners.buffer.read(), np.uint32).reshape(-1, 4)
     return (words[:, 0] & 0xFFFF).astype(np.uint16).view(np.float16).astype(float).reshape(SHAPE)
 
 

@@ -43,7 +43,7 @@ def growth(bench: Bench, view: JudgedView) -> Iterator[Row]:
         candidates = Candidates(gpu, sectors, len(view.cloud))
         nbytes = candidates.nbytes
         candidates.release()
-        cells = sectors.sector_of(sectors.spots(view.cloud.positions.astype(np.float64)))
+        cells = sectors.sector_of(sectors.sector_positions(view.cloud.positions.astype(np.float64)))
         yield {
             "method": HULL,
             "sectors": sectors.count,

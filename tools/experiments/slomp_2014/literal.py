@@ -81,7 +81,7 @@ class _Literal(Backend):
         own = pose.cloud.radii is not None
         points = Points(pose, own, len(pose.cloud), colored=True)
         splats = _splats(0.0 if own else _RADIUS_PER_SPACING * pose.stored.remember(typical_spacing))
-        sums = surface.keep(_new_sums)
+        sums = surface.cached(_new_sums)
         sums.target.use()
         sums.clear()
         sums.clear_depth()

@@ -15,7 +15,7 @@ from ...params import param
 from ...picture.surface import Surface
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
-from ...splatting.packed import WAYS, draw_depths, draw_splats
+from ...splatting.packed import VARIANTS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
@@ -111,7 +111,7 @@ class Params:
     instancing: str = param(
         "auto",
         "How the GPU draws splats. auto: the fastest way on this device",
-        choices=("auto", *WAYS),
+        choices=("auto", *VARIANTS),
         affects="speed",
         group=_SPEED,
     )
@@ -156,7 +156,7 @@ class AutoSplats(Backend):
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
         params: Params = frame.params
-        found = surface.keep(Neighborhoods)
+        found = surface.cached(Neighborhoods)
         search = search_of(params, pose)
         anew = bool(frame.changed - {"parameters", "values"})
         border = border_of(pose.cloud, frame.view, params.k)
@@ -167,14 +167,14 @@ class AutoSplats(Backend):
             surface.own("normal")
             give_value(found, surface, params.radius_scale)
             return surface.stats.share < 1
-        way, scale = params.instancing, params.radius_scale
+        instancing, scale = params.instancing, params.radius_scale
         if not found.is_whole:
-            draw_depths(_points(pose, found, params), surface, instancing=way, radius_scale=scale)
+            draw_depths(_points(pose, found, params), surface, instancing=instancing, radius_scale=scale)
             found.find_late(pose, surface, search)
         draw_splats(
             _points(pose, found, params),
             surface,
-            instancing=way,
+            instancing=instancing,
             radius_scale=scale,
             two=params.passes == "two",
             refine=params.refine,

@@ -55,7 +55,7 @@ def give_value(found: Neighborhoods, surface: Surface, radius_scale: float) -> N
     """Give the surface the one of `VALUES` that it wants, if any. radius_scale: factor on radii of splats."""
     if (name := surface.wanted) is None:
         return
-    gpu, texels = surface.gpu, surface.keep(_ByRow).reserve(max(len(surface.pose.cloud), 1))
+    gpu, texels = surface.gpu, surface.cached(_ByRow).reserve(max(len(surface.pose.cloud), 1))
     surface.give(texels)
     if found.count:
         with gpu.timers.measure("values"):

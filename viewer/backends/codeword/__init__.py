@@ -88,7 +88,7 @@ class CodeWords(Backend):
         is_lit = params.lighting == "own"
         # Colours of words that nobody sees need not be found.
         look = surface.look if is_lit else replace(surface.look, color_by="plain")
-        words = surface.keep(WordBuffers)
+        words = surface.cached(WordBuffers)
         made = _encoded_here if params.quality == "table" else _encoded_on_cpu
         sheet, materials = made(pose, frame, surface, look, words)
         lit = (surface.own("color", is_lit=True).buffer, materials) if is_lit else None
@@ -115,7 +115,7 @@ def _encoded_on_cpu(
 ) -> tuple[Sheet, Materials]:
     """Words of exact outlines, which take float64, and their materials."""
     params: Params = frame.params
-    part = surface.keep(_Sampled).take(pose, surface, frame.share)
+    part = surface.cached(_Sampled).take(pose, surface, frame.share)
     with surface.gpu.timers.measure("encode"):
         stream = words_of(part.pose, frame.view, look, part.enlarged(params), part.layers(surface.layers))
     is_lit = params.lighting == "own"

@@ -218,7 +218,7 @@ def _emit(
     }
     program = gpu.compute("codeword/words.comp", defines, params=given)
     words.bind("elements")
-    gpu.keep(_Table, given.steps).bind()
+    gpu.cached(_Table, given.steps).bind()
     cursors.bind_to_storage_buffer(Storage.CURSORS)
     if number == 1:
         words.bind("heads")

@@ -223,7 +223,7 @@ def _bind_lighting(words: WordBuffers, colors: moderngl.Buffer, materials: Mater
     tables = np.stack([materials.ambient, materials.diffuse, materials.specular], axis=1)
     words.write("materials", tables.astype(np.uint32))
     words.bind("heads", "materials")
-    words.gpu.keep(_light_bytes).bind(Texture.ENCODED)
+    words.gpu.cached(_light_bytes).bind(Texture.ENCODED)
     colors.bind_to_storage_buffer(Storage.COLOR)
 
 

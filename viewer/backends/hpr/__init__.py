@@ -161,7 +161,7 @@ class VisiblePoints(Backend):
         if not len(pose.cloud):
             surface.clear()
             return False
-        seen = surface.keep(SeenPicture)
+        seen = surface.cached(SeenPicture)
         candidates = seen.look(pose, frame, surface, frame.params.search)
         assert seen.calibration is not None
         return show_visible(pose, frame, surface, candidates, seen.calibration)

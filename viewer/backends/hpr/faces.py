@@ -71,7 +71,7 @@ def draw_faces(
     corners; colours, normals and values lie between those of all three.
     """
     gpu, sectors, count = surface.gpu, candidates.sectors, len(pose.cloud)
-    lists = surface.keep(FaceLists)
+    lists = surface.cached(FaceLists)
     lists.reserve(_quads(candidates), max(count, 1))
     first_point = 8 * sectors.count
 

@@ -30,7 +30,7 @@ def show_visible(
 
     seen: knows which they are.
     """
-    params, splats = frame.params, surface.keep(SectorSplats)
+    params, splats = frame.params, surface.cached(SectorSplats)
     if params.output != "points" or wants_normals(surface.look):
         nearest = splats.of_visible(pose, seen, calibration, surface)
     if params.output == "faces":

@@ -51,7 +51,7 @@ class PulledImages:
 def fill_between(pose: GpuPose, surface: Surface, splats: SectorSplats, radius_scale: float = 1.0) -> None:
     """Fill the pixels between the points that the surface shows, a pixel each. splats: of these.
     radius_scale: factor on their radii."""
-    gpu, images = surface.gpu, surface.keep(PulledImages)
+    gpu, images = surface.gpu, surface.cached(PulledImages)
     count = surface.size[0] * surface.size[1]
     colors, values = pose.find("colors"), surface.row_values
     defines = {"HAS_COLORS": int(colors is not None), "HAS_VALUES": int(values is not None)}

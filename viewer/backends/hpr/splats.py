@@ -92,7 +92,7 @@ class SectorSplats:
 
         def bind(_: Program) -> None:
             candidates.rows.bind(Texture.CANDIDATES)
-            candidates.spots.bind(Texture.SPOTS)
+            candidates.sector_positions.bind(Texture.SPOTS)
             pose.array("positions").bind(Texture.POSITIONS)
 
         def visits(cells: str) -> Visits:

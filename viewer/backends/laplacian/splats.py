@@ -78,10 +78,10 @@ def add_splats(
 ) -> FixedPoint:
     """Add up the samples of a view that the surface which pixels show does not hide, in that many levels of
     the picture; gives the steps of the sums."""
-    samples, splats = source.samples, surface.keep(CapturedLevels)
+    samples, splats = source.samples, surface.cached(CapturedLevels)
     nearest, _ = levels_that_fit(surface, view, source.params.detail)
     farthest = samples.levels - levels
-    used = samples.places[view][max(min(nearest, farthest), 0) :]
+    used = samples.view_levels[view][max(min(nearest, farthest), 0) :]
     first = used[0].first
     count = used[-1].first + used[-1].count - first
     fixed = FixedPoint((1.0, _LIMIT, _LIMIT, _LIMIT), (_FINEST,) * 4, count)

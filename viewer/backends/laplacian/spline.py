@@ -91,7 +91,7 @@ def spline_views(surface: Surface, source: ViewSource, channels: Sequence[str], 
 
     channels: what they have. Raises InputError for a picture that is too large for the driver.
     """
-    views = surface.keep(DrawnTiles).read_views()
+    views = surface.cached(DrawnTiles).read_views()
     colored = "color" in channels
     merges = colored and len(views) > (0 if bands.captured else 1)
     sharpens = colored and bands.detail != 1 and not bands.captured
@@ -122,7 +122,7 @@ class _Spline:
     def __init__(self, surface: Surface, source: ViewSource, channels: Sequence[str], bands: Bands) -> None:
         self._gpu, self._surface, self._source, self._channels = surface.gpu, surface, source, channels
         self._covered = surface.list_covered()
-        self._pictures = surface.keep(Pictures)
+        self._pictures = surface.cached(Pictures)
         self._bands = bands
         self._levels = range(1, min(bands.levels, len(self._pictures.sizes)))
         self._light = {"LOGARITHMIC": int(bands.logarithmic)}
@@ -147,17 +147,17 @@ class _Spline:
             **self._crisp,
         }
         look = self._gpu.compute("laplacian/look.comp", defines, params=self._source.params)
-        for place, view in enumerate(views):
+        for turn, view in enumerate(views):
             with self._gpu.timers.measure(f"view {view}"):
-                gl.clear_words(pictures.views[place].buffer, 0)
+                gl.clear_words(pictures.views[turn].buffer, 0)
                 self._source.bind()
                 surface.bind_textures()
                 for name in self._channels:
                     surface.own(name).bind(Texture[f"OWN_{name.upper()}S"])
-                pictures.views[place].buffer.bind_to_storage_buffer(Storage.VIEW_PICTURE)
+                pictures.views[turn].buffer.bind_to_storage_buffer(Storage.VIEW_PICTURE)
                 pictures.merged.buffer.bind_to_storage_buffer(Storage.MERGED)
                 pictures.winners.buffer.bind_to_storage_buffer(Storage.WINNERS)
-                self._gpu.set(look, number=view, first=place == 0)
+                self._gpu.set(look, number=view, first=turn == 0)
                 self._run(look)
 
     def merge_bands(self, views: Sequence[int]) -> None:
@@ -200,7 +200,7 @@ class _Spline:
 
     def _add_captured(self, views: Sequence[int]) -> None:
         """Add up the bands of captured images: of as many levels as all views have from the one that fits."""
-        pictures, gpu, splats = self._pictures, self._gpu, self._surface.keep(CapturedLevels)
+        pictures, gpu, splats = self._pictures, self._gpu, self._surface.cached(CapturedLevels)
         gl.clear_words(splats.finest.buffer, 0)
         source, bands = self._source, self._bands
         fits = max(levels_that_fit(self._surface, view, source.params.detail)[1] for view in views)
@@ -219,7 +219,7 @@ class _Spline:
 
     def _divide(self, fixed: FixedPoint) -> None:
         """Make the coarser levels of what the samples of a view show."""
-        pictures, splats = self._pictures, self._surface.keep(CapturedLevels)
+        pictures, splats = self._pictures, self._surface.cached(CapturedLevels)
         program = self._gpu.compute("laplacian/divide.comp", fixed.defines)
         splats.sums.buffer.bind_to_storage_buffer(Storage.SUMS)
         pictures.bands.buffer.bind_to_storage_buffer(Storage.BANDS)
@@ -228,7 +228,11 @@ class _Spline:
 
     def _combine(self, picture: gl.BufferTexture, level: int, fixed: FixedPoint) -> None:
         """Add a view's band of a level."""
-        pictures, splats, top = self._pictures, self._surface.keep(CapturedLevels), level == len(self._levels)
+        pictures, splats, top = (
+            self._pictures,
+            self._surface.cached(CapturedLevels),
+            level == len(self._levels),
+        )
         ends = {"FINEST": int(level == 0), "TOP": int(top)}
         program = self._gpu.compute("laplacian/combine.comp", {**self._taps, **fixed.defines, **ends})
         picture.bind(Texture.LOOKS)
@@ -262,7 +266,7 @@ class _Spline:
             surface.bind_own("level", *self._channels)
             pictures.merged.bind(Texture.COLORS)
             pictures.winners.bind(Texture.BEST)
-            (surface.keep(CapturedLevels).finest if captured else pictures.bands).bind(Texture.SAMPLES)
+            (surface.cached(CapturedLevels).finest if captured else pictures.bands).bind(Texture.SAMPLES)
             pictures.merged_bands.bind(Texture.DETAIL)
             self._set_levels(program, 1, 0)
             self._run(program)

@@ -29,7 +29,7 @@ from ...splatting.passes import blends
 from ...view import View
 from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, Backend, Derives, FrameView, Limit
 from .cubes import draw_cubes, shade_flat
-from .discs import WAYS, draw_discs
+from .discs import VARIANTS, draw_discs
 
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
@@ -149,7 +149,7 @@ class Params:
         "How the GPU draws octants. auto: the fastest way on this device; tiles: in a compute shader, or "
         "as faces if cubes are small; the others use a geometry shader, uniform blocks, buffer textures, "
         "vertex attributes or pulled vertices",
-        choices=("auto", *WAYS),
+        choices=("auto", *VARIANTS),
         affects="speed",
         group="Speed",
     )

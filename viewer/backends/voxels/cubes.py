@@ -43,13 +43,13 @@ def draw_cubes(points: Points, surface: Surface, instancing: str) -> None:
             "all voxels are smaller than a pixel, so each one is written to its pixel"
         )
     else:
-        feed = instancing_for(surface, "auto", "gs", "voxels", _OF_SOME, _ways)
+        feed = instancing_for(surface, "auto", "gs", "voxels", _OF_SOME, _variants)
         amplify(large, surface, feed, CUBE, _FRAGMENT, over=small is not None)
         surface.stats.chosen["instancing"] = feed if small is None else f"scatter, {feed}"
     surface.gpu.discard(*(part.rows for part in (small, large) if part is not None and part is not points))
 
 
-def _ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+def _variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
     points = Points.of(pose, surface, 1.0, use_radii=True)
     return {feed: partial(amplify, points, surface, feed, CUBE, _FRAGMENT) for feed in _OF_SOME}
 

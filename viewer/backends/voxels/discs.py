@@ -16,7 +16,7 @@ from ...splatting.subpixel import average, splat_subpixel, subpixel_share
 from ...splatting.tiles import splat
 
 TILES = "tiles"
-WAYS = (TILES, *FEEDS)
+VARIANTS = (TILES, *FEEDS)
 
 
 def draw_discs(
@@ -29,17 +29,17 @@ def draw_discs(
     """
     splats = _splats(radius_scale)
     share = subpixel_share(points, surface, splats)
-    way = _instancing(surface, instancing, two)
+    variant = _instancing(surface, instancing, two)
     if two and share < 1:
-        _draw(points, surface, splats, way, two)
+        _draw(points, surface, splats, variant, two)
         return
     if share > 0:
         splats = _splats(radius_scale, share)
-    if share > 0 and (way == TILES or instancing == "auto"):
+    if share > 0 and (variant == TILES or instancing == "auto"):
         surface.stats.skipped["tiles"] = "discs are smaller than a pixel, so each one is written to its pixel"
         splat_subpixel(points, surface, splats)
     else:
-        _draw(points, surface, splats, way, two=False)
+        _draw(points, surface, splats, variant, two=False)
     if share > 0:
         average(points, surface, splats)
 
@@ -58,20 +58,20 @@ def _splats(radius_scale: float, mean_share: float = 0.0) -> Splats:
     )
 
 
-def _draw(points: Points, surface: Surface, splats: Splats, way: str, two: bool) -> None:
-    if way == TILES:
+def _draw(points: Points, surface: Surface, splats: Splats, variant: str, two: bool) -> None:
+    if variant == TILES:
         (tiled_two_passes if two else splat)(points, surface, splats)
     elif two:
-        two_passes(points, surface, way, splats)
+        two_passes(points, surface, variant, splats)
     else:
-        amplify(points, surface, way, SURFEL, FRAGMENT, splats)
+        amplify(points, surface, variant, SURFEL, FRAGMENT, splats)
 
 
 def _instancing(surface: Surface, setting: str, two: bool) -> str:
     """How octants become discs; in one pass and in two this need not be the same."""
 
-    def ways(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
         points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {way: partial(_draw, points, surface, _splats(1.0), way, two) for way in WAYS}
+        return {variant: partial(_draw, points, surface, _splats(1.0), variant, two) for variant in VARIANTS}
 
-    return instancing_for(surface, setting, TILES, f"voxels as discs, {1 + two} passes", WAYS, ways)
+    return instancing_for(surface, setting, TILES, f"voxels as discs, {1 + two} passes", VARIANTS, variants)
