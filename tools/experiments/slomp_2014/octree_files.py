@@ -30,7 +30,7 @@ def written(options: Namespace) -> Iterator[Row]:
     """Bits a point of what `convert` writes: of a pose that stands alone, and of the one after it."""
     for scene, *clouds in octree_sizes.pairs(options.data):
         row = {"pose": scene, "points": spaced(len(clouds[1]))}
-        for prefix, (header, size) in zip(("", "told: "), _written(clouds), strict=True):
+        for prefix, (header, size) in zip(("", "relative: "), _written(clouds), strict=True):
             parts = {
                 "masks": sum(level.masks for level in header.levels),
                 "attributes": sum(level.attributes for level in header.levels),
