@@ -96,7 +96,8 @@ def backends_page() -> str:
         ),
     ]
     for backend in backends().values():
-        parts += [f"## {backend.title} (`--backend {backend.name}`)", wrapped(backend.about)]
+        about = f"`{backend.name}` {backend.about[0].lower()}{backend.about[1:]}"
+        parts += [f"## {backend.title} (`--backend {backend.name}`)", wrapped(about)]
         parts += tables_by_reader(backend.parameters)
         if backend.values:
             parts += [

@@ -54,7 +54,7 @@ _EYE_DOME = {"eye_dome": (None, True)}
 
 @dataclass(frozen=True)
 class Look:
-    """Colours, light and background of a picture, for all renderers.
+    """The look sets the colours, light and background of a picture, for all renderers.
 
     By default, `color_by` and `light` are `auto`. The picture then shows the scan's own colours. If the scan
     has normals, the light comes from the viewer. Without normals, eye-dome lighting shades the picture from
