@@ -24,7 +24,7 @@ _Array = NDArray[np.float64]
 ORDERS = ("value", "speed", "acceleration")  # by how often a curve is differentiated
 _EDGE = 1e-9  # relative: a point at the very edge of the window is in it, whatever rounding says
 _ALIKE = 1e-9  # relative: peaks that rounding alone tells apart
-_CERTAIN = 2.0  # standard deviations, from which on an amplitude is told from noise
+_CERTAIN = 2.0  # standard deviations, from which on an amplitude stands out of noise
 _AT_FRAME = 1e-6  # of the time from one frame to the next
 _SAME = 1e-12  # relative to values: an amplitude that rounding makes
 

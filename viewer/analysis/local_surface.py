@@ -39,7 +39,7 @@ class LocalSurface(NamedTuple):
     """The surface in the direction of a pixel, as points tell it.
 
     depth: there, scan units. slope: (2,) change of depth per pixel to the right and down. deviation: standard
-    deviation of `depth`, scan units. used: (n,) numbers of the points that told it, the nearest first.
+    deviation of `depth`, scan units. used: (n,) numbers of the points that gave it, the nearest first.
     doubt: the chance that another surface is seen there, 0 to 1: the pixel lies beyond points of this one,
     which may end before it, or of one before it, which may not. `deviation` holds how far apart they are.
     """

@@ -134,7 +134,7 @@ def pick(
         return Picked(
             _position(surface, pixel, depth),
             level,
-            *_told(surface, pixel, found, ids, points),
+            *_shown_by(surface, pixel, found, ids, points),
             between=found is not None and _is_between(surface, pixel, found, points),
         )
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
@@ -152,7 +152,7 @@ def pick(
     return Picked(
         _position(surface, pixel, depth if found is None else found.depth),
         level,
-        *_told(surface, pixel, found, ids, points),
+        *_shown_by(surface, pixel, found, ids, points),
         doubt=0.0 if found is None else found.doubt,
         row=row,
         id=id_,
@@ -215,7 +215,7 @@ def _position(surface: Surface, pixel: NDArray[np.float64], depth: float) -> NDA
     return surface.layers.world_from_pose.points(found + surface.view.origin)
 
 
-def _told(
+def _shown_by(
     surface: Surface,
     pixel: NDArray[np.float64],
     found: LocalSurface | None,

@@ -1,4 +1,4 @@
-"""Where the surface in a pixel faces, told by the picture around it: of a floor, what is up."""
+"""Where the surface in a pixel faces, from the picture around it: of a floor, what is up."""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..analysis.landmarks.landmark_set import LandmarkSet, told_apart
-from ..analysis.landmarks.placed import landmarks_of, told_beside
+from ..analysis.landmarks.landmark_set import LandmarkSet, why_apart
+from ..analysis.landmarks.placed import landmarks_of, why_beside
 from ..analysis.measures.series import surface_of
 from ..analysis.track import Track
 from ..analysis.tracking import track_landmarks
@@ -32,7 +32,7 @@ def check_on_scan(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
             f"has landmarks in {frame_in_words(last)}, but the scan has only {len(timeline)} frames", path,
             "They belong to another scan",
         )  # fmt: skip
-    apart = told_apart(found, framing(timeline, range(len(timeline))))
+    apart = why_apart(found, framing(timeline, range(len(timeline))))
     if apart is not None:
         hint = "Use landmarks of this scan; --axes and --unit give the axes and unit of the scan"
         raise InputError(apart, path, hint)
@@ -71,7 +71,7 @@ def put_on_surface(found: LandmarkSet, timeline: Timeline, frame: int) -> Landma
 def tracks_in_frames(found: LandmarkSet, timeline: Timeline, frame: int) -> dict[str, Track]:
     """The landmarks in all frames, in the order of the file; those that are nowhere are pending."""
     landmarks = landmarks_of(found, timeline.pose, len(timeline), frame)
-    beside = told_beside(landmarks)
+    beside = why_beside(landmarks)
     if beside is not None:
         warn(beside)
     tracks = track_landmarks(timeline, landmarks, first=frame)

@@ -49,9 +49,9 @@ from ..output.plots import (
     PLOT_SUFFIXES,
     check_plot,
     color_of_curve,
-    color_of_way,
+    color_of_path,
     line_of_curve,
-    line_of_way,
+    line_of_path,
     plot_against,
     plot_over_time,
 )
@@ -163,49 +163,71 @@ def run(args: Namespace) -> int:
         indices = sorted(chosen_poses(args, timeline) or range(len(timeline)))
         inputs = [args.landmarks, *([args.measures] if args.measures else [])]
         claim(outputs, [*scan_inputs(timeline), *inputs], args.force)
-        unit = None if timeline.unit == UNKNOWN_UNIT else timeline.unit
-        found = read_landmarks(args.landmarks, unit, args.axes)
-        for name in (*(args.anchors or ()), *(args.traced or ())):
-            if name not in found.names:
-                raise unknown_name("landmark", name, found.names)
+        found = _landmarks(args, timeline)
         measures = _measures(args, found)
-        for told in found.told:
-            warn(f"{args.landmarks}: {told}")
-        frame = indices[0] if args.placed_in is None else args.placed_in
-        timeline.label(frame)  # raises where there is none
-        check_on_scan(args.landmarks, found, timeline)
-        with _shown(f"Measuring {timeline.name}"):
-            if not args.no_snap:
-                found = put_on_surface(found, timeline, frame)
-            tracks = with_noise(tracks_in_frames(found, timeline, frame), args.noise)
-        with _shown(f"Measuring {timeline.name}"):
-            found_series = all_series(measures, tracks, timeline, frames=indices, keep=True)
-        if args.anchors:  # whose motion changes no measure
-            still = stabilising(tracks, args.anchors)
-            tracks = {name: held_still(track, still) for name, track in tracks.items()}
-        series = [each.in_frames(indices) for each in found_series.values()]
-        order = ORDERS.index(args.order)
-        curves = _curves(args, series, timeline)
+        for remark in found.remarks:
+            warn(f"{args.landmarks}: {remark}")
+        tracks, series = _tracked_and_measured(args, found, measures, timeline, indices)
+        curves, order = _curves(args, series, timeline), ORDERS.index(args.order)
         if order:
             series = [_changes(*each, order) for each in zip(series, curves, strict=True)]
-        ways = _ways(args, tracks, indices) if order else {}
-        paces = [_pace(name, way, tracks[name].known[indices], order) for name, way in ways.items()]
+        trajectories = _trajectories(args, tracks, indices) if order else {}
+        paces = [_pace(name, one, tracks[name].known[indices], order) for name, one in trajectories.items()]
         rows = _landmark_rows(tracks, timeline, indices)
         for kind, group in (("measure", series), ("trajectory", paces)):
             rows += _value_rows(kind, group, timeline.unit, indices, order)
         _write(args.out, timeline, (*LONG_COLUMNS, "note"), rows)
-        if args.numbers:
-            against = next((curve for curve in curves if curve.name == args.against), None)
-            columns = NUMBER_COLUMNS if against is None else (*NUMBER_COLUMNS, "r")
-            _write(args.numbers, timeline, columns, number_rows(curves, against))
+        _write_numbers(args, curves, timeline)
         if args.repeats:
             _write(args.repeats, timeline, REPEAT_COLUMNS, _repeats(args, curves, order))
         if args.plot:
-            _save_plot(args, curves, ways, timeline, indices)
+            _save_plot(args, curves, trajectories, timeline, indices)
         _tell_gaps(tracks, series, paces, indices, order)
     for path in outputs:
         tell(path)
     return 0
+
+
+def _landmarks(args: Namespace, timeline: Timeline) -> LandmarkSet:
+    """The landmarks of the file. Raises InputError where an argument names one that it lacks."""
+    unit = None if timeline.unit == UNKNOWN_UNIT else timeline.unit
+    found = read_landmarks(args.landmarks, unit, args.axes)
+    for name in (*(args.anchors or ()), *(args.traced or ())):
+        if name not in found.names:
+            raise unknown_name("landmark", name, found.names)
+    return found
+
+
+def _tracked_and_measured(
+    args: Namespace,
+    found: LandmarkSet,
+    measures: Sequence[Measure],
+    timeline: Timeline,
+    indices: Sequence[int],
+) -> tuple[Mapping[str, Track], list[Series]]:
+    """The tracks of landmarks in all frames, without head motion if the arguments say so, and the series of
+    measures in these frames."""
+    frame = indices[0] if args.placed_in is None else args.placed_in
+    timeline.label(frame)  # raises where there is none
+    check_on_scan(args.landmarks, found, timeline)
+    with _shown(f"Measuring {timeline.name}"):
+        if not args.no_snap:
+            found = put_on_surface(found, timeline, frame)
+        tracks = with_noise(tracks_in_frames(found, timeline, frame), args.noise)
+    with _shown(f"Measuring {timeline.name}"):
+        found_series = all_series(measures, tracks, timeline, frames=indices, keep=True)
+    if args.anchors:  # whose motion changes no measure
+        still = stabilising(tracks, args.anchors)
+        tracks = {name: held_still(track, still) for name, track in tracks.items()}
+    return tracks, [each.in_frames(indices) for each in found_series.values()]
+
+
+def _write_numbers(args: Namespace, curves: Sequence[MeasureCurve], timeline: Timeline) -> None:
+    """Write the numbers of movements, where they are asked for."""
+    if args.numbers:
+        against = next((curve for curve in curves if curve.name == args.against), None)
+        columns = NUMBER_COLUMNS if against is None else (*NUMBER_COLUMNS, "r")
+        _write(args.numbers, timeline, columns, number_rows(curves, against))
 
 
 def _length(text: str) -> float:
@@ -277,7 +299,7 @@ def _outputs(args: Namespace) -> list[Path]:
 
 
 def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
-    """The measures of whose landmarks the file has all; the others are told."""
+    """The measures of whose landmarks the file has all; reports the others."""
     if args.measures is None:
         return []
     kept, lacking = [], {}
@@ -316,7 +338,7 @@ def _changes(series: Series, curve: MeasureCurve, order: int) -> Series:
     return replace(series, values=values, sigmas=sigmas, known=_known_of(values, series.known))
 
 
-def _ways(args: Namespace, tracks: Mapping[str, Track], indices: list[int]) -> dict[str, Trajectory]:
+def _trajectories(args: Namespace, tracks: Mapping[str, Track], indices: list[int]) -> dict[str, Trajectory]:
     """The trajectories of the traced landmarks in these frames alone, as the window has them."""
     found = {}
     for name in args.traced or tracks:
@@ -331,10 +353,10 @@ def _ways(args: Namespace, tracks: Mapping[str, Track], indices: list[int]) -> d
     return found
 
 
-def _pace(name: str, way: Trajectory, known: NDArray[np.uint8], order: int) -> Series:
+def _pace(name: str, trajectory: Trajectory, known: NDArray[np.uint8], order: int) -> Series:
     """The speed or acceleration of a landmark. known: (T,) of its places."""
-    values, sigmas = way.pace(order)
-    return Series(name, "length", way.times, values, sigmas, _known_of(values, known))
+    values, sigmas = trajectory.pace(order)
+    return Series(name, "length", trajectory.times, values, sigmas, _known_of(values, known))
 
 
 def _known_of(values: NDArray[np.float64], known: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -343,8 +365,8 @@ def _known_of(values: NDArray[np.float64], known: NDArray[np.uint8]) -> NDArray[
 
 
 def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> list[list[object]]:
-    """The rows of the repeats, aligned by the peaks of one of the curves; none where it has no peak, which is
-    told."""
+    """The rows of the repeats, aligned by the peaks of one of the curves; none where it has no peak, which a
+    warning says."""
     aligned_by = next(curve for curve in curves if args.aligned in (None, curve.name))
     least = _LEAST if args.least is None else args.least
     aligned = repeats_by_peaks(aligned_by, least)
@@ -361,12 +383,12 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
 def _save_plot(
     args: Namespace,
     curves: Sequence[MeasureCurve],
-    ways: Mapping[str, Trajectory],
+    trajectories: Mapping[str, Trajectory],
     timeline: Timeline,
     indices: list[int],
 ) -> None:
-    """Write curves over time, or over one of them; those of more units than a picture has axes for are told.
-    ways: of landmarks, whose speed or acceleration is plotted over time beside that of measures."""
+    """Write curves over time, or over one of them. Warns of curves for whose unit a picture has no axis.
+    trajectories: of landmarks, whose speed or acceleration is plotted over time beside that of measures."""
     path, order, scale = args.plot, ORDERS.index(args.order), Scale(timeline.unit)
     frames = np.array(indices, np.intp)
     lines = {
@@ -376,8 +398,8 @@ def _save_plot(
         plot = plot_against(lines.pop(args.against), frames, [*lines.values()])
     else:
         paces = [
-            line_of_way(name, way, scale, color_of_way(number), order)
-            for number, (name, way) in enumerate(ways.items())
+            line_of_path(name, trajectory, scale, color_of_path(number), order)
+            for number, (name, trajectory) in enumerate(trajectories.items())
         ]
         plot = plot_over_time(timeline.times[indices], frames, [*lines.values(), *paces])
     plot.save(path)

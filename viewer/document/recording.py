@@ -220,15 +220,15 @@ class Entry:
             )
             for one in (self.landmarks if marks.landmarks else ())
         ]
-        of_ways = motion if self.held is None else motion.after(Rigid(np.array(self.held)))
-        ways = [(path, of_ways) for path in (self.trajectories if marks.trajectories else ())]
+        of_paths = motion if self.held is None else motion.after(Rigid(np.array(self.held)))
+        trajectories = [(path, of_paths) for path in (self.trajectories if marks.trajectories else ())]
         pins = (
             DrawnPath((one.position,), (LINE_COLOR,), name=one.text, has_ends=True, slack=slack)
             for one in notes
             if one.position is not None
         )
         lines = [(path, motion) for path in (*(self.measure_lines if marks.measure_lines else ()), *pins)]
-        paths = [(path, moved.points(np.array(path.places))) for path, moved in (*ways, *lines)]
+        paths = [(path, moved.points(np.array(path.places))) for path, moved in (*trajectories, *lines)]
         return Overlay.of(landmarks, paths, LINE_SLACK * radius) if landmarks or paths else None
 
     def drawn_from(self, origin: NDArray[np.float64]) -> Entry:

@@ -12,7 +12,7 @@ from .image_painter import ImagePainter
 from .labels import Box, Callout, LabelGround, LabelPlaces, forms_of, said_once
 from .legend import Legend
 from .marks import MARGIN, PAD, PLATE, MarkPainter, fitted_text
-from .overlays import LABEL_EDGE, LEADER_OPACITY, LEADER_THICK, ToldLine, draw_line, draw_overlay
+from .overlays import LABEL_EDGE, LEADER_OPACITY, LEADER_THICK, LabelledLine, draw_line, draw_overlay
 
 # In heights of the text:
 _LINE_STEP = 1.2  # from one line of a label to the next
@@ -24,33 +24,34 @@ def draw_lines(
     """Draw landmarks and lines and their labels. taken: where other marks are."""
     if legend.overlay is None:
         return
-    told, marks = draw_overlay(painter, size, legend.camera, legend.overlay)
-    inside = [one for one in told if _is_inside(one.places, size)]
+    labelled, marks = draw_overlay(painter, size, legend.camera, legend.overlay)
+    inside = [one for one in labelled if _is_inside(one.places, size)]
     ground = LabelGround(size, painter.em, legend.covered, marks, taken, legend.camera)
     legend.places.take_up(legend.labels)
     _draw_labels(painter, legend.places, said_once(inside, lambda one: one.text), ground)
 
 
 def _draw_labels(
-    painter: ImagePainter, places: LabelPlaces, told: Sequence[ToldLine], ground: LabelGround
+    painter: ImagePainter, places: LabelPlaces, labelled: Sequence[LabelledLine], ground: LabelGround
 ) -> None:
     """Draw texts on plates at their places, each with a leader from its line."""
     em = painter.em
     room = ground.size[0] - 2 * (MARGIN + PAD) * em
     forms = [
-        [[fitted_text(painter, line, room) for line in form] for form in forms_of([one.text])] for one in told
+        [[fitted_text(painter, line, room) for line in form] for form in forms_of([one.text])]
+        for one in labelled
     ]
     labels = [
         Callout(one.text.partition(":")[0], tuple(_plate_size(painter, form) for form in own), one.places)
-        for one, own in zip(told, forms, strict=True)
+        for one, own in zip(labelled, forms, strict=True)
     ]
     placed = places.place(labels, ground)
-    for one, place in zip(told, placed, strict=True):
+    for one, place in zip(labelled, placed, strict=True):
         if place.leader is not None:
             ends, none = np.array(place.leader), np.zeros(2, bool)
             opacities = np.full(2, max(one.opacity, LEADER_OPACITY))
             draw_line(painter, ends, [one.color] * 2, opacities, none, 0.0, LEADER_THICK)
-    for one, own, place in zip(told, forms, placed, strict=True):
+    for one, own, place in zip(labelled, forms, placed, strict=True):
         left, top, _, bottom = place.box
         painter.box(place.box, PLATE)
         painter.box(

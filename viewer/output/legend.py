@@ -137,12 +137,12 @@ def range_note(legend: Legend) -> str:
 
 def swatches(look: Look) -> list[tuple[Color, str]]:
     """Colours that the look shows something else by than numbers, and what each says."""
-    told = []
+    found = []
     if look.color_by == "level":
         levels = [f"Level {number}" for number in range(1, len(LEVEL_COLORS) + 1)]
         levels[-1] += " and above"
-        told = [(_MEASURED, "Measured"), *zip(map(rgba, LEVEL_COLORS), levels, strict=True)]
-    return [*told, (rgba(HOLE_COLOR), "Hole")] if look.holes else told
+        found = [(_MEASURED, "Measured"), *zip(map(rgba, LEVEL_COLORS), levels, strict=True)]
+    return [*found, (rgba(HOLE_COLOR), "Hole")] if look.holes else found
 
 
 def stamp(legend: Legend) -> str:

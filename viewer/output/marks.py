@@ -75,8 +75,8 @@ def draw(
         if values is not None:
             drawn.append(_draw_color_bar(painter, size, legend, values, kind))
             bottom = drawn[-1][1] - _GAP * painter.em
-        if told := swatches(legend.look):
-            drawn.append(_draw_swatches(painter, size, told, bottom))
+        if found := swatches(legend.look):
+            drawn.append(_draw_swatches(painter, size, found, bottom))
     upper_left = [stamp(legend)] if legend.marks.stamp else []
     return [*drawn, *_draw_plates(painter, size, [*upper_left, *legend.notes])]
 
@@ -121,8 +121,8 @@ def _draw_color_bar(
     title = fitted_text(painter, quantity(legend.look, legend.unit, kind), _TEXT_SHARE * size[0])
     note = fitted_text(painter, range_note(legend), _TEXT_SHARE * size[0])
     factor = legend.factor if shows_length(legend.look, kind) else 1.0
-    told = ticks(factor * values[0], factor * values[1], kind)
-    widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in told)
+    labels = ticks(factor * values[0], factor * values[1], kind)
+    widest = (_MAP_WIDTH + _GAP) * em + max(painter.width(text) for _, text in labels)
     widest = max(widest, painter.width(title), painter.width(note))
     height = min(_MAP_HEIGHT * em, _MAP_SHARE * size[1])
     right, bottom = round(size[0] - MARGIN * em), round(size[1] - MARGIN * em)
@@ -137,21 +137,21 @@ def _draw_color_bar(
     foot = bottom - round((PAD + 0.5) * em)
     colors = color_table(legend.look.color_map)
     painter.gradient((left, foot - round(height), left + round(_MAP_WIDTH * em), foot), colors)
-    for share, text in told:
+    for share, text in labels:
         painter.text(left + (_MAP_WIDTH + _GAP) * em, foot - share * height - em / 2, text)
     return box
 
 
 def _draw_swatches(
-    painter: MarkPainter, size: tuple[float, float], told: list[tuple[Color, str]], bottom: float
+    painter: MarkPainter, size: tuple[float, float], swatches: list[tuple[Color, str]], bottom: float
 ) -> Box:
     em, line = painter.em, round(_SWATCH_LINE * painter.em)
-    texts = [fitted_text(painter, text, _TEXT_SHARE * size[0]) for _, text in told]
+    texts = [fitted_text(painter, text, _TEXT_SHARE * size[0]) for _, text in swatches]
     right = round(size[0] - MARGIN * em)
     left = round(right - max(map(painter.width, texts)) - (_MAP_WIDTH + _GAP + 2 * PAD) * em)
-    top = round(bottom - PAD * em) - len(told) * line
+    top = round(bottom - PAD * em) - len(swatches) * line
     painter.box((left, top, right, bottom), PLATE)
-    for place, ((color, _), text) in enumerate(zip(told, texts, strict=True)):
+    for place, ((color, _), text) in enumerate(zip(swatches, texts, strict=True)):
         x, y = left + round(PAD * em), top + round(PAD * em) + place * line
         painter.box((x, y, x + round(_MAP_WIDTH * em), y + round(em)), color)
         painter.text(x + (_MAP_WIDTH + _GAP) * em, y, text)

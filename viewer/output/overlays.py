@@ -26,7 +26,7 @@ class StateMark(NamedTuple):
     sides: int
 
 
-# Told apart with protanopia, deuteranopia and tritanopia too: by the colour, and by the shape.
+# Distinct with protanopia, deuteranopia and tritanopia too: by the colour, and by the shape.
 STATE_MARKS = {
     Known.PLACED: StateMark(0x22D6A4, 0),
     Known.TRACKED: StateMark(0xFFD21F, 4),
@@ -243,7 +243,7 @@ def dotted(places: NDArray[np.float64], room: float) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True, eq=False)
-class ToldLine:
+class LabelledLine:
     """A line of a picture that has a label. places: (N, 2), pixels. color: 0xRRGGBB."""
 
     text: str
@@ -254,7 +254,7 @@ class ToldLine:
 
 def draw_overlay(
     painter: OverlayPainter, size: tuple[float, float], camera: Camera, overlay: Overlay
-) -> tuple[list[ToldLine], NDArray[np.float64]]:
+) -> tuple[list[LabelledLine], NDArray[np.float64]]:
     """Draw lines and landmarks; returns the lines and landmarks that are to have labels, and all places that
     labels keep off, (N, 2).
 
@@ -262,7 +262,7 @@ def draw_overlay(
     """
     width, height = size
     pixels = camera.places_in_picture(overlay.places) * (height, -height) + (width / 2, height / 2)
-    told, start = [], len(overlay.landmarks)
+    labelled, start = [], len(overlay.landmarks)
     for path in overlay.paths:
         part = slice(start, start + len(path.places))
         start = part.stop
@@ -271,7 +271,7 @@ def draw_overlay(
         _draw_path(painter, path, pixels[part], opacities)
         words = ": ".join(text for text in (path.name, path.value) if text)
         if words and np.isfinite(pixels[part]).all():
-            told.append(ToldLine(words, pixels[part], path.colors[0], float(opacities.max())))
+            labelled.append(LabelledLine(words, pixels[part], path.colors[0], float(opacities.max())))
     count = len(overlay.landmarks)
     lengths = height / camera.heights_at(overlay.places[:count]) if count else np.empty(0)
     of_landmarks = overlay.landmarks, pixels[:count]
@@ -280,8 +280,8 @@ def draw_overlay(
     if len(named) > MOST_NAMED:
         _draw_names(painter, *of_landmarks, overlay.seen[:count], named)
     else:
-        told += [_told_name(overlay, number, pixels[[number]]) for number in named]
-    return told, pixels[np.isfinite(pixels).all(axis=1)]
+        labelled += [_labelled_name(overlay, number, pixels[[number]]) for number in named]
+    return labelled, pixels[np.isfinite(pixels).all(axis=1)]
 
 
 def draw_line(
@@ -348,10 +348,10 @@ def named_in(size: tuple[float, float], names: Sequence[str], pixels: NDArray[np
     return [number for number in np.flatnonzero(inside).tolist() if names[number]]
 
 
-def _told_name(overlay: Overlay, number: int, place: NDArray[np.float64]) -> ToldLine:
+def _labelled_name(overlay: Overlay, number: int, place: NDArray[np.float64]) -> LabelledLine:
     one = overlay.landmarks[number]
     opacity = 1.0 if overlay.seen[number] else DIM_LANDMARK
-    return ToldLine(one.name, place, mark_of(one).color, opacity)
+    return LabelledLine(one.name, place, mark_of(one).color, opacity)
 
 
 def _draw_names(

@@ -22,7 +22,7 @@ from .overlays import BAND_OPACITY, DrawnCurve, DrawnPlot
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Seen on light and on dark, and told apart with colour-blindness: of Okabe and Ito (2008), and lighter ones.
+# Seen on light and on dark, and distinct with colour-blindness: of Okabe and Ito (2008), and lighter ones.
 PLOT_COLORS = (
     0x3D9BE0, 0xE69F00, 0x1FA783, 0xD55E00, 0xCC79A7, 0x8C7AE6, 0xB59F00, 0x56B4E9, 0xE06C75, 0x7F8C9A,
 )  # fmt: skip
@@ -182,8 +182,8 @@ def color_of_curve(number: int) -> int:
     return PLOT_COLORS[number % len(PLOT_COLORS)]
 
 
-def color_of_way(number: int) -> int:
-    """The colour of a landmark by its number among those whose ways are shown, 0xRRGGBB."""
+def color_of_path(number: int) -> int:
+    """The colour of a landmark by its number among those whose trajectories are shown, 0xRRGGBB."""
     return PLOT_COLORS[-1 - number % len(PLOT_COLORS)]
 
 
@@ -194,11 +194,11 @@ def line_of_curve(curve: MeasureCurve, color: int, order: int, has_band: bool = 
     return PlotLine(curve.name, unit, values, band, color, notes=curve.notes)
 
 
-def line_of_way(
-    name: str, way: Trajectory, scale: Scale, color: int, order: int, has_band: bool = True
+def line_of_path(
+    name: str, trajectory: Trajectory, scale: Scale, color: int, order: int, has_band: bool = True
 ) -> PlotLine:
     """The line of a landmark's speed, 1, or acceleration, 2, with two standard deviations."""
-    values, sigmas = (scale.factor * part for part in way.pace(order))
+    values, sigmas = (scale.factor * part for part in trajectory.pace(order))
     return PlotLine(name, scale.unit + PER_ORDER[order], values, _band(sigmas, has_band), color)
 
 

@@ -135,7 +135,7 @@ def test_names_that_cannot_stay(tmp_path: Path) -> None:
     (tmp_path / "m.mrk.json").write_text(json.dumps(data))
     found = read_landmarks(tmp_path / "m.mrk.json")
     assert found.names == ("twice", "twice (2)", "3", "line break", "x" * 200, "kept")
-    assert len(found.told) == 3
+    assert len(found.remarks) == 3
 
 
 def test_old_encodings_are_read(tmp_path: Path) -> None:

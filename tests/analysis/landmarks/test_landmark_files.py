@@ -45,7 +45,7 @@ def test_what_is_written_is_read_again(name: str, tmp_path: Path) -> None:
     found = read_landmarks(tmp_path / name, "mm")
     assert_same(found, wanted, off=FILES[name])
     assert (remark is None) == (name in WITH_STATES)
-    assert not found.told
+    assert not found.remarks
     if name in WITH_STATES:
         np.testing.assert_array_equal(found.known, wanted.known)
         np.testing.assert_array_equal(found.sigmas, wanted.sigmas)
@@ -85,9 +85,9 @@ def test_any_unit_comes_back(name: str, unit: str | None, tmp_path: Path) -> Non
     write_landmarks(tmp_path / name, wanted)
     found = read_landmarks(tmp_path / name, unit)
     assert_same(found, wanted, off=max(FILES[name], 1e-13))
-    assert not found.told
+    assert not found.remarks
     if unit == "furlongs":
-        (told,) = read_landmarks(tmp_path / name, "mm").told
+        (told,) = read_landmarks(tmp_path / name, "mm").remarks
         assert "'furlongs'" in told
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
-from viewer.analysis.landmarks.placed import landmarks_of, surface_point_at, told_beside
+from viewer.analysis.landmarks.placed import landmarks_of, surface_point_at, why_beside
 from viewer.analysis.surface_point import followed
 from viewer.analysis.track import Known
 from viewer.scan.points import PointCloud
@@ -64,11 +64,11 @@ def test_landmarks_beside_the_surface_are_told() -> None:
     for lifted, is_told in ((2, False), (3, True)):
         places[0, :lifted, 2] = 9.0
         made = landmarks_of(LandmarkSet.of(names, places), POSES.__getitem__, len(POSES), 0)
-        told = told_beside(made)
+        told = why_beside(made)
         assert (told is not None) == is_told
     assert told is not None
     assert told.startswith("3 of 10 landmarks lie beside the surface (p0, p1, p2)")
-    assert told_beside([Landmark("a")]) is None
+    assert why_beside([Landmark("a")]) is None
 
 
 def test_a_title_has_the_name_in_words_where_one_is_known() -> None:

@@ -47,7 +47,7 @@ def refused(surface: PoseSurface, kind: str, places: np.ndarray, **options: str)
     """The reason why a kind finds no value."""
     result = compute(surface, kind, places, **options)
     assert isinstance(result, Refused), result
-    return result.told([str(number) for number in range(len(places))])
+    return result.in_words([str(number) for number in range(len(places))])
 
 
 def track_of(positions: Sequence[Sequence[float]], deviation: float = 0.1, gaps: Sequence[int] = ()) -> Track:

@@ -18,7 +18,7 @@ _MARGIN = 0.25  # of a scan's radius: as far off its box may a landmark lie
 _TURNED = np.array([-1.0, -1.0, 1.0])  # from RAS to LPS, and back
 _FACTORS = (1000.0, 0.001, 10.0, 0.1, 25.4, 1 / 25.4)  # between units that people mix up
 _MOST_CELLS = 1 << 22  # landmarks times frames
-_ALL = 0.8  # of the landmarks, for which a reason may be told
+_ALL = 0.8  # of the landmarks, for which a reason is given
 _WIDE = (
     0.2  # of a scan's radius, that landmarks span at least: shrunk enough, any lie in a box about the origin
 )
@@ -30,10 +30,10 @@ class LandmarkSet:
 
     names: L of them, each once. positions: (T, L, 3) float64, NaN where not defined. known: (T, L) uint8 of
     `Known`; a position that is PENDING is a preview, which nobody has confirmed. sigmas: (T, L) standard
-    deviations, NaN where not known. times: (T,) seconds, NaN where not told. frames: (T,) indices from 0,
+    deviations, NaN where not known. times: (T,) seconds, NaN where not stated. frames: (T,) indices from 0,
     increasing. is_framed: whether the file tells them; else it holds one moment, or moments in an order.
-    unit: of lengths, None where not told. about: L descriptions, "" for none. axes: "LPS" or "RAS" as the
-    file tells, None where it does not. told: what a user should know of the reading, a sentence each.
+    unit: of lengths, None where not stated. about: L descriptions, "" for none. axes: "LPS" or "RAS" as the
+    file states, None where it does not. remarks: what a user should know of the reading, a sentence each.
     """
 
     names: tuple[str, ...]
@@ -46,7 +46,7 @@ class LandmarkSet:
     unit: str | None = None
     about: tuple[str, ...] = ()
     axes: str | None = None
-    told: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
 
     @classmethod
     def of(
@@ -61,19 +61,19 @@ class LandmarkSet:
         unit: str | None = None,
         about: Sequence[str] = (),
         axes: str | None = None,
-        told: Sequence[str] = (),
+        remarks: Sequence[str] = (),
     ) -> LandmarkSet:
         """A set of what a file tells. Names that are empty, long or there twice are made usable; positions
         that are not finite are not defined, the others PLACED where nothing else is said. A unit may be any
-        text; `told` says so where it is no unit. Raises InputError where there is no landmark."""
+        text; `remarks` says so where it is no unit. Raises InputError where there is no landmark."""
         if not len(names):
             raise InputError("holds no landmarks")
         positions = np.array(positions, np.float64).reshape(-1, len(names), 3)
         count = len(positions)
-        usable, remarks = _usable_names(names)
+        usable, of_names = _usable_names(names)
         if unit and usable_unit(unit) is None:
             named = f"'{shortened(unit)}', which is no short word such as mm"
-            remarks = [*remarks, f"Lengths are in {named}: they are used without conversion"]
+            of_names = [*of_names, f"Lengths are in {named}: they are used without conversion"]
         there = np.isfinite(positions).all(axis=2)
         if known is None:
             known = np.where(there, Known.PLACED, Known.PENDING)
@@ -91,7 +91,7 @@ class LandmarkSet:
             usable_unit(unit),
             tuple(about) or ("",) * len(names),
             axes,
-            (*told, *remarks),
+            (*remarks, *of_names),
         )
 
     @classmethod
@@ -152,17 +152,17 @@ class LandmarkSet:
         return replace(self, positions=self.positions * _TURNED)
 
     def in_unit(self, unit: str | None) -> LandmarkSet:
-        """The set in another unit. Where one of the two is not told, or is no known length, lengths stay as
-        they are, and `told` says so."""
+        """The set in another unit. Where one of the two is not stated, or is no known length, lengths stay as
+        they are, and `remarks` says so."""
         if unit is None or self.unit is None or unit == self.unit:
             return self if unit is None else replace(self, unit=unit)
         factor = conversion(self.unit, unit)
         if factor is None:
-            told = (
+            remark = (
                 f"Lengths are in '{self.unit}', those of the scan in '{unit}': they are used without "
                 "conversion"
             )
-            return replace(self, unit=unit, told=(*self.told, told))
+            return replace(self, unit=unit, remarks=(*self.remarks, remark))
         with np.errstate(over="ignore"):
             return replace(self, unit=unit, positions=self.positions * factor, sigmas=self.sigmas * factor)
 
@@ -204,21 +204,23 @@ def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
         if name != base and base == given.strip():
             twice.append(base)
         usable[name] = None
-    told = []
+    remarks = []
     if twice:
-        told.append(f"{_counted(len(twice), 'name')} there more than once, such as '{shortened(twice[0])}'")
+        remarks.append(
+            f"{_counted(len(twice), 'name')} there more than once, such as '{shortened(twice[0])}'"
+        )
     if unnamed:
-        told.append(f"{_counted(unnamed, 'landmark')} had no name and got a number")
+        remarks.append(f"{_counted(unnamed, 'landmark')} had no name and got a number")
     if changed:
-        told.append(f"{_counted(changed, 'name')} could not be shown and was shortened or cleaned")
-    return tuple(usable), told
+        remarks.append(f"{_counted(changed, 'name')} could not be shown and was shortened or cleaned")
+    return tuple(usable), remarks
 
 
 def _counted(number: int, word: str) -> str:
     return f"{number} {word}{'s' * (number != 1)}"
 
 
-def told_apart(landmarks: LandmarkSet, bounds: Bounds) -> str | None:
+def why_apart(landmarks: LandmarkSet, bounds: Bounds) -> str | None:
     """Why landmarks cannot be of a scan within these bounds, in words with the likely cause; None where all
     of them lie on it or near.
 

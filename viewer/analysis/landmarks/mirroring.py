@@ -22,8 +22,8 @@ Positions = Mapping[str, NDArray[np.float64]]
 _STEPS = 30  # of the iteration, which ends where weights stay
 _BIWEIGHT = 4.685  # standard deviations beyond which an item counts nothing (Holland and Welsch 1977)
 _NORMAL = 1.4826  # median of absolute deviations to standard deviation
-_TOLD_APART = 1e-9  # share of the largest eigenvalue, by which the least has to be less than the next
-_ENOUGH = 3  # items besides, by which a plane is told anew for the uncertainty of a proposal
+_DISTINCT = 1e-9  # share of the largest eigenvalue, by which the least has to be less than the next
+_ENOUGH = 3  # items besides, by which a plane is found anew for the uncertainty of a proposal
 _SIDES = (
     (r"(?i)\b(left|right)\b", {"left": "right", "right": "left"}),
     (r"(?<=[^A-Z])[LR]$", {"l": "r", "r": "l"}),
@@ -99,14 +99,14 @@ def mirror_plane(positions: Positions, partners: Mapping[str, str]) -> MirrorPla
         before = robust
         residuals = items.residuals(*best)
         scale = _NORMAL * float(np.median(residuals))
-        if scale <= _TOLD_APART * float(np.ptp(items.on, axis=0).max() + np.abs(items.across).max()):
+        if scale <= _DISTINCT * float(np.ptp(items.on, axis=0).max() + np.abs(items.across).max()):
             robust = (
                 residuals <= _BIWEIGHT * scale + np.finfo(np.float64).eps * np.abs(items.on).max()
             ) * 1.0
         else:
             robust = np.maximum(1 - (residuals / (_BIWEIGHT * scale)) ** 2, 0) ** 2
         best = _plane(items, robust) or best
-        if np.abs(robust - before).max() < _TOLD_APART:
+        if np.abs(robust - before).max() < _DISTINCT:
             break
     return MirrorPlane(*best, _sigma(items, best, robust))
 
@@ -135,7 +135,7 @@ def _plane(items: _Items, robust: NDArray[np.float64]) -> tuple[NDArray[np.float
     off = items.on - center
     form = (weights * off.T) @ off - (robust / 2 * items.across.T) @ items.across
     values, vectors = np.linalg.eigh(form)
-    if values[1] - values[0] <= _TOLD_APART * max(abs(values[0]), abs(values[2])):
+    if values[1] - values[0] <= _DISTINCT * max(abs(values[0]), abs(values[2])):
         return None
     normal = vectors[:, 0]
     return normal, float(normal @ center)
@@ -147,10 +147,10 @@ def _start(items: _Items) -> tuple[NDArray[np.float64], float] | None:
     for on, across in zip(items.on, items.across, strict=True):
         if length := float(np.linalg.norm(across)):
             planes.append((across / length, float(across @ on) / length))
-    told = [plane for plane in planes if plane is not None]
+    found = [plane for plane in planes if plane is not None]
     if planes[0] is None:  # a pair alone is as good as a plane of all only where there is nothing else
-        told = told if items.across.any() else []
-    return min(told, key=lambda plane: float(np.median(items.residuals(*plane))), default=None)
+        found = found if items.across.any() else []
+    return min(found, key=lambda plane: float(np.median(items.residuals(*plane))), default=None)
 
 
 def _sigma(items: _Items, plane: tuple[NDArray[np.float64], float], robust: NDArray[np.float64]) -> float:

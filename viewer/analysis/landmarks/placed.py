@@ -56,7 +56,7 @@ def landmarks_of(
     return tuple(landmarks)
 
 
-def told_beside(landmarks: Sequence[Landmark]) -> str | None:
+def why_beside(landmarks: Sequence[Landmark]) -> str | None:
     """How many landmarks are set beside the surface of their frames, in words; None for few.
 
     Landmarks of another subject, or of another scan of the same one, lie within the bounds of this one, and

@@ -89,13 +89,13 @@ class Series:
     def warning(self) -> str:
         """A remark on all values together, such as a movement: in how many frames there are none, and
         why; in how many a region has openings. "" for nothing."""
-        count, told = len(self.times), []
+        count, remarks = len(self.times), []
         gaps = [frame for frame in sorted(self.reasons) if np.isnan(self.values[frame])]
         if gaps:
             reasons = "; ".join(dict.fromkeys(self.reasons[frame] for frame in gaps))
-            told.append(f"no value in {len(gaps)} of {count} frames: {reasons}")
+            remarks.append(f"no value in {len(gaps)} of {count} frames: {reasons}")
         open_ = self.shares < WHOLE if len(self.shares) else np.zeros(count, bool)
         if open_.any():
             filled = self._filled(float(self.shares[open_].min()), "as little as ")
-            told.append(f"openings in {int(open_.sum())} of {count} frames: {filled}")
-        return "; ".join(told)
+            remarks.append(f"openings in {int(open_.sum())} of {count} frames: {filled}")
+        return "; ".join(remarks)

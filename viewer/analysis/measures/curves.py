@@ -1,4 +1,4 @@
-"""Curves of measures, in the unit that they are told in: their speed, and the numbers of movements."""
+"""Curves of measures, in the unit that they are shown in: their speed, and the numbers of movements."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def unit_of(quantity: str, unit: str) -> str:
 
 @dataclass(frozen=True, eq=False)
 class MeasureCurve:
-    """A measure over time as it is told.
+    """A measure over time as it is shown.
 
     unit: of the values, such as "mm". times, values, sigmas: (T,). smoothing: with a window wide enough for
     these times. movement: the largest one, None where there is none. fastest: the largest speed to either
@@ -63,7 +63,7 @@ class MeasureCurve:
 
     @classmethod
     def of(cls, series: Series, scale: Scale, smoothing: Smoothing) -> Self:
-        """The curve of a measure, at least one frame, in the unit that lengths are told in."""
+        """The curve of a measure, at least one frame, in the unit that lengths are shown in."""
         factor = scale.factor ** power_of(series.quantity)
         times, values, sigmas = series.times, factor * series.values, factor * series.sigmas
         wide = smoothing.wide_enough(times)

@@ -37,8 +37,8 @@ def plane_of(points: Vectors, how: str) -> tuple[Vectors, Vectors]:
     widths, axes = np.linalg.eigh(np.where(there[..., None, None], spread, np.eye(3)))
     normal = axes[..., 0]
     normal = np.where((normal * facing).sum(axis=-1, keepdims=True) < 0, -normal, normal)
-    told = there & (widths[..., 1] - widths[..., 0] > _LINE * np.abs(widths).max(axis=-1))
-    return np.where(told[..., None], center, np.nan), np.where(told[..., None], normal, np.nan)
+    is_plane = there & (widths[..., 1] - widths[..., 0] > _LINE * np.abs(widths).max(axis=-1))
+    return np.where(is_plane[..., None], center, np.nan), np.where(is_plane[..., None], normal, np.nan)
 
 
 def _scatter(vectors: Vectors) -> Vectors:

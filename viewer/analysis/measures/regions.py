@@ -29,7 +29,7 @@ class Refused:
     reason: str
     landmarks: tuple[int, ...] = ()
 
-    def told(self, names: Sequence[str]) -> str:
+    def in_words(self, names: Sequence[str]) -> str:
         """The reason with the names of landmarks, (K,)."""
         return self.reason.format(*(names[number % len(names)] for number in self.landmarks))
 

@@ -180,8 +180,8 @@ def _fill_points(asked: _Asked) -> None:
     positions = asked.positions[rows]
     asked.values[rows] = found = value(positions)
     variance = np.zeros(len(rows))
-    told = np.asarray(np.isfinite(asked.covariances[rows]).all(axis=(1, 2, 3)))
-    covariances = np.where(told[:, None, None, None], asked.covariances[rows], 0)
+    is_known = np.asarray(np.isfinite(asked.covariances[rows]).all(axis=(1, 2, 3)))
+    covariances = np.where(is_known[:, None, None, None], asked.covariances[rows], 0)
     roots = _roots(covariances)
     for landmark in range(covariances.shape[1]):
         moved = (asked.which == landmark)[None, :, None]
@@ -189,7 +189,7 @@ def _fill_points(asked: _Asked) -> None:
             step = moved * roots[:, landmark, None, :, axis]
             for side in (step, -step):
                 variance += (value(positions + side) - found) ** 2 / 2
-    asked.sigmas[rows] = np.where(told, np.sqrt(variance), np.nan)
+    asked.sigmas[rows] = np.where(is_known, np.sqrt(variance), np.nan)
     asked.reasons.update((int(row), _NO_DIRECTION) for row in rows[~np.isfinite(found)])
 
 
@@ -212,7 +212,7 @@ def _fill_surfaces(
             each.is_left[frame] = False
         try:
             surface = surface_of(timeline, timeline.visit(frame), faces)
-        except InputError:  # told by the timeline
+        except InputError:  # the timeline reports it
             for each in asked:
                 each.reasons.setdefault(frame, "the frame cannot be read")
             continue
@@ -233,7 +233,7 @@ def _fill_surface(asked: _Asked, frame: int, surface: PoseSurface, kept: KeptVal
         if kept:
             kept.put(frame, surface.digest, found)
     if isinstance(found, Refused):
-        asked.reasons[frame] = found.told(asked.measure.landmarks)
+        asked.reasons[frame] = found.in_words(asked.measure.landmarks)
         return
     gradient = np.zeros((asked.covariances.shape[1], 3))
     np.add.at(gradient, asked.which, found.gradient)

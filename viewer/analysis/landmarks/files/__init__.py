@@ -75,7 +75,7 @@ def read_landmarks(path: Path | str, unit: str | None = None, axes: str = "LPS")
     """The landmarks of a file, or of a series of files of one moment each ("smile_%04d.mrk.json").
 
     unit: of the scan, to which lengths are converted; None keeps those of the file. axes: of the scan, of
-    `AXES`; what a file has in the others is turned. `told` of the set says what was left out, changed or
+    `AXES`; what a file has in the others is turned. `remarks` of the set says what was left out, changed or
     taken for granted. Raises InputError, with the line where there is one, for what cannot be read, and where
     no landmark is in it.
     """
@@ -123,7 +123,7 @@ def _write(module: ModuleType, path: Path, landmarks: LandmarkSet) -> str | None
 def _read(path: Path, unit: str | None, axes: str, frame: int | None) -> LandmarkSet:
     """The landmarks of one file. frame: that its name tells, from 0."""
     module = _readable_module(path)
-    with _told_of(path, module):
+    with _one_message_of(path, module):
         found: LandmarkSet = module.read(path)
         if frame is not None and len(found) > 1:
             raise InputError(f"holds {len(found)} moments, and is one of a series of files of one each")
@@ -138,7 +138,7 @@ def _read(path: Path, unit: str | None, axes: str, frame: int | None) -> Landmar
 
 
 @contextmanager
-def _told_of(path: Path, module: ModuleType) -> Iterator[None]:
+def _one_message_of(path: Path, module: ModuleType) -> Iterator[None]:
     """One message for whatever goes wrong; a line that it tells stands behind the name of the file."""
     with one_message(path, f"cannot be read as {module.TITLE}"):
         try:
@@ -178,7 +178,7 @@ def _joined(parts: list[LandmarkSet], path: Path) -> LandmarkSet:
         parts[0].unit,
         tuple(about[name] for name in names),
         parts[0].axes,
-        tuple(dict.fromkeys(text for part in parts for text in part.told)),
+        tuple(dict.fromkeys(text for part in parts for text in part.remarks)),
     )
 
 

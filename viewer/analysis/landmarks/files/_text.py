@@ -20,7 +20,7 @@ from ..landmark_set import LandmarkSet
 
 MOST_BYTES = 64 * 2**20  # of a file of landmarks
 MISSING = "NA"  # in place of a coordinate, as geomorph reads it
-_LARGEST = 1e150  # so that numbers times a scale or a unit's factor can be told
+_LARGEST = 1e150  # so that numbers times a scale or a unit's factor stay finite
 _ABSENT = {"na", "nan", "-nan", "none", "null", ""}
 _REAL = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?", re.ASCII)
 _OWN = "scan4d "

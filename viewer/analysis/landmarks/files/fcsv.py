@@ -37,8 +37,9 @@ def read(path: Path) -> LandmarkSet:
                     raise at_line(f"the coordinate system is '{shortened(value)}'", line, hint)
                 axes = _AXES[value.upper()]
             elif key == "columns":
-                told = [name.strip() for name in value.split(",")]
-                columns = told + [name for name in _COLUMNS.split(",") if "id" in told and name not in told]
+                named = [name.strip() for name in value.split(",")]
+                rest = (name for name in _COLUMNS.split(",") if "id" in named and name not in named)
+                columns = [*named, *rest]
             continue
         try:
             (row,) = csv.reader(StringIO(text))

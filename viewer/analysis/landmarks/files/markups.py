@@ -71,7 +71,7 @@ def read(path: Path) -> LandmarkSet:
         unit=unit,
         about=[text for part in parts for text in part["about"]],
         axes=parts[0]["axes"],
-        told=[text for part in parts for text in part["told"]],
+        remarks=[text for part in parts for text in part["remarks"]],
     )
 
 
@@ -110,12 +110,16 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
             lost.append(names[-1])
         if known[row] == Known.PENDING and np.isfinite(positions[row]).all():
             previews.append(names[-1])
-    told = []
+    remarks = []
     if lost:
-        told.append(f"{len(lost)} are said to be defined without a position, such as '{shortened(lost[0])}'")
+        remarks.append(
+            f"{len(lost)} are marked as defined without a position, such as '{shortened(lost[0])}'"
+        )
     if previews:
         are = "is a preview" if len(previews) == 1 else "are previews"
-        told.append(f"{len(previews)} {are}, which nobody has confirmed, such as '{shortened(previews[0])}'")
+        remarks.append(
+            f"{len(previews)} {are}, which nobody has confirmed, such as '{shortened(previews[0])}'"
+        )
     name = _word(markup.get("name"))
     if len(points) == 1 and not names[0]:
         names[0] = name
@@ -125,7 +129,7 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
         "known": known,
         "sigmas": sigmas,
         "about": about,
-        "told": told,
+        "remarks": remarks,
         "axes": _axes(markup.get("coordinateSystem", "LPS"), where),
         "unit": _unit(markup.get("coordinateUnits", _UNIT), where),
     }

@@ -81,9 +81,9 @@ def read(path: Path) -> LandmarkSet:
         three_numbers([*re.split(r"[\s,;]+", text)[:dimensions], *flat], line) for line, text in places
     ]
     left_out = dict.fromkeys(_LEFT_OUT[name] for name in sections if name in _LEFT_OUT)
-    told = [f"Its {' and '.join(left_out)} are left out"] if left_out else []
+    remarks = [f"Its {' and '.join(left_out)} are left out"] if left_out else []
     if flat:
-        told.append("Its landmarks have two coordinates: z is taken for 0")
+        remarks.append("Its landmarks have two coordinates: z is taken for 0")
     frames = _listed(own.get("frames"), individuals)
     names = own_names(own, count)
     if names is None:
@@ -94,7 +94,7 @@ def read(path: Path) -> LandmarkSet:
         times=_listed(own.get("times"), individuals),
         frames=None if frames is None else own_frames(frames.tolist()),
         unit=own_unit(own),
-        told=told,
+        remarks=remarks,
     )
 
 

@@ -70,7 +70,7 @@ def read(path: Path) -> LandmarkSet:
         frames=numbers,
         unit=_unit(reader),
         about=_texts(reader, "DESCRIPTIONS", count),
-        told=[] if labels else ["Its points have no names, and got numbers"],
+        remarks=[] if labels else ["Its points have no names, and got numbers"],
     )
 
 
@@ -209,5 +209,5 @@ def _remark(landmarks: LandmarkSet, labels: Sequence[bytes], longest: int, is_ev
         off = np.abs(points.astype(np.float32) - points).max()
         if off > _ROUNDED * max(float(np.ptp(points, axis=0).max()), 1e-300):
             lost.append(f"coordinates are rounded, by up to {off:.2g}")
-    told = [f"In C3D {'; '.join(lost)}"] if lost else []
-    return ". ".join(filter(None, [*told, without_states(landmarks, TITLE)])) or None
+    remarks = [f"In C3D {'; '.join(lost)}"] if lost else []
+    return ". ".join(filter(None, [*remarks, without_states(landmarks, TITLE)])) or None

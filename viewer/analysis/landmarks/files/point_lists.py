@@ -76,9 +76,9 @@ def read(path: Path) -> LandmarkSet:
         if _are_numbered(rows):
             names, rows = [str(int(row[0])) for row in rows], [row[1:] for row in rows]
     flat = sum(len(row) == 2 for row in rows)
-    told = [f"{flat} landmarks have two coordinates: z is taken for 0"] if flat else []
+    remarks = [f"{flat} landmarks have two coordinates: z is taken for 0"] if flat else []
     places = [_place(row, has_flags) for row in rows]
-    return LandmarkSet.of(names, np.array([places]), told=told)
+    return LandmarkSet.of(names, np.array([places]), remarks=remarks)
 
 
 def _place(row: list[float], has_flag: bool) -> list[float]:

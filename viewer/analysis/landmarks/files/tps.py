@@ -109,11 +109,11 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
     positions = np.array([specimen.points or missing for specimen in specimens]).reshape(-1, count, 3)
     positions *= np.array([specimen.scale for specimen in specimens])[:, np.newaxis, np.newaxis]
     own = specimens[0].own
-    told = []
+    remarks = []
     if curves:
-        told.append(f"{curves} curves are left out")
+        remarks.append(f"{curves} curves are left out")
     if any(specimen.is_flat for specimen in specimens):
-        told.append("Its landmarks have two coordinates: z is taken for 0")
+        remarks.append("Its landmarks have two coordinates: z is taken for 0")
     names = own_names(own, count)
     if names is None:
         names = [str(number) for number in range(1, count + 1)]
@@ -123,7 +123,7 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
         times=np.array([own_number(specimen.own, "time") for specimen in specimens]),
         frames=own_frames([own_number(specimen.own, "frame") for specimen in specimens]),
         unit=own_unit(own),
-        told=told,
+        remarks=remarks,
     )
 
 

@@ -39,8 +39,8 @@ class MeasureKind:
     compute: `OfPoints` takes positions (T, K, 3) and gives values (T,), NaN where they tell none; `OnSurface`
     takes the surface of one pose and positions (K, 3), and gives a value or the reason why there is none.
     needs_surface: which of both it is. choices: the values that each option may have, the first where it is
-    not told. lines: of a kind that needs no surface, takes positions (K, 3) and gives the lines to draw, each
-    (P, 3).
+    not stated. lines: of a kind that needs no surface, takes positions (K, 3) and gives the lines to draw,
+    each (P, 3).
     """
 
     name: str

@@ -13,8 +13,8 @@ from ....analysis.landmarks.files import (
     read_landmarks,
     write_landmarks,
 )
-from ....analysis.landmarks.landmark_set import LandmarkSet, told_apart
-from ....analysis.landmarks.placed import landmarks_of, told_beside
+from ....analysis.landmarks.landmark_set import LandmarkSet, why_apart
+from ....analysis.landmarks.placed import landmarks_of, why_beside
 from ....analysis.landmarks.templates import (
     is_template_file,
     read_template,
@@ -108,8 +108,8 @@ class Exchange:
         template = template_of(file.name.removesuffix(".json"), made.listed, made.measures)
         save_template(file, template)
         self.templates[template.name] = template
-        told = f"{len(template.landmarks)} landmarks and {len(template.measures)} measures"
-        self._context.note(f"Saved {file}, {told}.")
+        counts = f"{len(template.landmarks)} landmarks and {len(template.measures)} measures"
+        self._context.note(f"Saved {file}, {counts}.")
 
     def _read_landmarks(self, path: Path) -> None:
         """Have a file read beside the window. One that seems to be of another scan is taken at the second
@@ -121,7 +121,7 @@ class Exchange:
 
         def read() -> tuple[LandmarkSet, tuple[Landmark, ...]]:
             found = read_landmarks(path, unit)
-            problem = None if is_sure else told_apart(found, _bounds(found, timeline, frame))
+            problem = None if is_sure else why_apart(found, _bounds(found, timeline, frame))
             if problem is not None:
                 raise InputError(problem, path, "Import the file again to use them anyway")
             return found, landmarks_of(found, timeline.visit, len(timeline), frame, known)
@@ -137,9 +137,9 @@ class Exchange:
     def _add(self, path: Path, found: LandmarkSet, landmarks: tuple[Landmark, ...]) -> None:
         self._context.change("Import landmarks", self._context.document.part(Landmarks).with_read(landmarks))
         self._context.reveal()
-        for text in found.told:
+        for text in found.remarks:
             self._context.note(f"{path.name}: {text}.")
-        if beside := told_beside(landmarks):
+        if beside := why_beside(landmarks):
             self._context.note(f"{path.name}: {beside}")
         self._context.note(f"Imported {len(landmarks)} landmarks from {path.name}.")
 

@@ -32,10 +32,10 @@ def place_words(shown: ShownLandmarks, number: int, scale: Scale) -> str:
 
 def corners_words(states: Sequence[str]) -> str:
     """Say how many corners a region has, and how they stand, the commonest state first."""
-    told = [state if count == len(states) else f"{count} {state}" for state, count in Counter(
+    counts = [state if count == len(states) else f"{count} {state}" for state, count in Counter(
         state.partition(":")[0] for state in states
     ).most_common()]  # fmt: skip
-    return f"{len(states)} corners: {', '.join(told)}"
+    return f"{len(states)} corners: {', '.join(counts)}"
 
 
 def gap_spans(

@@ -1,4 +1,4 @@
-"""Measures over time, plotted under the timeline, and the ways of landmarks over the picture."""
+"""Measures over time, plotted under the timeline, and the paths of landmarks over the picture."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ from .choices import CurveChoices, Settings
 from .lasso import Lasso
 from .lines import MeasureLines
 from .measurer import Measurer
+from .paths import Paths
 from .renaming import Renaming
 from .shown import Curve, Kept, Shown
-from .ways import Ways
 from .words import numbers_in_words
 
 TITLE = "Measures over time"
 
 
 class Tool:
-    """The tool that plots measures over time, and draws the ways of landmarks.
+    """The tool that plots measures over time, and draws the paths of landmarks.
 
-    shown: what is plotted. ways, lines: what is drawn over the picture. lasso: draws regions. adding: the
+    shown: what is plotted. paths, lines: what is drawn over the picture. lasso: draws regions. adding: the
     measure that is to be added. measurer: what finds measures over time. pointed: the curve that the mouse
     points at in the table, by name.
     """
@@ -50,7 +50,7 @@ class Tool:
     def __init__(self, context: ToolContext) -> None:
         self.context = context
         self.shown = Shown()
-        self.ways = Ways(context)
+        self.paths = Paths(context)
         self.lines = MeasureLines(context)
         self.adding = Adding()
         self.lasso = Lasso(context)
@@ -133,12 +133,12 @@ class Tool:
 
     def update(self) -> None:
         """Find what is plotted now."""
-        ways = self.ways.trajectories(self.settings, self.choices)
+        paths = self.paths.trajectories(self.settings, self.choices)
         count, series = len(self.times), self.context.followed.series
         fitting = {
             name: one for name, one in series.items() if len(one.times) == count
         }  # not of a scan before
-        self.shown.take(fitting, self.choices, self.settings, self.context.scale, ways)
+        self.shown.take(fitting, self.choices, self.settings, self.context.scale, paths)
 
     def fit(self) -> None:
         """Have the axes show all of the curves."""
@@ -230,18 +230,18 @@ class Tool:
         panel.draw(self, ui)
 
     def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
-        """Draw the ways of landmarks, what is measured in the frame, and the region that is being drawn."""
-        self.ways.draw(self.settings, self.choices, canvas, view)
+        """Draw the paths of landmarks, what is measured in the frame, and the region that is being drawn."""
+        self.paths.draw(self.settings, self.choices, canvas, view)
         self.lines.draw(self.landmarks, self.unseen, self.pointed, canvas, view)
         self.lasso.draw(canvas, view)
 
     def drawn(self, frame: int) -> DrawnMarks:
-        """The ways of landmarks and what is measured over a frame, for pictures that are saved."""
+        """The paths of landmarks and what is measured over a frame, for pictures that are saved."""
         pose = self.context.pose
         if pose is None:
             return NOTHING_DRAWN
         radius = self.context.viewport.bounds(pose).radius
-        found = self.ways.drawn(self.settings, self.choices, frame, radius)
+        found = self.paths.drawn(self.settings, self.choices, frame, radius)
         if self.is_below() and self.shown.plot is not None:
             found = replace(found, plot=self.shown.plot.drawn_below())
         lines = self.lines.drawn(self.landmarks, self.unseen, frame, radius)
@@ -251,17 +251,17 @@ class Tool:
         """Measure what is left to be measured, and have the scan held still by its anchors where that is
         chosen; whether there is something new."""
         has_measured = self.measurer.advance(budget, self.choices.noise)
-        return self.ways.hold(self.settings, self.choices) or has_measured
+        return self.paths.hold(self.settings, self.choices) or has_measured
 
-    def toggle_ways(self) -> None:
-        """Draw the ways of the landmarks that are ticked, or not."""
+    def toggle_paths(self) -> None:
+        """Draw the paths of the landmarks that are ticked, or not."""
         self.settings = replace(self.settings, trajectories=not self.settings.trajectories)
 
     def toggle_head_motion(self) -> None:
         """Show the scan with the motion of the rigid references removed, or as it was recorded."""
         self.settings = replace(self.settings, hold=not self.settings.hold)
-        if self.settings.hold and self.ways.still(self.choices) is None and self.ways.problem:
-            self.context.note(self.ways.problem)
+        if self.settings.hold and self.paths.still(self.choices) is None and self.paths.problem:
+            self.context.note(self.paths.problem)
 
     def show_lines(self) -> None:
         """Draw what is measured in the view, or not."""
@@ -328,7 +328,7 @@ COMMANDS = {
                     is_on=lambda tool: tool.lasso.is_drawn,
                 ),
                 Command(
-                    "trajectories", "Landmark paths", Tool.toggle_ways, "W",
+                    "trajectories", "Landmark paths", Tool.toggle_paths, "W",
                     is_on=lambda tool: tool.settings.trajectories,
                 ),
                 Command(

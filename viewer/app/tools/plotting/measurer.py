@@ -96,7 +96,7 @@ class Measurer:
                         self._found[name] = one, replace(series, name=name)
 
     def _wanted(self, measures: Sequence[Measure], noise: float) -> dict[str, Inputs]:
-        """The measures whose landmarks are all placed, with their tracks; what is no measure is told once."""
+        """The measures whose landmarks are all placed, with their tracks. Reports unknown kinds once."""
         tracks, wanted = self._context.followed.tracks, {}
         for measure in measures:
             names = dict.fromkeys(measure.landmarks)

@@ -1,4 +1,4 @@
-"""Curves in the panel: the measures, how to add one, and whose ways are drawn."""
+"""Curves in the panel: the measures, how to add one, and whose paths are drawn."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ... import widgets
 from ...ui import Ui
 from . import adding
 from .choices import ANCHORS, Settings
-from .ways import SPEED_MAP
+from .paths import SPEED_MAP
 
 if TYPE_CHECKING:
     from . import Tool
@@ -44,7 +44,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
         adding.draw(tool, ui)
         imgui.tree_pop()
-    _draw_ways(tool)
+    _draw_paths(tool)
 
 
 def _draw_measures(tool: Tool) -> None:
@@ -92,13 +92,13 @@ def _draw_noise(tool: Tool) -> None:
         tool.choose("Set scanner noise", noise=max(float(f"{new / scale.factor:.6g}"), 0.0))
 
 
-def _draw_ways(tool: Tool) -> None:
-    """The landmarks, each with whether its way is drawn and whether it holds the scan still."""
+def _draw_paths(tool: Tool) -> None:
+    """The landmarks, each with whether its path is drawn and whether it holds the scan still."""
     placed = tool.placed
     if not placed or not imgui.tree_node("Landmark paths (trajectories)"):
         return
     choices = tool.choices
-    if imgui.begin_table("ways", 3, imgui.TableFlags_.sizing_fixed_fit.value):
+    if imgui.begin_table("paths", 3, imgui.TableFlags_.sizing_fixed_fit.value):
         imgui.table_setup_column("landmark", imgui.TableColumnFlags_.width_stretch.value)
         for words, about in (
             ("", ""),
@@ -127,9 +127,9 @@ def _draw_ways(tool: Tool) -> None:
             imgui.pop_id()
         imgui.end_table()
     tool.settings = widgets.edit(tool.settings, Settings(), hidden=_OF_THE_PLOT, rest="More path options")
-    if (tool.settings.hold or tool.settings.coordinates == ANCHORS) and tool.ways.problem:
-        widgets.faint(tool.ways.problem)
-    if tool.settings.by_speed and tool.settings.trajectories and tool.ways.fastest:
+    if (tool.settings.hold or tool.settings.coordinates == ANCHORS) and tool.paths.problem:
+        widgets.faint(tool.paths.problem)
+    if tool.settings.by_speed and tool.settings.trajectories and tool.paths.fastest:
         _draw_colors(tool)
     imgui.tree_pop()
 
@@ -146,4 +146,4 @@ def _draw_colors(tool: Tool) -> None:
         ink = imgui.color_convert_float4_to_u32(ImVec4(red, green, blue, 1))
         imgui.get_window_draw_list().add_rect_filled(corner, corner + ImVec2(step + 1, 0.5 * em), ink)
     imgui.dummy(ImVec2(0, 0.5 * em))
-    imgui.text_disabled(f"0 to {scale.factor * tool.ways.fastest:.3g} {scale.unit}/s")
+    imgui.text_disabled(f"0 to {scale.factor * tool.paths.fastest:.3g} {scale.unit}/s")

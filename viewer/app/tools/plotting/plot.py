@@ -304,8 +304,8 @@ def _draw_table(tool: Tool, frame: int, size: ImVec2) -> None:
         _draw_name(tool, curve)
         now = with_uncertainty(float(curve.values[frame]), float(curve.sigmas[frame]), curve.unit)
         now = with_note(now, curve.notes.get(frame, ""))
-        told = (f"{related[curve.name]:.3f}" if curve.name in related else "",)
-        for words in (now, *(told if is_against else tool.words_of(curve))):
+        correlated = (f"{related[curve.name]:.3f}" if curve.name in related else "",)
+        for words in (now, *(correlated if is_against else tool.words_of(curve))):
             imgui.table_next_column()
             imgui.text(words)
             if words.startswith(WARNING):

@@ -18,9 +18,9 @@ from ....output.plots import (
     CurvePlot,
     PlotLine,
     color_of_curve,
-    color_of_way,
+    color_of_path,
     line_of_curve,
-    line_of_way,
+    line_of_path,
     plot_against,
     plot_over_time,
 )
@@ -71,13 +71,13 @@ class Shown:
         choices: CurveChoices,
         settings: Settings,
         scale: Scale,
-        ways: Mapping[str, Trajectory] = MappingProxyType({}),
+        trajectories: Mapping[str, Trajectory] = MappingProxyType({}),
     ) -> None:
         """Find what is to be plotted; the same objects as before where nothing in them has changed.
 
-        ways: of landmarks, whose speed or acceleration is plotted beside that of measures.
+        trajectories: of landmarks, whose speed or acceleration is plotted beside that of measures.
         """
-        asked = series, choices, settings, scale, ways
+        asked = series, choices, settings, scale, trajectories
         if asked == self._asked:  # a series equals itself alone
             return
         smoothing, keys, curves = settings.smoothing, set[object](), []
@@ -90,18 +90,18 @@ class Shown:
                 curves.append(self._kept.of(key, (one,), make))
         self._kept.forget_others(keys)
         self._asked, self.curves, self.plot = asked, tuple(curves), plot_of(curves, choices, settings)
-        if settings.mode == TIME and settings.derivative and ways:
-            order, bands, times = settings.derivative, settings.bands, next(iter(ways.values())).times
+        if settings.mode == TIME and settings.derivative and trajectories:
+            order, bands, times = settings.derivative, settings.bands, next(iter(trajectories.values())).times
             lines = [
-                line_of_way(name, way, scale, color_of_way(number), order, bands)
-                for number, (name, way) in enumerate(ways.items())
+                line_of_path(name, trajectory, scale, color_of_path(number), order, bands)
+                for number, (name, trajectory) in enumerate(trajectories.items())
             ]
             before = () if self.plot is None else self.plot.lines
             self.plot = plot_over_time(times, np.arange(len(times)), (*before, *lines))
 
 
 def curve_of(series: Series, color: int, scale: Scale, smoothing: Smoothing) -> Curve:
-    """The curve of a measure, in the unit that lengths are told in."""
+    """The curve of a measure, in the unit that lengths are shown in."""
     return replace(Curve.of(series, scale, smoothing), color=color)
 
 

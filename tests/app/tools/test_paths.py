@@ -13,7 +13,7 @@ import pytest
 
 from viewer.analysis.track import Known, Track
 from viewer.app.tools.plotting.choices import ANCHORS, CurveChoices, Settings
-from viewer.app.tools.plotting.ways import Ways
+from viewer.app.tools.plotting.paths import Paths
 
 TIMES = np.arange(30) / 30
 PLACES = {"a": (0, 0, 0), "b": (1, 0, 0), "c": (0, 1, 0)}
@@ -25,13 +25,13 @@ def track_at(place: tuple[int, int, int]) -> Track:
 
 
 @pytest.fixture
-def ways() -> Ways:
+def ways() -> Paths:
     followed = SimpleNamespace(tracks={name: track_at(place) for name, place in PLACES.items()})
     context: Any = SimpleNamespace(followed=followed, timeline=TIMES)
-    return Ways(context)
+    return Paths(context)
 
 
-def test_what_is_asked_for_again_is_the_same(ways: Ways) -> None:
+def test_what_is_asked_for_again_is_the_same(ways: Paths) -> None:
     settings, choices = Settings(coordinates=ANCHORS), CurveChoices(traced=("a", "b"), anchors=tuple(PLACES))
     found, still = ways.trajectories(settings, choices), ways.still(choices)
     again = ways.trajectories(settings, choices)
@@ -40,7 +40,7 @@ def test_what_is_asked_for_again_is_the_same(ways: Ways) -> None:
 
 
 @pytest.mark.parametrize("change", [{"traced": ("b",)}, {"traced": ()}, {"seconds": 0.5}])
-def test_ways_that_are_not_traced_any_more_are_forgotten(ways: Ways, change: dict[str, Any]) -> None:
+def test_ways_that_are_not_traced_any_more_are_forgotten(ways: Paths, change: dict[str, Any]) -> None:
     settings, choices = Settings(), CurveChoices(traced=("a",))
     former = weakref.ref(ways.trajectories(settings, choices)["a"])
     if "seconds" in change:

@@ -1,4 +1,4 @@
-"""The ways of landmarks over the picture, in the scan's coordinates or held still by anchors."""
+"""The paths of landmarks over the picture, in the scan's coordinates or held still by anchors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ....analysis.trajectories import Trajectory, stabilising, trajectory_of
 from ....errors import InputError
 from ....look import color_table
 from ....output.overlays import DIM_LINE, NOTHING_DRAWN, DrawnMarks, DrawnPath, rounded, runs_of
-from ....output.plots import color_of_way
+from ....output.plots import color_of_path
 from ....rigid import STILL, Rigid
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import ToolContext
@@ -24,11 +24,11 @@ from .shown import Kept
 
 Still = tuple[Rigid | None, ...]
 SPEED_MAP = "viridis"
-_LEVELS = 16  # of speed that are told apart
+_LEVELS = 16  # of speed that have colours of their own
 
 
-class Ways:
-    """The ways of the landmarks that are ticked. problem: why they are not held still, "" where nothing is
+class Paths:
+    """The paths of the landmarks that are ticked. problem: why they are not held still, "" where nothing is
     wrong. fastest: the speed that has the last colour, scan units a second."""
 
     def __init__(self, context: ToolContext) -> None:
@@ -70,14 +70,14 @@ class Ways:
         return True
 
     def trajectories(self, settings: Settings, choices: CurveChoices) -> dict[str, Trajectory]:
-        """The ways of the landmarks that are ticked, by name."""
+        """The paths of the landmarks that are ticked, by name."""
         tracks, smoothing = self._context.followed.tracks, settings.smoothing
         still = self.still(choices) if settings.coordinates == ANCHORS and choices.traced else None
         found = {}
         for name in choices.traced:
             if (track := tracks.get(name)) is not None and len(track.times) == len(self._context.timeline):
                 found[name] = self._kept.of(
-                    (name, smoothing), (track, still), partial(_way_of, track, smoothing, still)
+                    (name, smoothing), (track, still), partial(_trajectory_of, track, smoothing, still)
                 )
         self._kept.forget_others({("still", self._anchors(choices)), *((name, smoothing) for name in found)})
         if (now := tuple(found.values())) != self._all:
@@ -108,7 +108,7 @@ class Ways:
             canvas.path(*each)
 
     def _held(self, settings: Settings, choices: CurveChoices, frame: int) -> Rigid | None:
-        """The motion of ways to where they lie about a frame; None where nobody knows how the anchors lie in
+        """The motion of paths to where they lie about a frame; None where nobody knows how the anchors lie in
         it."""
         still = self.still(choices) if settings.coordinates == ANCHORS else None
         if still is None:
@@ -117,7 +117,7 @@ class Ways:
         return None if now is None else now.inverse
 
     def drawn(self, settings: Settings, choices: CurveChoices, frame: int, radius: float) -> DrawnMarks:
-        """The ways about a frame, for pictures that are saved. radius: of the scan."""
+        """The paths about a frame, for pictures that are saved. radius: of the scan."""
         found = self.trajectories(settings, choices) if settings.trajectories else {}
         held = self._held(settings, choices, frame)
         if not found or held is None:
@@ -132,20 +132,20 @@ class Ways:
         return DrawnMarks(trajectories=self._drawn[1], held=held)
 
     def _colors(self, settings: Settings) -> list[list[int]]:
-        """The colours of the ways in each frame, 0xRRGGBB."""
+        """The colours of the paths in each frame, 0xRRGGBB."""
         if not settings.by_speed:
-            return [[color_of_way(number)] * len(one.positions) for number, one in enumerate(self._all)]
+            return [[color_of_path(number)] * len(one.positions) for number, one in enumerate(self._all)]
         if self._by_speed is None:
             self._by_speed = [self._speed_colors(one) for one in self._all]
         return self._by_speed
 
     def _speed_colors(self, one: Trajectory) -> list[int]:
-        """The colours of a way by its speed, 0xRRGGBB; that of rest where the speed is not known."""
+        """The colours of a path by its speed, 0xRRGGBB; that of rest where the speed is not known."""
         share = np.nan_to_num(one.speeds) / self.fastest if self.fastest else np.zeros(len(one.speeds))
         levels = np.round(np.clip(share, 0, 1) * (_LEVELS - 1)) / (_LEVELS - 1)
         red, green, blue = color_table(SPEED_MAP)[np.round(levels * 255).astype(int), :3].astype(int).T
         return (red << 16 | green << 8 | blue).tolist()
 
 
-def _way_of(track: Track, smoothing: Smoothing, still: Still | None) -> Trajectory:
+def _trajectory_of(track: Track, smoothing: Smoothing, still: Still | None) -> Trajectory:
     return trajectory_of(track, smoothing.wide_enough(track.times), still)
