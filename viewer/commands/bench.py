@@ -1,4 +1,4 @@
-"""RowSource the run time and the error of every renderer.
+"""Measure the run time and the error of every renderer.
 
 The scenes have a known truth. DIR receives report.html, one page with all results; results.jsonl, a row for
 each scene, renderer and setting; numerics.jsonl, the results of the stability suite; plots and pictures.
@@ -72,7 +72,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 
 def run(args: Namespace) -> int:
-    """RowSource, report, compare, or only report. 1 where Ctrl-C stopped it."""
+    """Measure, report, compare, or only report. 1 where Ctrl-C stopped it."""
     require(*_LIBRARIES)
     if args.calibrate:
         return _calibrate(args)
@@ -105,7 +105,7 @@ def run(args: Namespace) -> int:
 
 
 def _calibrate(args: Namespace) -> int:
-    """RowSource each configuration that the automatic choice knows, unless `--report` says that the rows are
+    """Measure each configuration that the automatic choice knows, unless `--report` says that the rows are
     there, and store the model of them. 1 where Ctrl-C stopped it: nothing is stored then."""
     if args.suite or args.backend or args.compare:
         hint = "Leave out --suite, --backend and --compare"

@@ -14,6 +14,13 @@ Scan4D's own tests run the same checks on everything that its folders hold.
 
 from __future__ import annotations
 
+import sys
+
+if "pytest" in sys.modules:  # so that a check that fails shows the values that it compared
+    sys.modules["pytest"].register_assert_rewrite(
+        *(f"{__name__}.{part}" for part in ("backends", "measures", "readers", "tools"))
+    )
+
 from .backends import backend_checks
 from .check import Check
 from .measures import measure_checks
