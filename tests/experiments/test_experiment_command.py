@@ -40,8 +40,8 @@ def test_octrees_stand_beside_the_papers(run_experiment: Run, tmp_path: Path) ->
     rows = read_rows(tmp_path / "out")
     assert {row["sweep"] for row in rows} == {"instancing", "max_depth"}
     assert all(bool(row["errors"]) == (row["sweep"] == "max_depth") for row in rows)
-    assert [row["delta"] for row in read_rows(tmp_path / "out" / "octrees.jsonl")] == [2, 5, 10, 50]
-    assert {row["scene"] for row in read_rows(tmp_path / "out" / "octree-sizes.jsonl")} == {"demo"}
+    assert [row["delta"] for row in read_rows(tmp_path / "out" / "trees.jsonl", {})] == [2, 5, 10, 50]
+    assert {row["scene"] for row in read_rows(tmp_path / "out" / "sizes.jsonl", {})} == {"demo"}
     text = (tmp_path / "out" / "octree-tables.md").read_text(encoding="utf-8")
     assert text.count("| `demo` |") == 3  # octrees, and levels with two kinds of cubes
     assert text.count("| `demo`, level 10 |") == 2
