@@ -102,6 +102,13 @@ def renderer() -> Renderer:
     return shared_renderer()
 
 
+@pytest.fixture(autouse=True)
+def current_context(request: pytest.FixtureRequest) -> None:
+    """The shared renderer's context is the current one: other tests leave contexts of their own."""
+    if "renderer" in request.fixturenames:
+        request.getfixturevalue("renderer").gpu.activate()
+
+
 @pytest.fixture
 def draw(renderer: Renderer) -> Callable[..., Surface]:
     """draw(cloud or range views, camera, size, backend or its name or a variant, look, params): one finished

@@ -96,8 +96,8 @@ def test_what_fails_because_of_a_mutant_kills_it(
         ),
         ("viewer/scan/formats/npz.py", "read", "tests/scan/formats/test_npz.py"),
         ("viewer/scan/formats/_columns.py", "_as_ellipses", "tests/scan/formats/test_ellipses.py"),
-        ("viewer/splatting/culling.py", "points_of", "tests/gpu/test_culling.py"),
-        ("shaders/chunks/cull.comp", "is_hidden", "tests/gpu/test_culling.py"),
+        ("viewer/splatting/culling.py", "points_of", "tests/splatting/test_culling.py"),
+        ("shaders/chunks/cull.comp", "is_hidden", "tests/splatting/test_culling.py"),
     ],
 )
 def test_the_nearest_tests_run_first(mutate: ModuleType, file: str, function: str, first: str) -> None:

@@ -117,3 +117,18 @@ def test_texts_count_frames_by_one_rule(modules: list[tuple[str, ast.Module]]) -
     """A text that adds 1 by itself, or forgets to, is beside the others that a person reads."""
     found = {path: told for path, syntax in modules if (told := frames_told(syntax))}
     assert list(found) == ["scan/times.py"], found
+
+
+# Classes with more than 30 methods. This list only gets shorter.
+LARGE = {"GpuPose", "Steering", "Timeline", "Tool", "Toolbox"}
+
+
+def test_classes_have_at_most_30_methods(modules: list[tuple[str, ast.Module]]) -> None:
+    large = {
+        node.name
+        for _, syntax in modules
+        for node in ast.walk(syntax)
+        if isinstance(node, ast.ClassDef)
+        if sum(isinstance(method, ast.FunctionDef) for method in node.body) > 30
+    }
+    assert large == LARGE

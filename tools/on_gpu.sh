@@ -138,7 +138,7 @@ tell "$(tail -n 4 "$out/device.log" | head -n 3 | paste -sd ' ')"
 
 tested=(tests/gpu tests/backends tests/numerics)
 if [ $quick = yes ]; then
-    tested=(tests/gpu/test_bins.py tests/gpu/test_fastest.py tests/backends/test_instancing.py)
+    tested=(tests/gpu/test_bins.py tests/splatting/test_fastest.py tests/backends/test_instancing.py)
 fi
 pytest=("$python" -m pytest -q -rs -p no:cacheprovider -p no:benchmark -p left_out -m "not slow")
 ! has xdist || pytest+=(-n "$(nproc)" --dist worksteal)

@@ -85,7 +85,7 @@ def test_a_sequence_plays_without_merging(
         viewport.draw(viewport.request)
     surface = viewport.surface
     assert surface is not None
-    picked = viewport.pick((SIZE[0] // 2, SIZE[1] // 2))
+    picked = viewport.probe.pick((SIZE[0] // 2, SIZE[1] // 2))
     assert picked is not None
     assert picked.id == surface.texel(SIZE[0] // 2, SIZE[1] // 2).row
     at_rest, now = SimpleNamespace(is_moving=False), time.monotonic() + LATER

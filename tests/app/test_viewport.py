@@ -13,6 +13,7 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from scenes import sphere
 
+from viewer.app.scene import probe as probe_module
 from viewer.app.scene import viewport as viewport_module
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import Backend, FrameView
@@ -46,48 +47,48 @@ def test_a_pixel_is_read_once_until_mouse_or_picture_move(
         reads.append((x, y))
         return picture_pick(surface, x, y, **options)
 
-    picture_pick = viewport_module.pick
-    monkeypatch.setattr(viewport_module, "pick", counted)
-    assert viewport.pick((30, 20)) is None, "before the first picture"
+    picture_pick = probe_module.pick
+    monkeypatch.setattr(probe_module, "pick", counted)
+    assert viewport.probe.pick((30, 20)) is None, "before the first picture"
     viewport.draw(REQUEST)
-    first = viewport.pick((30, 20))
+    first = viewport.probe.pick((30, 20))
     assert first is not None
     viewport.draw(REQUEST)
-    assert viewport.pick((30, 20)) is first
-    assert viewport.pick((0, 0)) is viewport.pick((0, 0)) is None
+    assert viewport.probe.pick((30, 20)) is first
+    assert viewport.probe.pick((0, 0)) is viewport.probe.pick((0, 0)) is None
     assert len(reads) == 2
     other = replace(REQUEST, camera=REQUEST.camera.orbited(40, 0))
-    viewport.pick((30, 20))
+    viewport.probe.pick((30, 20))
     viewport.draw(other)
-    turned = viewport.pick((30, 20))
+    turned = viewport.probe.pick((30, 20))
     assert turned is not None
     assert turned.row != first.row
     assert len(reads) == 4
 
 
 def test_what_is_shown_near_a_pixel_is_known(viewport: Viewport) -> None:
-    assert not viewport.shows_near((30, 20), 5), "before the first picture"
+    assert not viewport.probe.shows_near((30, 20), 5), "before the first picture"
     viewport.draw(REQUEST)
     assert viewport.surface is not None
     shown = np.isfinite(viewport.surface.depth)
     left = int(shown.any(axis=0).argmax())
-    assert viewport.shows_near((30, 20), 1)
-    assert viewport.shows_near((left - 3, 20), 6)
-    assert not viewport.shows_near((left - 9, 20), 6)
-    assert not viewport.shows_near((0, 0), 2)
+    assert viewport.probe.shows_near((30, 20), 1)
+    assert viewport.probe.shows_near((left - 3, 20), 6)
+    assert not viewport.probe.shows_near((left - 9, 20), 6)
+    assert not viewport.probe.shows_near((0, 0), 2)
 
 
 def test_nothing_is_picked_where_there_is_no_picture(viewport: Viewport) -> None:
     viewport.draw(REQUEST)
-    assert viewport.pick((30, 20)) is not None
+    assert viewport.probe.pick((30, 20)) is not None
     broken = replace(REQUEST, look=replace(REQUEST.look, color_by="missing"))
     viewport.draw(broken)
     assert viewport.problem is not None
-    assert viewport.pick((30, 20)) is None
+    assert viewport.probe.pick((30, 20)) is None
     viewport.draw(REQUEST)
-    assert viewport.pick((30, 20)) is not None
+    assert viewport.probe.pick((30, 20)) is not None
     viewport.clear()
-    assert viewport.pick((30, 20)) is None
+    assert viewport.probe.pick((30, 20)) is None
     assert viewport.is_visible, "until another one is drawn"
 
 
@@ -186,19 +187,19 @@ def test_a_backend_that_draws_more_simply_in_motion_is_called_again_at_rest(view
 
 def test_what_is_under_the_mouse_in_a_preview_is_about_what_it_is_in_full(viewport: Viewport) -> None:
     viewport.draw(REQUEST)
-    whole = viewport.pick((37, 12))
+    whole = viewport.probe.pick((37, 12))
     viewport.took(1000.0, goal_ms=10.0)
     viewport.draw(replace(REQUEST, look=Look(light="flat")), held=True)
     assert viewport.is_preview
-    rough = viewport.pick((37, 12))
+    rough = viewport.probe.pick((37, 12))
     assert whole is not None
     assert rough is not None
     assert np.linalg.norm(rough.position - whole.position) < 0.1
-    exact = viewport.pick_in_full()
+    exact = viewport.probe.pick_in_full()
     assert not viewport.is_preview
     assert exact is not None
     np.testing.assert_array_equal(exact.position, whole.position)
-    assert viewport.pick((SIZE[0] - 1, SIZE[1] - 1)) is None
+    assert viewport.probe.pick((SIZE[0] - 1, SIZE[1] - 1)) is None
 
 
 def shown(viewport: Viewport) -> tuple[np.ndarray, ...]:
@@ -222,7 +223,7 @@ def test_two_viewports_of_one_scan_share_its_upload_and_nothing_else(viewport: V
         for alone, beside in zip(shown(viewport), shown(one), strict=True):
             np.testing.assert_array_equal(beside, alone)
     assert not np.array_equal(shown(front)[2], shown(side)[2])
-    in_front, at_side = front.pick((30, 20)), side.pick((30, 20))
+    in_front, at_side = front.probe.pick((30, 20)), side.probe.pick((30, 20))
     assert in_front is not None
     assert at_side is not None
     assert in_front.id != at_side.id

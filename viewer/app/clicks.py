@@ -45,7 +45,7 @@ class Clicks:
         surface, request = viewport.surface, viewport.request
         if surface is None or request is None or not viewport.is_there:
             return None
-        at = pixel if in_full else viewport.pixel_of_picture(pixel)
+        at = pixel if in_full else viewport.probe.pixel_of_picture(pixel)
         meant = before_gap(surface, *at)
         picked = pick(surface, *at, shown=meant, spacing=in_full)
         is_farther = meant != at and surface.texel(*at).depth < np.inf

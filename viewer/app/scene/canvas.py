@@ -273,7 +273,7 @@ class Canvas:
         ratio = self._viewport.size[1] / view.size.y  # pixels of the picture
         x, y = ((place.x - view.corner.x) * ratio, (place.y - view.corner.y) * ratio)
         reached = round(half / _MAGNIFIED * ratio)
-        if image is None or not self._viewport.shows_near((math.floor(x), math.floor(y)), reached):
+        if image is None or not self._viewport.probe.shows_near((math.floor(x), math.floor(y)), reached):
             return
         away = 2 * half * _LOUPE_AWAY
         across = away if place.x + away + half < view.box.high.x else -away
@@ -307,7 +307,7 @@ class Canvas:
         marks = np.concatenate([np.empty((0, 2)), *self._marks]) - corner
         marks = marks[:: len(marks) // _MOST_MARKS + 1]
         size = view.size.x, view.size.y
-        ground = placing.LabelGround(size, self.em, self._viewport.covered, marks, taken, view.camera)
+        ground = placing.LabelGround(size, self.em, self._viewport.probe.covered, marks, taken, view.camera)
         labels = placing.said_once(self._labels, lambda one: one.text)
         asked = [placing.Callout(one.key, one.sizes, one.line - corner) for one in labels]
         placed = places.place(asked, ground)

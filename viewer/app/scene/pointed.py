@@ -42,7 +42,7 @@ class Pointer(WindowPart):
 
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
-        picked = self.viewport.pick(pixel) if pixel else None
+        picked = self.viewport.probe.pick(pixel) if pixel else None
         told = self.playback.scale, self.has_details
         if picked is self.picked and told == self._told:
             return
@@ -58,7 +58,7 @@ class Pointer(WindowPart):
 
     def in_full(self) -> Picked | None:
         """The place under the mouse in the picture in full."""
-        return self.viewport.pick_in_full() or self.picked
+        return self.viewport.probe.pick_in_full() or self.picked
 
     COMMANDS = (
         Command(

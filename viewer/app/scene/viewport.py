@@ -9,10 +9,6 @@ from collections import defaultdict, deque
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ...analysis.pick import Picked, before_gap, pick
 from ...bounds import Bounds
 from ...drawing.frame import draw_plan, reshade, scaled_size, supersample
 from ...drawing.jobs import Stage
@@ -21,7 +17,6 @@ from ...drawing.renderer import Renderer
 from ...drawing.request import Request, colorable, fallback
 from ...errors import Scan4DError
 from ...look import SAMPLES
-from ...output.labels import covered_cells
 from ...picture.present import Presenter
 from ...picture.soften import soften
 from ...picture.surface import Surface
@@ -30,6 +25,7 @@ from ...scan.times import frame_in_words
 from ..failures import failure_in_words
 from .detail import Budget, Detail
 from .motion import Motion
+from .probe import Probe
 
 log = logging.getLogger(__name__)
 _RATE_SPAN = 1.0  # seconds over which pictures are counted
@@ -74,8 +70,7 @@ class Viewport:
         self._simplifies: defaultdict[str, bool] = defaultdict(bool)  # whether it does in motion, the same
         self._bounded: tuple[Pose, Bounds] | None = None
         self._times: deque[float] = deque()
-        self._picked: tuple[tuple[int, int], Picked | None] | None = None
-        self._covered: tuple[int, NDArray[np.bool_]] | None = None  # by the number of the picture
+        self.probe = Probe(self)
 
     @property
     def aspect(self) -> float:
@@ -112,7 +107,8 @@ class Viewport:
                 is_uploading = isinstance(asked, Waiting) and asked.stage is Stage.UPLOAD
                 self._prepared_at = now + (0.0 if is_uploading else _PREPARED_LATER)
                 return False
-            self._drawn, self.request, self._picked = wanted, request, None
+            self._drawn, self.request = wanted, request
+            self.probe.forget()
             self._is_rough = False
             self.problem, self._prepared_at = None, math.inf
             if size != self.size:  # what was drawn for the other goes with whoever has it still
@@ -290,61 +286,15 @@ class Viewport:
             light = _DIMMED if dimmed else 1.0
             self._presenter.present(self.surface, *self.place[:2], self.size, light)
 
-    def pick(self, pixel: tuple[int, int]) -> Picked | None:
-        """The place that a pixel shows, without its spacing, never through a gap (`before_gap`).
-
-        Read from the GPU once for each place and picture.
-        """
-        if self.surface is None or not self.is_there:
-            return None
-        if self._picked is None or self._picked[0] != pixel:
-            at = self.pixel_of_picture(pixel)
-            meant = before_gap(self.surface, *at)
-            self._picked = pixel, pick(self.surface, *at, shown=meant, spacing=False)
-        return self._picked[1]
-
-    def pixel_of_picture(self, pixel: tuple[int, int]) -> tuple[int, int]:
-        """The pixel of the picture that shows the middle of one of the view, of which a preview has fewer."""
-        if self.surface is None:
-            return pixel
-        (x, y), (width, height), (wide, high) = pixel, self.surface.size, self.size
-        return math.floor((x + 0.5) * width / wide), math.floor((y + 0.5) * height / high)
-
-    def shows_near(self, pixel: tuple[int, int], reach: int) -> bool:
-        """Whether the picture shows something at most so many pixels of the view beside one of them, across
-        or down."""
-        if self.surface is None or not self.is_there:
-            return False
-        away = max(1, round(reach * self.surface.size[1] / self.size[1]))
-        return bool(np.isfinite(self.surface.depth_around(*self.pixel_of_picture(pixel), away)).any())
-
-    @property
-    def covered(self) -> NDArray[np.bool_] | None:
-        """The cells of the picture that show the subject (see `labels.covered_cells`), None without a
-        picture.
-
-        Read from the GPU once for each picture.
-        """
-        if self.surface is None or not self.is_there:
-            return None
-        if self._covered is None or self._covered[0] != self.number:
-            self._covered = self.number, covered_cells(self.surface)
-        return self._covered[1]
-
     @property
     def image(self) -> int | None:
         """The OpenGL texture that the picture was shown from last, its first row at 0; None before."""
         return self._presenter.image if self.is_visible else None
 
-    def pick_in_full(self) -> Picked | None:
-        """The last `pick` once more, in the picture in full; None where that was before another picture."""
-        pixel = self._picked and self._picked[0]
-        self.finish()
-        return self.pick(pixel) if pixel else None
-
     def clear(self) -> None:
         """Forget what is shown, whose image stays until the next request is drawn."""
-        self._drawn = self.request = self.problem = self._bounded = self._picked = self._asked_for = None
+        self._drawn = self.request = self.problem = self._bounded = self._asked_for = None
+        self.probe.forget()
         self._prepared_at, self._is_rough = math.inf, False
 
     def bounds(self, pose: Pose) -> Bounds:
