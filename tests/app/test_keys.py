@@ -81,6 +81,15 @@ def test_changed_keys_hold_and_the_others_stay(file: Path) -> None:
     assert of == USUAL | {"play": "Ctrl+F7", "fit": ""}
 
 
+def test_a_key_that_two_tools_want_is_that_of_the_first(file: Path) -> None:
+    commands = Commands()
+    for tool in ("first", "second"):
+        commands.add("Tools", (Command(f"act_{tool}", "Act", print, "Alt+Q"),), tool)
+    keys, (problem,) = load_keys(file, commands)
+    assert (keys.of["act_first"], keys.of["act_second"]) == ("Alt+Q", "")
+    assert str(problem).startswith("The tool 'second': Alt+Q is set for both 'act_first' and 'act_second'")
+
+
 def test_two_commands_can_swap_keys(file: Path) -> None:
     changes = {"screenshot": USUAL["record"], "record": USUAL["screenshot"]}
     of, problems = load_text(file, "[keys]\n" + "\n".join(f'{n} = "{k}"' for n, k in changes.items()))

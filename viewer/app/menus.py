@@ -96,7 +96,8 @@ class Commands:
         )
         of = [command for menu in self.menus for command in menu.commands()]
         # Those of backends come last: they have those keys that are left.
-        of.sort(key=lambda one: (one.name in self.tool_of, one.name.startswith("switch_")))
+        added = {name: number for number, name in enumerate(self.tool_of)}  # of two tools the first has a key
+        of.sort(key=lambda one: (added.get(one.name, -1), one.name.startswith("switch_")))
         self.of: Mapping[str, Command] = {command.name: command for command in of}
 
     def _expanded(self, menu: Menu) -> Menu:
