@@ -103,10 +103,11 @@ def _chords(
 def _under(patch: Patch, line: Line) -> tuple[list[int], NDArray[np.float64]]:
     """The face that each piece of a line crosses, -1: of no length, and the weights of its corners at both
     ends, (P - 1, 2, 3)."""
-    from .cutting_kernels import faces_under
+    from .cutting_kernels import PatchArrays, faces_under
 
     found, weights = np.empty(len(line) - 1, np.int64), np.empty((len(line) - 1, 2, 3))
-    faces_under(patch.vertices, patch.faces, *patch.around, line, _SAME, found, weights)
+    arrays = PatchArrays(patch.vertices, patch.faces, *patch.around)
+    faces_under(arrays, line, _SAME, found, weights)
     return found.tolist(), weights
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,12 +44,19 @@ def _nearest(
     return float(np.sqrt(np.dot(off, off)))
 
 
+class PatchArrays(NamedTuple):
+    """A patch as compiled loops have it; the faces at each vertex are around[firsts[vertex] : firsts[vertex +
+    1]]."""
+
+    vertices: NDArray[np.float64]  # (V, 3)
+    faces: NDArray[np.int64]  # (F, 3)
+    firsts: NDArray[np.int64]  # (V + 1,)
+    around: NDArray[np.int64]
+
+
 @compiled
 def faces_under(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    firsts: NDArray[np.int64],
-    around: NDArray[np.int64],
+    patch: PatchArrays,
     line: NDArray[np.float64],
     same: float,
     found: NDArray[np.int64],
@@ -56,9 +65,9 @@ def faces_under(
     """Walk along a line from a vertex on, (P, 3), and fill in the face that each of its pieces crosses,
     (P - 1,), -1 for pieces without length, and the weights of its corners at both ends, (P - 1, 2, 3).
 
-    firsts, around: the faces at each vertex are around[firsts[vertex] : firsts[vertex + 1]]. same: weights
-    below it are none.
+    same: weights below it are none.
     """
+    vertices, faces, firsts, around = patch
     start, least = 0, np.inf
     for vertex in range(len(vertices)):
         off = vertices[vertex] - line[0]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,9 @@ from .pattern import FoundPattern, PointPattern, RecurringPoints
 from .registration import WAYS, PatchLevel, Placement, best_registered, patch_of, registered, rotations
 from .settings import TrackingSettings
 from .surface import MomentSurface
+
+if TYPE_CHECKING:
+    from .patch_kernels import SurfacePatch
 
 Float = NDArray[np.float64]
 
@@ -73,6 +77,10 @@ class Sighting:
     def gap(cls, reason: str) -> Sighting:
         """No sighting, and why."""
         return cls(np.full(3, np.nan), np.full((3, 3), np.nan), reason)
+
+
+class _Lost(Exception):
+    """A landmark that is not found in a frame, and why."""
 
 
 class Follower:
@@ -172,47 +180,33 @@ class Follower:
         """Look for it in the next frame by the surface around it. carried: where a body has carried it."""
         if self._wide is None or self._fine is None:
             return Sighting.gap("there is no surface where it was set")
-        hold, is_held = self._hold, self._hold is not None
-        wide_patch, fine_patch = self._wide, self._fine
+        try:
+            return self._registered(surface, self._guesses(surface, before, carried), carried)
+        except _Lost as lost:
+            self._is_lost = True
+            return Sighting.gap(str(lost))
+
+    def _registered(
+        self, surface: MomentSurface, guesses: Iterator[Placement], carried: Placement | None
+    ) -> Sighting:
+        """Register the patches around it: the wide one, the fine one, and one back to where it was set.
+
+        Raises _Lost.
+        """
+        assert self._wide is not None
+        assert self._fine is not None
+        hold, wide_patch, fine_patch = self._hold, self._wide, self._fine
         if hold is not None and self._grips is not None:
             wide_patch, fine_patch = (
                 hold.bent(patch, grip)
                 for patch, grip in zip((self._wide, self._fine), self._grips, strict=True)
             )
-        loose = (_LOOSE[is_held] * self.spacing) ** 2 * np.eye(3)
-        wide, reason = None, "the region around it was not found"
-        for start in self._guesses(surface, before, carried):
-            fit = registered(wide_patch, surface, start, _WIDE[is_held], loose)
-            if fit is None or fit.kept < self._settings.least_kept:
-                reason = "too little of the surface around it was found"
-            elif fit.deviation > self._limit(_OFF_WIDE):
-                reason = "the surface around it has another shape"
-            else:
-                wide = fit
-                break
-        if wide is None:
-            return self._lose(reason)
-        slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
-        bent = np.zeros(WAYS) if is_held else self._fine_found.bent
-        fine = registered(fine_patch, surface, Placement(wide.place, wide.turn, bent), _FINE[is_held], slack)
-        if fine is None or fine.middle < _MIDDLE:
-            return self._lose("it is hidden, or there is a hole")
-        if fine.deviation > self._limit(_OFF_FINE):
-            return self._lose("the surface around it has another shape")
-        patch = patch_of(surface, fine.place, self._wide_radius, _BACK[0].points)
-        back = None
-        if patch is not None:
-            patch = patch if hold is None else hold.unbent(patch, wide.turn)
-            start = Placement(self._place, wide.turn.T)
-            back = registered(patch, self._own, start, _BACK[is_held], loose)
-        if back is None or back.kept < self._settings.least_kept:
-            return self._lose("the way back was not found")
-        if back.deviation > self._limit(_OFF_WIDE):
-            return self._lose("the surface around it had another shape")
-        returned = wide.turn @ (back.place - self._place)
+        wide = self._on_wide(wide_patch, surface, guesses)
+        fine = self._on_fine(fine_patch, surface, wide)
+        returned = wide.turn @ (self._back(surface, fine.place, wide.turn) - self._place)
         apart = float(np.linalg.norm(returned))
         if apart > self._bound:
-            return self._lose(f"forward and backward are {apart:.3g} apart")
+            raise _Lost(f"forward and backward are {apart:.3g} apart")
         between = fine.place - wide.place
         covariance = (
             _NOISE * fine.covariance
@@ -223,7 +217,7 @@ class Follower:
         if hold is not None and carried is not None:
             aside = fine.place - carried.place
             if np.linalg.norm(aside) > _ASIDE * self.spacing:
-                return self._lose("the body around it went elsewhere")
+                raise _Lost("the body around it went elsewhere")
             left_out = _LEFT_OUT * fine_patch.radius * np.linalg.norm(fine.bent)
             covariance += left_out**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
             unsure = (_SLIPPED if hold.slip() > self._bound else _UNSURE) * self.spacing
@@ -234,6 +228,55 @@ class Follower:
             return Sighting.gap("its place along the surface is not sure")
         placed = wide.turn @ self._spread @ wide.turn.T
         return Sighting(fine.place + self._origin, covariance + placed)
+
+    @property
+    def _is_held(self) -> bool:
+        return self._hold is not None
+
+    @property
+    def _loose(self) -> Float:
+        """The covariance of a position that is nearly known, (3, 3)."""
+        return (_LOOSE[self._is_held] * self.spacing) ** 2 * np.eye(3)
+
+    def _on_wide(
+        self, patch: SurfacePatch, surface: MomentSurface, guesses: Iterator[Placement]
+    ) -> Placement:
+        """The wide patch on a surface, from the first guess from which it fits. Raises _Lost."""
+        reason = "the region around it was not found"
+        for start in guesses:
+            fit = registered(patch, surface, start, _WIDE[self._is_held], self._loose)
+            if fit is None or fit.kept < self._settings.least_kept:
+                reason = "too little of the surface around it was found"
+            elif fit.deviation > self._limit(_OFF_WIDE):
+                reason = "the surface around it has another shape"
+            else:
+                return fit
+        raise _Lost(reason)
+
+    def _on_fine(self, patch: SurfacePatch, surface: MomentSurface, wide: Placement) -> Placement:
+        """The fine patch on a surface, from where the wide one lies. Raises _Lost."""
+        slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
+        bent = np.zeros(WAYS) if self._is_held else self._fine_found.bent
+        start = Placement(wide.place, wide.turn, bent)
+        fine = registered(patch, surface, start, _FINE[self._is_held], slack)
+        if fine is None or fine.middle < _MIDDLE:
+            raise _Lost("it is hidden, or there is a hole")
+        if fine.deviation > self._limit(_OFF_FINE):
+            raise _Lost("the surface around it has another shape")
+        return fine
+
+    def _back(self, surface: MomentSurface, place: Float, turn: Float) -> Float:
+        """Where the surface around a place, (3,), lies in the frame in which it was set. Raises _Lost."""
+        patch, back = patch_of(surface, place, self._wide_radius, _BACK[0].points), None
+        if patch is not None:
+            patch = patch if self._hold is None else self._hold.unbent(patch, turn)
+            start = Placement(self._place, turn.T)
+            back = registered(patch, self._own, start, _BACK[self._is_held], self._loose)
+        if back is None or back.kept < self._settings.least_kept:
+            raise _Lost("the way back was not found")
+        if back.deviation > self._limit(_OFF_WIDE):
+            raise _Lost("the surface around it had another shape")
+        return back.place
 
     def _guesses(
         self, surface: MomentSurface, before: MomentSurface, carried: Placement | None
@@ -267,7 +310,3 @@ class Follower:
         """How far a patch may be off the surface, scan units."""
         assert self._wide is not None
         return off[0] * self._wide.noise + off[1] * self.spacing
-
-    def _lose(self, reason: str) -> Sighting:
-        self._is_lost = True
-        return Sighting.gap(reason)

@@ -3,6 +3,8 @@ numba; see `surfaces`."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,28 +13,40 @@ from ...compiled import compiled
 _EDGE = 1e-6  # of a triangle: how far outside of it a place still counts, so that none falls between two
 
 
+class PlacesByPixel(NamedTuple):
+    """Q places of a picture, sorted by the pixels that they lie in."""
+
+    pixels: NDArray[np.float64]  # (Q, 2), column and row
+    depth: NDArray[np.float64]  # (Q,)
+    order: NDArray[np.intp]  # (Q,), by pixel
+    first: NDArray[np.intp]  # (width * height + 1,), where each pixel begins in the order
+    width: int
+    height: int
+
+
+class LayerHits(NamedTuple):
+    """The triangle that is found for each of Q places."""
+
+    offset: NDArray[np.float64]  # (Q,), its depth less the place's; inf where none is
+    found: NDArray[np.int64]  # (Q,), its row
+    share: NDArray[np.float32]  # (Q, 2), the weights of its second and third corner
+
+
 @compiled
 def nearest_layer(
-    places: NDArray[np.float64],
-    depth: NDArray[np.float64],
-    order: NDArray[np.intp],
-    first: NDArray[np.intp],
-    width: int,
-    height: int,
+    places: PlacesByPixel,
     corners: NDArray[np.float64],
     faces: NDArray[np.uint32],
     is_parallel: bool,
-    offset: NDArray[np.float64],
-    found: NDArray[np.int64],
-    share: NDArray[np.float32],
+    hits: LayerHits,
 ) -> None:
     """Find for each place of a picture the triangle over it whose depth differs least from its own.
 
-    places: (Q, 2), column and row, of depths (Q,); order: (Q,), by pixel; first: (width * height + 1,), where
-    each pixel begins in it. corners: (V, 3), column, row, and depth in a parallel projection, else one over
-    it, of which faces (F, 3) are made. Gets offset (Q,), the triangle's depth less the place's, with inf
-    before; found (Q,), the row of the triangle; share (Q, 2), the weights of its second and third corner.
+    corners: (V, 3), column, row, and depth in a parallel projection, else one over it, of which faces (F, 3)
+    are made.
     """
+    pixels, depth, order, first, width, height = places
+    offset, found, share = hits
     for face in range(len(faces)):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
         ax, ay = corners[a, 0], corners[a, 1]
@@ -48,7 +62,7 @@ def nearest_layer(
         for row in range(top, bottom + 1):
             for n in range(first[row * width + left], first[row * width + right + 1]):
                 at = order[n]
-                x, y = places[at, 0] - ax, places[at, 1] - ay
+                x, y = pixels[at, 0] - ax, pixels[at, 1] - ay
                 second = (x * cy - cx * y) / area
                 third = (bx * y - x * by) / area
                 if second < -_EDGE or third < -_EDGE or second + third > 1.0 + _EDGE:

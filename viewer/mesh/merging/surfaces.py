@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from ...scan.faces import Triangles
 from ...scan.range_view import RangeView
 from ..range_mesh import triangles_of
 from ..scene import Rays
+
+if TYPE_CHECKING:
+    from .layer_kernels import LayerHits
 
 LEAST_COSINE = 0.1  # of incidence: a surface seen more steeply is taken as seen so, 84 degrees
 
@@ -113,7 +117,7 @@ def meet(
     nothing that lies behind or before the place counts as the same but by the caller's measure of distance.
     weights: (N,), of the other's points, else 1. faces: (F,), which of the other's triangles take part.
     """
-    from .layer_kernels import nearest_layer
+    from .layer_kernels import LayerHits, PlacesByPixel, nearest_layer
 
     height, width = seen.view.depth.shape
     pixels, _ = seen.view.project(places)
@@ -126,15 +130,12 @@ def meet(
     if faces is not None:
         takes_part &= faces
     rows = np.flatnonzero(takes_part)
-    found = np.full(len(places), -1)
-    offset, share = np.full(len(places), np.inf), np.zeros((len(places), 2), np.float32)
-    is_parallel = seen.view.kind == "height"
-    nearest_layer(
-        pixels, depth, order, first, width, height, corners, other.faces[rows], is_parallel,
-        offset, found, share,
-    )  # fmt: skip
-    hit = np.flatnonzero(found >= 0)
-    return _met(seen, places, hit, other, other.faces[rows[found[hit]]], share[hit], offset, weights)
+    hits = LayerHits(
+        np.full(len(places), np.inf), np.full(len(places), -1), np.zeros((len(places), 2), np.float32)
+    )
+    by_pixel = PlacesByPixel(pixels, depth, order, first, width, height)
+    nearest_layer(by_pixel, corners, other.faces[rows], seen.view.kind == "height", hits)
+    return _met(seen, places, other, hits._replace(found=np.append(rows, -1)[hits.found]), weights)
 
 
 def _in_picture(seen: RangeSurface, other: RangeSurface) -> tuple[Rays, NDArray[np.bool_]]:
@@ -154,19 +155,18 @@ def _in_picture(seen: RangeSurface, other: RangeSurface) -> tuple[Rays, NDArray[
 def _met(
     seen: RangeSurface,
     places: Rays,
-    hit: NDArray[np.intp],
     other: RangeSurface,
-    faces: Triangles,
-    share: NDArray[np.float32],
-    offset: NDArray[np.float64],
+    hits: LayerHits,
     weights: NDArray[np.floating] | None,
 ) -> Meeting:
-    """The meeting of the places in these rows, (H,), with faces (H, 3) at shares (H, 2) of their corners."""
+    """The meeting of places (Q, 3) with the triangles of a surface that are found for them."""
+    hit = np.flatnonzero(hits.found >= 0)
+    faces, share = other.faces[hits.found[hit]], hits.share[hit]
     shares = np.column_stack([1 - share.sum(axis=1), share])
     normal = (other.normals[faces] * shares[:, :, None]).sum(axis=1)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal /= np.where(length > 0, length, 1)
-    rays, change = seen.rays(places[hit]), offset[hit]
+    rays, change = seen.rays(places[hit]), hits.offset[hit]
     there = places[hit] + change[:, None] * rays
     spacing = (seen.spacing(places[hit], normal) + other.spacing(there, normal)) / 2
     weight = np.ones(len(hit)) if weights is None else (weights[faces] * shares).sum(axis=1)

@@ -41,7 +41,7 @@ def attributes_of(
     works: list[Callable[[], object]] = [partial(_rows, order, found["rows"])]
     found["offsets"] = np.empty((order.nodes, 3), np.uint16)
     found["radii"] = np.empty(order.nodes, np.float32)
-    works.append(partial(_discs, order, cloud, points, grid, edge, masks, found["offsets"], found["radii"]))
+    works.append(partial(_discs, order, cloud, points, grid, edge, masks, found))
     if cloud.colors is not None:
         found["colors"] = np.empty((order.nodes, 4), np.uint8)
         works.append(partial(_colors, order, cloud.colors, found["colors"]))
@@ -90,15 +90,14 @@ def _discs(
     grid: Grid,
     edge: float,
     masks: Sequence[NDArray[np.uint8]],
-    offsets: NDArray[np.uint16],
-    radii: NDArray[np.float32],
+    found: dict[str, NDArray],
 ) -> None:
+    """Fill the offsets and radii of all nodes."""
     from . import disc_kernels
 
-    positions = np.ascontiguousarray(cloud.positions)
-    in_order = (points.rows, points.codes, points.levels, order.ends)
-    disc_kernels.leaf_offsets(positions, *in_order, *grid, order.starts, offsets)
-    discs_of(masks, edge, order.by_level(offsets), order.by_level(radii))
+    walk = disc_kernels.CodeOrder(points.rows, points.codes, points.levels, order.ends, order.starts)
+    disc_kernels.leaf_offsets(np.ascontiguousarray(cloud.positions), walk, grid, found["offsets"])
+    discs_of(masks, edge, order.by_level(found["offsets"]), order.by_level(found["radii"]))
 
 
 def _rows(order: _Order, rows: NDArray[np.uint32]) -> None:

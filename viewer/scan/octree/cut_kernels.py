@@ -8,6 +8,7 @@ corner.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,34 +47,65 @@ def _center(place: np.uint64, edge: float) -> tuple[float, float, float]:
     return (x + 0.5) * edge, (y + 0.5) * edge, (z + 0.5) * edge
 
 
+class Nodes(NamedTuple):
+    """Nodes of one level, or room for them."""
+
+    places: NDArray[np.uint64]  # (n,)
+    indices: NDArray[np.uint32]  # (n,)
+
+
+class LevelArrays(NamedTuple):
+    """All nodes of a level; cones (0,): not asked."""
+
+    masks: NDArray[np.uint8]
+    first_child: NDArray[np.uint32]
+    normals: NDArray[np.float32]
+    cones: NDArray[np.float32]
+
+
+class SightArrays(NamedTuple):
+    """A view of the cube; positions are relative to its lowest corner."""
+
+    planes: NDArray[np.float64]  # (p, 4): inward unit normals and offsets
+    eye: NDArray[np.float64]  # (3,)
+    back: NDArray[np.float64]  # (3,), opposite to the view's direction
+
+
+class SightLens(NamedTuple):
+    """How large a view shows nodes of a level."""
+
+    perspective: bool
+    scale: float  # pixels per unit, at depth 1 or everywhere
+    near: float
+    least: float  # size in pixels; smaller nodes are not divided
+    margin: float  # how far a node is seen beyond its sphere
+
+
+class Descent(NamedTuple):
+    """How many nodes are children, done, outside and facing away."""
+
+    followed: int
+    shown: int
+    outside: int
+    away: int
+
+
 @compiled
 def descend(
-    places: NDArray[np.uint64],
-    indices: NDArray[np.uint32],
-    edge: float,
-    last: bool,
-    masks: NDArray[np.uint8],
-    first_child: NDArray[np.uint32],
-    normals: NDArray[np.float32],
-    cones: NDArray[np.float32],
-    planes: NDArray[np.float64],
-    eye: NDArray[np.float64],
-    back: NDArray[np.float64],
-    lens: tuple[bool, float, float, float, float],
-    child_places: NDArray[np.uint64],
-    child_indices: NDArray[np.uint32],
-    done_places: NDArray[np.uint64],
-    done_indices: NDArray[np.uint32],
-) -> tuple[int, int, int, int]:
+    nodes: Nodes, edge: float, level: LevelArrays, sight: SightArrays, lens: SightLens, children: Nodes,
+    done: Nodes,
+) -> Descent:  # fmt: skip
     """Sort some nodes (n,) of a level into those that are done and those whose children are looked at next.
 
-    edge: of a node. last: children are not looked at. masks, first_child, normals, cones: of all nodes of the
-    level; cones (0,): not asked. planes: (p, 4), inward unit normals and offsets. back: (3,), opposite to
-    the view's direction. lens: perspective, pixels per unit (at depth 1, or everywhere), near, least size in
-    pixels, how far a node is seen beyond its sphere. Children, up to (8 n,) and one more, and nodes done (n,)
-    are written from the beginnings of those arrays; children nearest to the eye first. Returns how many are
-    children, done, outside and facing away.
+    edge: of a node. level: without masks, its nodes have no children. Children, up to (8 n,) and one more,
+    and nodes done (n,) are written from the beginnings of those arrays; children nearest to the eye first.
     """
+    places, indices = nodes
+    masks, first_child, normals, cones = level
+    planes, eye, back = sight
+    child_places, child_indices = children
+    done_places, done_indices = done
+    last = len(masks) == 0
     perspective, scale, near, least, margin = lens
     if not perspective:
         near = 1.0  # what sizes are divided by
@@ -94,7 +126,7 @@ def descend(
             inside = nearest >= radius + margin
         to_x, to_y, to_z = eye[0] - x, eye[1] - y, eye[2] - z
         if len(cones) and _faces_away(
-            normals, cones, index, to_x, to_y, to_z, back, radius if perspective else -1.0
+            normals, cones, index, (to_x, to_y, to_z), back, radius if perspective else -1.0
         ):
             away += 1
             continue
@@ -119,7 +151,7 @@ def descend(
             followed += 2
             family >>= _TWO
         followed = end
-    return followed, shown, outside, away
+    return Descent(followed, shown, outside, away)
 
 
 @compiled
@@ -127,9 +159,7 @@ def _faces_away(
     normals: NDArray[np.float32],
     cones: NDArray[np.float32],
     node: int,
-    to_x: float,
-    to_y: float,
-    to_z: float,
+    to_eye: tuple[float, float, float],
     back: NDArray[np.float64],
     radius: float,
 ) -> bool:
@@ -138,6 +168,7 @@ def _faces_away(
     With a the angle between the mean normal and the direction to the eye, c the half angle of the cone and s
     that of the sphere as the eye sees it: a > 90 degrees + c + s. radius below 0: the eye is infinitely far.
     """
+    to_x, to_y, to_z = to_eye
     cosine = np.float64(cones[node])
     x, y, z = np.float64(normals[node, 0]), np.float64(normals[node, 1]), np.float64(normals[node, 2])
     if cosine <= 0:

@@ -7,11 +7,13 @@ position within its node's cell, in 65536ths of its edge, the first of them from
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from .cube import Grid
 from .octree import DEEPEST
 
 _CHILDREN = np.bitwise_count(np.arange(256, dtype=np.uint8)).astype(np.int64)
@@ -36,24 +38,26 @@ def _coordinate(code: np.uint64) -> float:
     return float(bits)
 
 
+class CodeOrder(NamedTuple):
+    """N points in the order of their codes, see `node_kernels`."""
+
+    rows: NDArray[np.uint32]  # (N,)
+    codes: NDArray[np.uint64]  # (N,)
+    levels: NDArray[np.uint8]  # (N,)
+    ends: NDArray[np.uint8]  # (N,)
+    starts: NDArray[np.int64]  # (depth + 1,)
+
+
 @compiled
 def leaf_offsets(
-    positions: NDArray[np.float32],
-    rows: NDArray[np.uint32],
-    codes: NDArray[np.uint64],
-    levels: NDArray[np.uint8],
-    ends: NDArray[np.uint8],
-    steps_per_unit: float,
-    low: NDArray[np.float64],
-    cells_per_step: float,
-    starts: NDArray[np.int64],
-    offsets: NDArray[np.uint16],
+    positions: NDArray[np.float32], order: CodeOrder, grid: Grid, offsets: NDArray[np.uint16]
 ) -> None:
     """The mean positions (nodes, 3) of the points in each leaf; those of other nodes stay as they are.
 
-    positions: (N, 3) of the cloud. rows, codes, levels, ends: (N,), starts: as in `node_kernels`.
-    steps_per_unit, low, cells_per_step: of the `cube.Grid`.
+    positions: (N, 3) of the cloud.
     """
+    rows, codes, levels, ends, starts = order
+    steps_per_unit, low, cells_per_step = grid
     node = starts - 1
     sums, points = np.zeros(3, np.int64), 0
     for i in range(len(rows)):

@@ -5,6 +5,8 @@ Each lets other threads go on. Imported where points are sorted, as numba takes 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -79,6 +81,15 @@ def fill_buckets(
         codes[place], rows[place] = unsorted[i], first_row + i
 
 
+class _SortRoom(NamedTuple):
+    """Room that a radix sort works in."""
+
+    codes: NDArray[np.uint64]  # as many as the largest bucket has
+    rows: NDArray[np.uint32]
+    ends: NDArray[np.int64]  # of each digit
+    waiting: NDArray[np.int64]  # (parts, 2), first and last + 1 of parts that are not sorted yet
+
+
 @compiled
 def sort_buckets(codes: NDArray[np.uint64], rows: NDArray[np.uint32], starts: NDArray[np.int64]) -> None:
     """Sort each bucket's codes, and the rows with them; equal codes keep their order.
@@ -88,10 +99,10 @@ def sort_buckets(codes: NDArray[np.uint64], rows: NDArray[np.uint32], starts: ND
     largest = 0
     for k in range(len(starts) - 1):
         largest = max(largest, starts[k + 1] - starts[k])
-    spare_codes, spare_rows = np.empty(largest, np.uint64), np.empty(largest, np.uint32)
-    ends = np.empty((1 << _DIGIT) + 1, np.int64)
     # A division leaves at most 2^9 parts to do, of nine bits fewer each.
     waiting = np.empty(((1 << _DIGIT) * (1 + DEEPEST), 2), np.int64)
+    ends = np.empty((1 << _DIGIT) + 1, np.int64)
+    room = _SortRoom(np.empty(largest, np.uint64), np.empty(largest, np.uint32), ends, waiting)
     for k in range(len(starts) - 1):
         waiting[0, 0], waiting[0, 1] = starts[k], starts[k + 1]
         count = 1
@@ -101,7 +112,7 @@ def sort_buckets(codes: NDArray[np.uint64], rows: NDArray[np.uint32], starts: ND
             if end - begin <= _FEW:
                 _insertion_sort(codes[begin:end], rows[begin:end])
             else:
-                count = _divide(codes, rows, begin, end, spare_codes, spare_rows, ends, waiting, count)
+                count = _divide(codes, rows, begin, end, room, count)
 
 
 @compiled
@@ -137,13 +148,11 @@ def _divide(
     rows: NDArray[np.uint32],
     begin: int,
     end: int,
-    spare_codes: NDArray[np.uint64],
-    spare_rows: NDArray[np.uint32],
-    ends: NDArray[np.int64],
-    waiting: NDArray[np.int64],
+    room: _SortRoom,
     count: int,
 ) -> int:
     """One step of a radix sort: by the highest bits that differ. Returns how many parts wait then."""
+    spare_codes, spare_rows, ends, waiting = room
     shift, bits = _first_digit(codes[begin:end])
     if not bits:
         return count

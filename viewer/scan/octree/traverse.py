@@ -237,36 +237,26 @@ class Traversal:
             return
         nodes = self._nodes.part(self._at, self._at + _CHUNK)
         children, shown = self._children.part(self._followed), self._shown.part(self._kept)
+        masks, first_child = _NO_MASKS, _NO_CHILDREN
+        if not last:
+            masks, first_child = self.octree.masks[level], self.octree.first_child[level]
+        least = self._threshold if self.octree.size(level) < self._least else 0.0  # 0: none is so small
         followed, kept, outside, away = cut_kernels.descend(
-            nodes.places,
-            nodes.indices,
+            cut_kernels.Nodes(nodes.places, nodes.indices),
             self.octree.size(level),
-            last,
-            *(
-                (_NO_MASKS, _NO_CHILDREN)
-                if last
-                else (self.octree.masks[level], self.octree.first_child[level])
+            cut_kernels.LevelArrays(masks, first_child, *self._attributes()),
+            cut_kernels.SightArrays(self._planes, self._eye, self._back),
+            cut_kernels.SightLens(
+                self._perspective, self._scale, self._near, least, float(self._margins[level])
             ),
-            *self._attributes(),
-            self._planes,
-            self._eye,
-            self._back,
-            self._lens(),
-            children.places,
-            children.indices,
-            shown.places,
-            shown.indices,
+            cut_kernels.Nodes(children.places, children.indices),
+            cut_kernels.Nodes(shown.places, shown.indices),
         )
         self._at, self._followed = self._at + len(nodes), self._followed + followed
         self._outside, self._away = self._outside + outside, self._away + away
         self._kept += kept
         if kept:
             self._done.append((level, shown.part(0, kept)))
-
-    def _lens(self) -> tuple[bool, float, float, float, float]:
-        """The camera as `cut_kernels.descend` takes it; least size 0: no node is so small."""
-        least = self._threshold if self.octree.size(self._level) < self._least else 0.0
-        return self._perspective, self._scale, self._near, least, float(self._margins[self._level])
 
     def _attributes(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         found = self.octree.attributes[self._level] if self._cones else None
