@@ -266,7 +266,7 @@ class Follower:
         return fine
 
     def _back(self, surface: MomentSurface, place: Float, turn: Float) -> Float:
-        """Where the surface around a place, (3,), lies in the frame in which it was set. Raises _Lost."""
+        """The place, (3,), to which the surface around another goes back. Raises _Lost."""
         patch, back = patch_of(surface, place, self._wide_radius, _BACK[0].points), None
         if patch is not None:
             patch = patch if self._hold is None else self._hold.unbent(patch, turn)
