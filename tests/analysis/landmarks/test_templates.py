@@ -102,10 +102,10 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
         ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "but not the reverse"),
         ({"landmarks": [{"name": "a", "colour": "b"}]}, "unknown field 'colour'"),
         (
-            {"measures": [{"name": "w", "kind": "distance", "landmarks": ["x"]}]},
+            {"measures": [{"name": "w", "kind": "distance", "landmarks": ["x", "y"]}]},
             r"measures\[0\]: no landmark",
         ),
-        ({"measures": [{"name": "w"}]}, r"measures\[0\]: has no 'kind'"),
+        ({"measures": [{"name": "w"}]}, r"measures\[0\]: has no 'name' and 'kind'"),
         ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "options are no words"),
         ({"measures": [{"name": "w", "kind": "width"}]}, r"measures\[0\]: unknown kind of measure 'width'"),
         ({"measures": [{"name": "w", "kind": "angle", "landmarks": ["aL"]}]}, "takes 3 landmarks, not 1"),

@@ -13,10 +13,11 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError, explained, shortened
+from ...errors import InputError, shortened
 from ...files import parsed_json, read_text, whole_file
 from ...resources import resource_path
 from ..measures import Measure
+from ..measures.definitions import errors_of, measure_of
 from ..measures.kinds import kind_of
 from . import Landmark, Template
 from .landmark_set import LONGEST_LANDMARK_NAME
@@ -50,18 +51,8 @@ def is_template_file(path: Path | str) -> bool:
 def read_template(path: Path | str) -> Template:
     """The template of a file. Raises InputError, which tells the place of what is wrong."""
     path = Path(path)
-    try:
-        data = parsed_json(read_text(path, _MOST_BYTES))
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", path, hint) from error
-    except ValueError as error:  # of the text's encoding as well
-        raise InputError(f"is not JSON ({error})", path, _HINT) from error
-    try:
-        return _template(data)
-    except InputError as error:
-        where = ", ".join(map(str, filter(None, (path, error.where))))
-        raise InputError(error.what, where, error.hint or _HINT) from None
+    with errors_of(path, "is not JSON", _HINT):
+        return _template(parsed_json(read_text(path, _MOST_BYTES)))
 
 
 def _template(data: Any) -> Template:
@@ -99,20 +90,10 @@ def _landmark(data: Any, where: str) -> Landmark:
 
 
 def _measure(data: Any, names: set[str], where: str) -> Measure:
-    fields = _fields(data, ("name", "kind", "landmarks", "options"), where)
-    used = _list(fields, "landmarks", where)
-    for name in used:
-        if not isinstance(name, str) or name not in names:
+    measure = measure_of(data, where)
+    for name in measure.landmarks:
+        if name not in names:
             raise InputError(f"no landmark is called {shortened(name)!r}", where)
-    options = fields.get("options", {})
-    if not isinstance(options, dict) or not all(isinstance(value, str) for value in options.values()):
-        raise InputError("its options are no words by name", where)
-    name, kind = (_text(fields, key, where, needed=True) for key in ("name", "kind"))
-    measure = Measure(name, kind, tuple(used), options)
-    try:
-        kind_of(measure)
-    except InputError as error:
-        raise InputError(error.what, where, error.hint) from None
     return measure
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -17,29 +19,35 @@ _HINT = "docs/how-it-works/landmarks.md shows how to define measures"
 
 
 def read_measures(path: Path | str) -> tuple[Measure, ...]:
-    """The measures of a file, of a template as well, at least one. Raises InputError, which tells what is
+    """The measures of a file, of a template as well, at least one. Raises InputError, which says what is
     wrong and where."""
     path = Path(path)
-    try:
+    with errors_of(path, "is neither JSON nor TOML", _HINT):
         text = read_text(path, _MOST_BYTES)
-        data = parsed_toml(text) if path.suffix.lower() == ".toml" else parsed_json(text)
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", path, hint) from error
-    except ValueError as error:  # of the text's encoding as well
-        raise InputError(f"is neither JSON nor TOML ({error})", path, _HINT) from error
+        return _measures(parsed_toml(text) if path.suffix.lower() == ".toml" else parsed_json(text))
+
+
+@contextmanager
+def errors_of(path: Path, not_parsed: str, hint: str) -> Iterator[None]:
+    """Raise InputError, which names the file, for what goes wrong inside. not_parsed: words for a text that
+    cannot be parsed. hint: for errors without one."""
     try:
-        return _measures(data)
+        yield
     except InputError as error:
         where = ", ".join(map(str, filter(None, (path, error.where))))
-        raise InputError(error.what, where, error.hint or _HINT) from None
+        raise InputError(error.what, where, error.hint or hint) from None
+    except OSError as error:
+        what, how = explained(error)
+        raise InputError(f"cannot be read: {what}", path, how) from error
+    except ValueError as error:  # of the text's encoding as well
+        raise InputError(f"{not_parsed} ({error})", path, hint) from error
 
 
 def _measures(data: Any) -> tuple[Measure, ...]:
     held = data.get("measures") if isinstance(data, dict) else data
     if not isinstance(held, list) or not 0 < len(held) <= _MOST:
         raise InputError(f"has no list of 'measures', of 1 to {_MOST}")
-    found = tuple(_measure(each, f"measures[{number}]") for number, each in enumerate(held))
+    found = tuple(measure_of(each, f"measures[{number}]") for number, each in enumerate(held))
     names = [measure.name for measure in found]
     for name in names:
         if names.count(name) > 1:
@@ -47,14 +55,15 @@ def _measures(data: Any) -> tuple[Measure, ...]:
     return found
 
 
-def _measure(data: Any, where: str) -> Measure:
+def measure_of(data: Any, where: str) -> Measure:
+    """The measure of an object of a file, which stands there. Raises InputError for what is wrong in it."""
     if not isinstance(data, dict):
         raise InputError("is no object", where)
     for field in data:
         if field not in _FIELDS:
             raise InputError(f"has an unknown field '{shortened(field)}'", where)
     name, kind = data.get("name"), data.get("kind")
-    landmarks, options = data.get("landmarks"), data.get("options", {})
+    landmarks, options = data.get("landmarks", []), data.get("options", {})
     if not (isinstance(name, str) and name and name.isprintable() and isinstance(kind, str)):
         raise InputError("has no 'name' and 'kind' that are text", where)
     if not (isinstance(landmarks, list) and all(isinstance(landmark, str) for landmark in landmarks)):

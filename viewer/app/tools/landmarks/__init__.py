@@ -25,6 +25,7 @@ from ...commands import Command, Menu
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import Click, FrameSpan, ToolContext
 from ...ui import Ui
+from .._cached import Cached
 from . import overlay, panel
 from .corners import regions_of
 from .exchange import Exchange
@@ -64,11 +65,7 @@ class Tool:
         self.notebook = Notebook(context)
         self.exchange = Exchange(context, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on
-        self._regions: tuple[tuple[object, ...], Mapping[str, str]] | None = None
-        self._shown: tuple[tuple[object, ...], ShownLandmarks] | None = None
-        self._seen: tuple[tuple[object, ...], NDArray[np.bool_]] | None = None
-        self._proposal: tuple[tuple[object, ...], Proposal | None] | None = None
-        self._spans: tuple[tuple[object, ...], list[FrameSpan]] = (), []
+        self._cached = Cached()
         self._on_screen = np.empty((0, 2))
         self._grab = 0.0  # pixels
 
@@ -88,17 +85,13 @@ class Tool:
     def shown(self) -> ShownLandmarks:
         """The landmarks in the frame that is shown."""
         of = self.made.all, self.context.followed.tracks, self.frame
-        if self._shown is None or not _same(self._shown[0], of):
-            self._shown = of, ShownLandmarks.of(self.made.listed, *of[1:])
-        return self._shown[1]
+        return self._cached.of("shown", of, lambda: ShownLandmarks.of(self.made.listed, *of[1:]))
 
     @property
     def regions(self) -> Mapping[str, str]:
         """The landmarks that are corners of regions, and the names of these."""
-        of = (self.made.measures,)
-        if self._regions is None or not _same(self._regions[0], of):
-            self._regions = of, regions_of(*of)
-        return self._regions[1]
+        measures = self.made.measures
+        return self._cached.of("regions", (measures,), lambda: regions_of(measures))
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -114,13 +107,13 @@ class Tool:
         surface, request = viewport.surface, viewport.request
         if surface is None or request is None or not viewport.is_there:
             return shown.is_there
-        of = shown, request, surface
-        if self._seen is None or not _same(self._seen[0], of):
+
+        def find() -> NDArray[np.bool_]:
             radius = viewport.bounds(request.pose).radius
             slacks = np.asarray(slack_before(shown.spacings, np.nan_to_num(shown.sure), radius))
-            has_some = bool(shown.is_there.any())
-            self._seen = of, are_seen(surface, self.positions, slacks) if has_some else shown.is_there
-        return self._seen[1]
+            return are_seen(surface, self.positions, slacks) if shown.is_there.any() else shown.is_there
+
+        return self._cached.of("seen", (shown, request, surface), find)
 
     @property
     def target(self) -> Landmark | None:
@@ -142,12 +135,13 @@ class Tool:
         """Place of the one that a click sets, as the mirror image of its partner, in scan coordinates;
         None where that is not known, or it has a place in the frame."""
         target, shown = self.target, self.shown
-        of = target, shown
-        if self._proposal is None or not _same(self._proposal[0], of):
+
+        def find() -> Proposal | None:
             template = self.exchange.templates.get(self.made.template)
             listed = {one.name for one in template.landmarks} if template else set()
-            self._proposal = of, None if target is None else _mirrored(target, shown, listed)
-        return self._proposal[1]
+            return None if target is None else _mirrored(target, shown, listed)
+
+        return self._cached.of("proposal", (target, shown), find)
 
     # --- placing ----------------------------------------------------------------------
 
@@ -407,10 +401,9 @@ class Tool:
 
     def spans(self) -> list[FrameSpan]:
         """The gaps, for the timeline."""
-        of = self.made.all, self.context.followed.tracks
-        if not _same(self._spans[0], of):
-            self._spans = of, gap_spans(self.made.listed, self.context.followed.tracks, self.regions)
-        return self._spans[1]
+        tracks, regions = self.context.followed.tracks, self.regions
+        of = self.made.all, tracks, regions
+        return self._cached.of("spans", of, lambda: gap_spans(self.made.listed, tracks, regions))
 
     def on_file(self, path: Path) -> bool:
         """Read a file of landmarks; whether it is one."""
@@ -419,14 +412,6 @@ class Tool:
     def advance(self, budget: float) -> bool:
         """Have landmarks followed; whether something new was found."""
         return self.follower.advance(self.context.settings.follow)
-
-
-def _same(before: tuple[object, ...], now: tuple[object, ...]) -> bool:
-    """Whether each is the very object, or equal number, that it was before."""
-    return len(before) == len(now) and all(
-        one is other or (isinstance(one, int) and one == other)
-        for one, other in zip(before, now, strict=True)
-    )
 
 
 def _mirrored(target: Landmark, shown: ShownLandmarks, listed: Collection[str]) -> Proposal | None:

@@ -25,6 +25,7 @@ from ...save_dialog import SaveDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
+from .._cached import Cached
 from . import panel, plot
 from .adding import Adding
 from .choices import CurveChoices, Settings
@@ -33,7 +34,7 @@ from .lines import MeasureLines
 from .measurer import Measurer
 from .paths import Paths
 from .renaming import Renaming
-from .shown import Curve, Kept, Shown
+from .shown import Curve, Shown
 from .words import numbers_in_words
 
 TITLE = "Measures over time"
@@ -61,7 +62,7 @@ class Tool:
             "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
             PLOT_SUFFIXES[0], self._save, context.redraw, PLOT_SUFFIXES[1:],
         )  # fmt: skip
-        self._words = Kept()
+        self._words = Cached()
         self._fitted: object = None  # what the axes were fitted to last
 
     @property

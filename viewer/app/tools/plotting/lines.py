@@ -21,8 +21,8 @@ from ....output.plots import color_of_curve
 from ....scan.units import Scale
 from ...scene.canvas import Canvas, Label, ViewPlace
 from ...tool_context import ToolContext
+from .._cached import Cached
 from .._seen import seen_in_view
-from .shown import Kept
 
 _PIECES = 24  # of a straight line, so that a part of it may be hidden
 _MOST_LABELS = 8  # measures of named landmarks with a label; of more, the one that is pointed at
@@ -45,7 +45,7 @@ class MeasureLines:
 
     def __init__(self, context: ToolContext) -> None:
         self._context = context
-        self._kept = Kept()
+        self._cached = Cached()
 
     def shown(self, made: Landmarks, hidden: tuple[str, ...]) -> tuple[ShownLine, ...]:
         """The lines of measures but for hidden ones, where they are in the picture."""
@@ -60,8 +60,8 @@ class MeasureLines:
             found = self._in_frame(made, hidden, pose.index, radius)
             return [replace(line, positions=motion.points(line.positions)) for line in found]
 
-        lines = self._kept.of("placed", inputs, placed)
-        return self._kept.of("lines", (lines, request), lambda: self._with_seen(lines))
+        lines = self._cached.of("placed", inputs, placed)
+        return self._cached.of("lines", (lines, request), lambda: self._with_seen(lines))
 
     def _with_seen(self, lines: Sequence[ShownLine]) -> tuple[ShownLine, ...]:
         if not lines:

@@ -18,9 +18,9 @@ from ....output.plots import color_of_path
 from ....rigid import STILL, Rigid
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import ToolContext
+from .._cached import Cached
 from .._seen import seen_in_view
 from .choices import ANCHORS, CurveChoices, Settings
-from .shown import Kept
 
 Still = tuple[Rigid | None, ...]
 SPEED_MAP = "viridis"
@@ -35,7 +35,7 @@ class Paths:
         self.problem = ""
         self.fastest = 0.0
         self._context = context
-        self._kept = Kept()
+        self._cached = Cached()
         self._all: tuple[Trajectory, ...] = ()  # that were asked for last, with what is found of them:
         self._by_speed: list[list[int]] | None = None  # colours
         self._drawn: tuple[object, tuple[DrawnPath, ...]] | None = None
@@ -45,7 +45,7 @@ class Paths:
     def still(self, choices: CurveChoices) -> Still | None:
         """The motion of each frame that holds the scan still; None where the anchors do not tell one."""
         tracks, anchors = self._context.followed.tracks, self._anchors(choices)
-        return self._kept.of(
+        return self._cached.of(
             ("still", anchors), tuple(tracks[name] for name in anchors), lambda: self._found(tracks, anchors)
         )
 
@@ -76,10 +76,12 @@ class Paths:
         found = {}
         for name in choices.traced:
             if (track := tracks.get(name)) is not None and len(track.times) == len(self._context.timeline):
-                found[name] = self._kept.of(
+                found[name] = self._cached.of(
                     (name, smoothing), (track, still), partial(_trajectory_of, track, smoothing, still)
                 )
-        self._kept.forget_others({("still", self._anchors(choices)), *((name, smoothing) for name in found)})
+        self._cached.forget_others(
+            {("still", self._anchors(choices)), *((name, smoothing) for name in found)}
+        )
         if (now := tuple(found.values())) != self._all:
             self._all, self._by_speed, self._drawn = now, None, None
             speeds = [np.nanmax(one.speeds) for one in now if np.isfinite(one.speeds).any()]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from ....output.plots import (
     plot_over_time,
 )
 from ....scan.units import Scale
+from .._cached import Cached
 from .choices import AGAINST, REPEATS, TIME, CurveChoices, Settings
 
 T = TypeVar("T")
@@ -37,32 +38,13 @@ class Curve(MeasureCurve):
     color: int = 0
 
 
-class Kept:
-    """Results, each kept until it is asked for with other inputs, which are compared by `is`."""
-
-    def __init__(self) -> None:
-        self._kept: dict[object, tuple[tuple[object, ...], Any]] = {}
-
-    def of(self, key: object, inputs: tuple[object, ...], make: Callable[[], T]) -> T:
-        """The result of a key, made anew where the inputs are not those that it was made of."""
-        known = self._kept.get(key)
-        if known is None or any(a is not b for a, b in zip(known[0], inputs, strict=True)):
-            known = self._kept[key] = inputs, make()
-        result: T = known[1]
-        return result
-
-    def forget_others(self, keys: set[object]) -> None:
-        """Keep the results of these keys alone."""
-        self._kept = {key: result for key, result in self._kept.items() if key in keys}
-
-
 class Shown:
     """The curves that are plotted now. plot: of them, None where there is nothing to plot."""
 
     def __init__(self) -> None:
         self.curves: tuple[Curve, ...] = ()
         self.plot: CurvePlot | None = None
-        self._kept = Kept()
+        self._cached = Cached()
         self._asked: tuple[object, ...] | None = None
 
     def take(
@@ -87,8 +69,8 @@ class Shown:
             keys.add(key)
             if name not in choices.hidden and len(one.times):
                 make = partial(curve_of, one, color, scale, smoothing)
-                curves.append(self._kept.of(key, (one,), make))
-        self._kept.forget_others(keys)
+                curves.append(self._cached.of(key, (one,), make))
+        self._cached.forget_others(keys)
         self._asked, self.curves, self.plot = asked, tuple(curves), plot_of(curves, choices, settings)
         if settings.mode == TIME and settings.derivative and trajectories:
             order, bands, times = settings.derivative, settings.bands, next(iter(trajectories.values())).times
