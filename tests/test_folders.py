@@ -15,7 +15,7 @@ from command_line import Run
 from viewer.app.settings import FILE, save
 from viewer.document.document import Document
 from viewer.document.journal import Journal, journal_folder
-from viewer.document.saved_session import SavedSession, keep, kept_file
+from viewer.document.saved_session import SavedSession, store, stored_file
 from viewer.errors import InputError
 from viewer.files import whole_file
 from viewer.folders import cache_folder, new_file, new_folder, state_folder, user_folder
@@ -58,7 +58,7 @@ def test_nobody_else_can_replace_the_folders_that_are_made_for_a_user(umask: int
 
 @posix
 def test_nobody_else_can_read_what_is_kept_of_a_user(run: Run, tmp_path: Path) -> None:
-    keep(SavedSession("/scans/doe.ply", None, 0, Document()))
+    store(SavedSession("/scans/doe.ply", None, 0, Document()))
     save({}, user_folder() / FILE)
     journal = Journal(tmp_path)
     with whole_file(cache_folder() / "facts.json") as temporary:
@@ -77,7 +77,7 @@ def test_nobody_else_can_read_what_is_kept_of_a_user(run: Run, tmp_path: Path) -
 
 @posix
 def test_folders_of_earlier_versions_are_closed_with_all_in_them(tmp_path: Path) -> None:
-    file = kept_file("/scans/doe.ply")
+    file = stored_file("/scans/doe.ply")
     file.parent.mkdir(parents=True)
     (user_folder() / FILE).write_text("{}")
     (tmp_path / "elsewhere").touch()
@@ -85,7 +85,7 @@ def test_folders_of_earlier_versions_are_closed_with_all_in_them(tmp_path: Path)
     journal_folder().mkdir(parents=True)
     (journal_folder() / "1_a.jsonl").touch()
     assert mode(user_folder()) == 0o755
-    keep(SavedSession("/scans/doe.ply", None, 0, Document()))
+    store(SavedSession("/scans/doe.ply", None, 0, Document()))
     Journal(tmp_path).remove()
     assert mode(user_folder()) == mode(file.parent) == mode(state_folder()) == mode(journal_folder()) == 0o700
     assert mode(user_folder() / FILE) == mode(journal_folder() / "1_a.jsonl") == 0o600
@@ -96,9 +96,9 @@ def test_folders_of_earlier_versions_are_closed_with_all_in_them(tmp_path: Path)
 @posix
 def test_only_inner_folders_that_are_open_are_closed_as_well() -> None:
     user_folder().mkdir(parents=True, mode=0o700)
-    kept_file("a").parent.mkdir()
-    keep(SavedSession("/scans/doe.ply", None, 0, Document()))
-    assert mode(kept_file("a").parent) == 0o700
+    stored_file("a").parent.mkdir()
+    store(SavedSession("/scans/doe.ply", None, 0, Document()))
+    assert mode(stored_file("a").parent) == 0o700
 
 
 @posix

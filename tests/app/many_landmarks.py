@@ -14,7 +14,7 @@ from viewer.analysis.surface_point import SurfacePoint
 from viewer.app.tools.plotting.choices import CurveChoices
 from viewer.document.document import Document
 from viewer.document.landmarks import Landmarks
-from viewer.document.saved_session import SavedSession, kept_file
+from viewer.document.saved_session import SavedSession, stored_file
 from viewer.geometry import vector
 
 TRACED = 6  # landmarks whose ways are drawn
@@ -53,7 +53,7 @@ def left_open(folder: Path, frames: int, landmarks: int, measures: int) -> Path:
     config = folder / "config" / "scan4d"
     (config / "scans").mkdir(parents=True)
     session = SavedSession(str(scan), None, 0, document(positions[0], landmarks, measures))
-    (config / "scans" / kept_file(str(scan)).name).write_text(json.dumps(session.to_json()))
+    (config / "scans" / stored_file(str(scan)).name).write_text(json.dumps(session.to_json()))
     tools = {"plotting": {"is_open": True}}
     (config / "settings.json").write_text(json.dumps({"format": 1, "tools": tools}))
     return scan

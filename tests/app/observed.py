@@ -163,7 +163,7 @@ def shown(app: App) -> dict[str, Any]:
         "scan": app.session.scan,
         "is_opening": app.opener.job.scan is not None,
         "view": (left, app.window.buffer_size[1] - bottom - height, width, height),
-        "place": app.window.place and asdict(app.window.place),
+        "place": app.window.placement and asdict(app.window.placement),
         "size": app.window.buffer_size,
         "windows": imgui.get_frame_count(),
         "pictures": viewport.number,

@@ -90,12 +90,12 @@ def test_the_same_is_told_again_after_a_while(
     monkeypatch.setattr(failures.time, "monotonic", lambda: now)
     for seconds in (0, 1, 9, 9, 9):  # it goes on
         now += seconds
-        told.tell("Drawing", ValueError("x"))
+        told.report("Drawing", ValueError("x"))
     assert len(notes) == 1
-    told.tell("Measuring", ValueError("x"))
+    told.report("Measuring", ValueError("x"))
     assert len(notes) == 2
     now += 60
-    told.tell("Drawing", ValueError("x"))
+    told.report("Drawing", ValueError("x"))
     assert len(notes) == 3
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from depth_folders import write_color, write_depth, write_matrix
-from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, kept_of, running_app
+from virtual_screen import PATIENCE, ROOT, RunningApp, Screen, running_app, stored_of
 
 from viewer.app.settings import FILE, load
 from viewer.scan.open import DEMO
@@ -90,7 +90,7 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
     kept = load(settings)[0]
     assert kept.recent == tuple(str(study / name) for name in ("one", "two.npy", "three.npy"))
     assert (kept.theme, kept.backend) == ("light", None), "no renderer was chosen for all scans"
-    own = kept_of(tmp_path, study / "one")
+    own = stored_of(tmp_path, study / "one")
     assert (own.document.backend, own.pose) == ("codeword", 1)
 
     np.save(study / "three.npy", np.random.default_rng(9).random((500, 3)) * 1e4 + 1e6)

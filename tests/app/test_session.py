@@ -267,7 +267,7 @@ def test_what_tools_lay_is_merged_and_goes_with_the_scan() -> None:
     assert layers.scalars["q"] is first
     np.testing.assert_array_equal(layers.world_from_pose.points(np.array([1.0, 0, 0])), (3, 1, 0))
     laid.take_away("b")
-    np.testing.assert_array_equal(laid.place(7).points(np.zeros(3)), (7, 0, 0))
+    np.testing.assert_array_equal(laid.world_from_pose(7).points(np.zeros(3)), (7, 0, 0))
     session.turn_to("two")
     assert laid.layers(BARE) is NO_LAYERS
 
@@ -279,7 +279,7 @@ def test_a_pose_that_is_replayed_stands_where_it_was_and_has_its_own_numbers() -
     laid.replay(pose.index, moved(-1))
     assert list(laid.layers(pose).scalars) == ["a"]
     np.testing.assert_array_equal(laid.layers(pose).world_from_pose.points(np.zeros(3)), (-1, 0, 0))
-    np.testing.assert_array_equal(laid.place(4).points(np.zeros(3)), (4, 0, 0))
+    np.testing.assert_array_equal(laid.world_from_pose(4).points(np.zeros(3)), (4, 0, 0))
     laid.lay("b", lambda pose: {}, lambda index: STILL)
     assert list(laid.layers(pose).scalars) == ["q", "a"]
     np.testing.assert_array_equal(laid.layers(pose).world_from_pose.points(np.zeros(3)), (3, 0, 0))

@@ -17,7 +17,7 @@ from viewer.app import settings
 from viewer.app.output.export_plan import Choices
 from viewer.app.output.exporting import Exporting
 from viewer.app.part import part_classes, stored_values
-from viewer.app.place import Place, reachable
+from viewer.app.placement import WindowPlacement, reachable
 from viewer.app.playing.player import Pace
 from viewer.app.session import Session, SessionSettings, known_as
 from viewer.app.settings import load, save
@@ -30,7 +30,7 @@ from viewer.look import Look
 from viewer.output.legend import Marks
 
 CAMERA = Camera(eye=(1, 2, 3), target=(0.5, 0, 0), fov_y=25)
-PLACEMENT = Place(10, 20, 800, 600, maximised=True)
+PLACEMENT = WindowPlacement(10, 20, 800, 600, maximised=True)
 FULL = {
     "session": {
         "backend": "surfels", "params": {"points": {"point_size": 7}},
@@ -241,18 +241,20 @@ SCREENS = [(0, 0, 1920, 1040), (1920, -200, 1280, 1024)]
 @pytest.mark.parametrize(
     ("place", "expected"),
     [
-        (Place(100, 50, 800, 600), Place(100, 50, 800, 600)),
-        (Place(2000, -150, 800, 600, True), Place(2000, -150, 800, 600, True)),
-        (Place(0, 0, 4000, 3000), Place(0, 0, 1920, 1040)),
-        (Place(-700, 30, 800, 600), Place(-700, 30, 800, 600)),
-        (Place(-790, 30, 800, 600), None),
-        (Place(100, -30, 800, 600), None),
-        (Place(100, 1030, 800, 600), None),
-        (Place(5000, 30, 800, 600), None),
-        (Place(10, 10, 3, 0), None),
+        (WindowPlacement(100, 50, 800, 600), WindowPlacement(100, 50, 800, 600)),
+        (WindowPlacement(2000, -150, 800, 600, True), WindowPlacement(2000, -150, 800, 600, True)),
+        (WindowPlacement(0, 0, 4000, 3000), WindowPlacement(0, 0, 1920, 1040)),
+        (WindowPlacement(-700, 30, 800, 600), WindowPlacement(-700, 30, 800, 600)),
+        (WindowPlacement(-790, 30, 800, 600), None),
+        (WindowPlacement(100, -30, 800, 600), None),
+        (WindowPlacement(100, 1030, 800, 600), None),
+        (WindowPlacement(5000, 30, 800, 600), None),
+        (WindowPlacement(10, 10, 3, 0), None),
     ],
 )
-def test_a_window_comes_back_only_where_it_can_be_reached(place: Place, expected: Place | None) -> None:
+def test_a_window_comes_back_only_where_it_can_be_reached(
+    place: WindowPlacement, expected: WindowPlacement | None
+) -> None:
     assert reachable(place, SCREENS) == expected
 
 

@@ -18,10 +18,10 @@ from virtual_screen import (
     ROOT,
     RunningApp,
     Screen,
-    kept_of,
     running_app,
+    stored_of,
     wait_until,
-    wait_until_kept,
+    wait_until_stored,
 )
 from written import picture
 
@@ -158,10 +158,10 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
         hands.measure(60)
         hands.press("o", "ctrl+b", "b")
         done = app.settle()
-        wait_until_kept(tmp_path, scan, done)
+        wait_until_stored(tmp_path, scan, done)
         app.process.send_signal(signal.SIGKILL)
         app.process.wait()
-    kept = kept_of(tmp_path, scan)
+    kept = stored_of(tmp_path, scan)
     assert len(kept.document.part(Landmarks).distances) == 1
     assert str(kept.hash).startswith("content:")
     with running_app(screen, tmp_path, scan) as app:
@@ -278,8 +278,8 @@ def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
     with subprocess.Popen(command, env=environment, cwd=home) as process:
         wait_until(lambda: list(home.glob("config/**/scans/*.json")))
         process.terminate()
-    assert json.loads(json.dumps(kept_of(home, scan).to_json()))["document"] == done
-    assert kept_of(home, scan).pose == 1
+    assert json.loads(json.dumps(stored_of(home, scan).to_json()))["document"] == done
+    assert stored_of(home, scan).pose == 1
 
     def refused(*words: object) -> str:
         ended = view(screen, home, *words)

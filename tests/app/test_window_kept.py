@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, RunningApp, Screen, running_app, wait_until_kept
+from virtual_screen import PANEL, RunningApp, Screen, running_app, wait_until_stored
 
 ACTS = 100
 KEYS = {
@@ -84,7 +84,7 @@ def test_a_hundred_acts_are_there_again_after_a_kill(screen: Screen, tmp_path: P
         assert "Traceback" not in app.log()
         app.screen.do("key", "ctrl+b")  # an act that nothing settles after
         done = app.see(lambda state: len(state.document["bookmarks"]) > len(done.document["bookmarks"]))
-        wait_until_kept(home, scan, app.settle())
+        wait_until_stored(home, scan, app.settle())
         app.process.kill()
         app.process.wait()
     parts = done.document

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, kept_of, running_app
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, running_app, stored_of
 
 from viewer.analysis.landmarks import Landmark, Template
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
@@ -248,7 +248,7 @@ def test_notes_are_pinned_and_kept(screen: Screen, tmp_path: Path, scan: Path) -
         press(app, "Return")
         app.process.terminate()
         assert app.process.wait(PATIENCE) == 0
-    assert len(kept_of(tmp_path, scan).document.part(Landmarks).notes) == 2
+    assert len(stored_of(tmp_path, scan).document.part(Landmarks).notes) == 2
     with running_app(screen, tmp_path, scan, home=tmp_path) as app:
         app.act(PANEL, ("item_click", "$$0/\uf1f8"))
         state = app.settle()

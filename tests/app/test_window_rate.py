@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, PATIENCE, Screen, kept_of, running_app
+from virtual_screen import PANEL, PATIENCE, Screen, running_app, stored_of
 
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -33,6 +33,6 @@ def test_a_rate_and_names_tell_the_times(screen: Screen, tmp_path: Path) -> None
         app.see(shown_time=pytest.approx(0.04))
         app.screen.do("key", "ctrl+q")
         app.process.wait(PATIENCE)
-    assert kept_of(tmp_path, scan).document.fps == 50
+    assert stored_of(tmp_path, scan).document.fps == 50
     with running_app(screen, tmp_path, scan) as app:
         app.see(scan_rate=pytest.approx(50))

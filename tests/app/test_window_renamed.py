@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_window_changes import lowest_button, points
-from virtual_screen import Screen, running_app, wait_until_kept
+from virtual_screen import Screen, running_app, wait_until_stored
 
 
 @pytest.mark.slow
@@ -19,7 +19,7 @@ def test_what_was_made_comes_back_under_another_name(screen: Screen, tmp_path: P
     with running_app(screen, tmp_path, old) as app:
         app.do(("key", "ctrl+b"), ("key", "Return"))
         made = app.see(lambda state: state.document["bookmarks"])
-        wait_until_kept(tmp_path, old, made)
+        wait_until_stored(tmp_path, old, made)
     old.rename(new)
     with running_app(screen, tmp_path, new) as app:
         app.told("Scan4D knows these files by another name: .*doe .bookmarks., which is no longer there")

@@ -17,8 +17,8 @@ from virtual_screen import (
     SIZE,
     RunningApp,
     Screen,
-    kept_of,
     running_app,
+    stored_of,
     virtual_screen,
     wait_until,
 )
@@ -82,7 +82,7 @@ def test_a_signal_closes_the_window_and_saves_all(
     check_recording(path)
     kept = settings(tmp_path)
     assert kept["window_look"]["theme"] == "light"
-    assert kept_of(tmp_path, scan).document.camera is not None
+    assert stored_of(tmp_path, scan).document.camera is not None
     assert journals(tmp_path) == []
     left = {entry.name for entry in tmp_path.iterdir()}
     assert left == {"config", "state", "log", path.name}

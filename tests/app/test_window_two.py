@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from test_window_changes import points
-from virtual_screen import PATIENCE, RunningApp, kept_of, running_app, virtual_screen, wait_until_kept
+from virtual_screen import PATIENCE, RunningApp, running_app, stored_of, virtual_screen, wait_until_stored
 
 from viewer.document.saved_session import SavedSession
 
@@ -37,7 +37,7 @@ def test_what_is_made_in_two_windows_is_kept_of_both(tmp_path: Path) -> None:
     ):
         add_bookmark(one, 1, 20)
         made = one.settle().document["bookmarks"]
-        wait_until_kept(tmp_path, scan, one.state)
+        wait_until_stored(tmp_path, scan, one.state)
         add_bookmark(two, 1, -50)
         two.told(CHANGED)
         add_bookmark(one, 2, 40)
@@ -50,7 +50,7 @@ def test_what_is_made_in_two_windows_is_kept_of_both(tmp_path: Path) -> None:
             assert CHANGED in log
             assert "Traceback" not in log
     folder = tmp_path / "config" / "scan4d" / "scans"
-    sessions = [kept_of(tmp_path, scan), *(SavedSession.load(path) for path in folder.glob("*.old-*"))]
+    sessions = [stored_of(tmp_path, scan), *(SavedSession.load(path) for path in folder.glob("*.old-*"))]
     counts = sorted(len(session.document.bookmarks) for session in sessions)
     assert counts in ([1, 1, 2], [1, 2]), "no bookmark is lost, whoever saved last"
     assert any(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, RunningApp, Screen, kept_of, running_app
+from virtual_screen import PANEL, RunningApp, Screen, running_app, stored_of
 
 from viewer.app.scene.cube import cube_place
 from viewer.camera import Camera
@@ -69,8 +69,8 @@ def test_each_scan_stands_upright_by_itself_and_keeps_what_its_user_said(
     assert camera_of(app).up == up_vector("-x")
     app.screen.do("key", "ctrl+q")
     app.process.wait()
-    assert kept_of(tmp_path, scans / "along_z.npy").document.look.up == "-x"
-    assert kept_of(tmp_path, scans / "along_y.npy").document.look.up == "+y"
+    assert stored_of(tmp_path, scans / "along_z.npy").document.look.up == "-x"
+    assert stored_of(tmp_path, scans / "along_y.npy").document.look.up == "+y"
 
 
 @pytest.mark.slow
@@ -94,7 +94,7 @@ def test_a_side_can_be_the_front(app: RunningApp, tmp_path: Path, scans: Path) -
     assert camera_of(app).eye == pytest.approx(left.eye)
     app.screen.do("key", "ctrl+q")
     app.process.wait()
-    assert kept_of(tmp_path, scans / "along_y.npy").document.front == pytest.approx(90)
+    assert stored_of(tmp_path, scans / "along_y.npy").document.front == pytest.approx(90)
 
 
 @pytest.mark.slow

@@ -24,7 +24,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from viewer.document.saved_session import SavedSession, kept_file
+from viewer.document.saved_session import SavedSession, stored_file
 
 ROOT = Path(__file__).resolve().parents[2]
 PANEL = "panel/settings"  # name of the window's part with the parameters
@@ -328,13 +328,13 @@ class RunningApp:
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def kept_of(home: Path, scan: object) -> SavedSession:
+def stored_of(home: Path, scan: object) -> SavedSession:
     """What is kept of a scan for the next start, in the home that `running_app` was given."""
     return SavedSession.load(_kept_path(home, scan))
 
 
 def _kept_path(home: Path, scan: object) -> Path:
-    return home / "config" / "scan4d" / "scans" / kept_file(str(scan)).name
+    return home / "config" / "scan4d" / "scans" / stored_file(str(scan)).name
 
 
 def wait_until(holds: Callable[[], object]) -> None:
@@ -345,13 +345,13 @@ def wait_until(holds: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-def wait_until_kept(home: Path, scan: object, state: State) -> None:
+def wait_until_stored(home: Path, scan: object, state: State) -> None:
     """Wait until what this state shows is kept of a scan for the next start."""
 
     def is_kept() -> bool:
         if not _kept_path(home, scan).exists():
             return False
-        kept: dict[str, Any] = json.loads(json.dumps(kept_of(home, scan).to_json()))
+        kept: dict[str, Any] = json.loads(json.dumps(stored_of(home, scan).to_json()))
         return kept["document"] == state.document
 
     wait_until(is_kept)

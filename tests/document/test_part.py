@@ -119,24 +119,24 @@ def test_a_value_that_could_not_be_read_again_is_refused_with_its_place(
     values: dict[str, Any], words: str
 ) -> None:
     with pytest.raises(TypeError, match=words):
-        part(**values).check_kept()
+        part(**values).check_storable()
 
 
 def test_a_value_that_can_be_read_again_is_kept() -> None:
-    part(all=(Note("a", (1, 2, 3), 4),), named={"a": 1}).check_kept()
-    part().check_kept()
+    part(all=(Note("a", (1, 2, 3), 4),), named={"a": 1}).check_storable()
+    part().check_storable()
 
 
 def test_of_a_change_what_is_new_is_checked_and_told_with_its_place_in_the_whole() -> None:
     before = part(all=(Note("a"), Note("b")), named={"a": 1})
     kind: Any = type(before)
     kept = kind(all=(before.all[1], Note("c")), named={"a": 1})  # type: ignore[attr-defined]
-    kept.check_kept(before)
+    kept.check_storable(before)
     wrong = Note("c", (1.0, 2.0))  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"^notes\.all\[2\]\.position is to be 3 values"):
-        kind(all=(*before.all, wrong)).check_kept(before)  # type: ignore[attr-defined]
+        kind(all=(*before.all, wrong)).check_storable(before)  # type: ignore[attr-defined]
     with pytest.raises(TypeError, match=r"^notes\.named\.a is to be a whole number"):
-        kind(all=before.all, named={"a": 0.5}).check_kept(before)  # type: ignore[attr-defined]
+        kind(all=before.all, named={"a": 0.5}).check_storable(before)  # type: ignore[attr-defined]
 
 
 def test_what_was_checked_is_not_gone_through_again(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -151,5 +151,5 @@ def test_what_was_checked_is_not_gone_through_again(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(schema, "plain", counted)
     kind: Any = type(before)
-    kind(all=(*before.all, Note("new"))).check_kept(before)  # type: ignore[attr-defined]
+    kind(all=(*before.all, Note("new"))).check_storable(before)  # type: ignore[attr-defined]
     assert [value for value in gone_through if isinstance(value, Note)] == [Note("new")]

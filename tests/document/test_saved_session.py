@@ -28,7 +28,7 @@ from viewer.document.document import Bookmark, Document
 from viewer.document.landmarks import Landmarks
 from viewer.document.part import Part
 from viewer.document.recording import place_of
-from viewer.document.saved_session import SavedSession, is_session, keep, kept, kept_file
+from viewer.document.saved_session import SavedSession, is_session, store, stored, stored_file
 from viewer.errors import InputError
 from viewer.look import Look
 from viewer.scan.points import PointCloud
@@ -183,13 +183,13 @@ UNREADABLE = [
 def test_what_cannot_be_read_of_a_document_costs_no_more_and_is_written_again(
     path: tuple[Any, ...], to: Any, name: str
 ) -> None:
-    keep(SESSION)
-    file = kept_file(SESSION.scan)
+    store(SESSION)
+    file = stored_file(SESSION.scan)
     data = json.loads(file.read_text())
     changed("document", *path, to=to)(data)
     file.write_text(json.dumps(data))
 
-    found = kept(SESSION.scan)
+    found = stored(SESSION.scan)
     assert found is not None
     assert found.problem is not None
     assert name in found.problem
@@ -202,7 +202,7 @@ def test_what_cannot_be_read_of_a_document_costs_no_more_and_is_written_again(
     # Whatever the user does now, it is there.
     document = document.with_part(Landmarks().with_distance(*ENDS))
     document = document.with_params("points", backend("points").params({"point_size": 2}))
-    keep(replace(found, document=replace(document, camera=Camera(), bookmarks=(), unit="m")))
+    store(replace(found, document=replace(document, camera=Camera(), bookmarks=(), unit="m")))
     again = json.loads(file.read_text())["document"]["unread"]
     raw = data["document"]
     for step in name.split("."):
@@ -253,26 +253,26 @@ def test_whatever_stands_in_a_session_it_is_read_or_refused() -> None:
 def test_each_scan_has_its_own(home: Path) -> None:
     sessions = [replace(SESSION, scan=name) for name in ("demo", "/a", "/b", os.fsdecode(b"/caf\xe9"))]
     for session in sessions:
-        keep(session)
-    assert [kept(session.scan) for session in sessions] == sessions
-    assert kept("/c") is None
+        store(session)
+    assert [stored(session.scan) for session in sessions] == sessions
+    assert stored("/c") is None
     assert all("knot" not in path.name for path in home.rglob("*")), "names of files tell nothing"
 
 
 def test_those_kept_last_stay(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(saved_session, "MOST_KEPT", 5)
+    monkeypatch.setattr(saved_session, "MOST_STORED", 5)
     seen = replace(SESSION, document=Document(camera=CAMERA, unit="mm"))
     for number in range(12):
-        keep(replace(seen, scan=f"/{number}"))
-        os.utime(kept_file(f"/{number}"), (number, number))
-    keep(replace(seen, scan="/8", pose=1))
-    keep(replace(seen, scan="/12"))
-    there = [number for number in range(13) if kept(f"/{number}") is not None]
+        store(replace(seen, scan=f"/{number}"))
+        os.utime(stored_file(f"/{number}"), (number, number))
+    store(replace(seen, scan="/8", pose=1))
+    store(replace(seen, scan="/12"))
+    there = [number for number in range(13) if stored(f"/{number}") is not None]
     assert there == [8, 9, 10, 11, 12]
 
 
 def test_what_a_user_made_is_never_deleted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(saved_session, "MOST_KEPT", 3)
+    monkeypatch.setattr(saved_session, "MOST_STORED", 3)
     nothing = Document(camera=CAMERA)
     made = [
         replace(nothing, bookmarks=FULL.bookmarks),
@@ -281,46 +281,46 @@ def test_what_a_user_made_is_never_deleted(monkeypatch: pytest.MonkeyPatch) -> N
     ]
     sessions = [replace(SESSION, scan=f"/{n}", document=document) for n, document in enumerate(made)]
     for session in sessions:
-        keep(session)
+        store(session)
     other_window(replace(sessions[0], document=replace(FULL, parts={})))
-    assert keep(sessions[0]) is not None
-    later = kept_file("/later")
+    assert store(sessions[0]) is not None
+    later = stored_file("/later")
     later.write_text(json.dumps(SESSION.to_json() | {"format": 2}))
     for path in later.parent.iterdir():
         os.utime(path, (1, 1))
     before = set(later.parent.iterdir())
     assert len(before) == 5
     for number in range(10, 20):
-        keep(replace(SESSION, scan=f"/{number}", document=nothing))
+        store(replace(SESSION, scan=f"/{number}", document=nothing))
     assert before <= set(later.parent.iterdir())
     assert len(list(later.parent.iterdir())) == len(before) + 3
-    assert [kept(session.scan) for session in sessions] == sessions
+    assert [stored(session.scan) for session in sessions] == sessions
 
 
 def test_what_is_damaged_is_put_aside_and_told_once() -> None:
-    keep(SESSION)
-    file = kept_file(SESSION.scan)
+    store(SESSION)
+    file = stored_file(SESSION.scan)
     file.write_text(file.read_text()[:-40])
     with pytest.raises(InputError) as caught:
-        kept(SESSION.scan)
+        stored(SESSION.scan)
     assert str(caught.value).startswith("/scans/knot: what was kept of it cannot be read (is not JSON")
     aside = file.with_name(f"{file.stem}.old-1.scan4d.json")
     assert str(aside) in str(caught.value)
-    assert kept(SESSION.scan) is None
+    assert stored(SESSION.scan) is None
     former = aside.read_bytes()
     file.write_text("{")
     with pytest.raises(InputError, match="old-2"):
-        kept(SESSION.scan)
+        stored(SESSION.scan)
     assert aside.read_bytes() == former, "what was put aside before stays"
 
 
 def other_window(session: SavedSession) -> None:
     """Keep a session as another process does."""
-    session.save(kept_file(session.scan))
+    session.save(stored_file(session.scan))
 
 
 def asides() -> list[SavedSession]:
-    folder = kept_file(SESSION.scan).parent
+    folder = stored_file(SESSION.scan).parent
     return [SavedSession.load(path) for path in sorted(folder.glob("*.old-*.scan4d.json"))]
 
 
@@ -330,32 +330,32 @@ def with_bookmarks(*names: str) -> SavedSession:
 
 
 def test_what_another_window_made_is_put_aside_once_and_told() -> None:
-    keep(with_bookmarks("a"))
-    assert kept(SESSION.scan) == with_bookmarks("a")
+    store(with_bookmarks("a"))
+    assert stored(SESSION.scan) == with_bookmarks("a")
     theirs = with_bookmarks("a", "b")
     other_window(theirs)
     mine = replace(with_bookmarks("a"), pose=7)
-    told = keep(mine)
-    (aside,) = kept_file(SESSION.scan).parent.glob("*.old-*")
+    told = store(mine)
+    (aside,) = stored_file(SESSION.scan).parent.glob("*.old-*")
     assert told is not None
     assert told.startswith("/scans/knot: what is kept of it was changed elsewhere")
     assert str(aside) in told
     assert asides() == [theirs]
-    assert kept(SESSION.scan) == mine
+    assert stored(SESSION.scan) == mine
     assert is_session(aside)
-    assert keep(replace(mine, pose=8)) is None
+    assert store(replace(mine, pose=8)) is None
     other_window(replace(theirs, pose=4))  # which goes on moving its camera
-    assert keep(replace(mine, pose=9)) is None
+    assert store(replace(mine, pose=9)) is None
     assert asides() == [theirs]
     other_window(with_bookmarks("a", "b", "c"))
-    assert keep(mine) is not None
+    assert store(mine) is not None
     assert asides() == [theirs, with_bookmarks("a", "b", "c")]
 
 
 def test_what_another_window_made_stays_where_it_is_while_nothing_can_be_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    keep(with_bookmarks("a"))
+    store(with_bookmarks("a"))
     other_window(with_bookmarks("b"))
 
     def refuse(session: SavedSession, path: Path) -> None:
@@ -364,48 +364,48 @@ def test_what_another_window_made_stays_where_it_is_while_nothing_can_be_written
     with monkeypatch.context() as patch:
         patch.setattr(SavedSession, "save", refuse)
         with pytest.raises(InputError):
-            keep(SESSION)
+            store(SESSION)
     assert asides() == []
-    assert keep(SESSION) is not None
+    assert store(SESSION) is not None
     assert asides() == [with_bookmarks("b")]
 
 
 def test_another_window_that_made_nothing_costs_nothing() -> None:
-    keep(with_bookmarks("a"))
+    store(with_bookmarks("a"))
     other_window(replace(with_bookmarks("a"), pose=9))
-    assert keep(with_bookmarks("a", "b")) is None, "it had what this one had"
+    assert store(with_bookmarks("a", "b")) is None, "it had what this one had"
     other_window(replace(SESSION, document=Document(camera=CAMERA)))
-    assert keep(with_bookmarks("a", "b")) is None
+    assert store(with_bookmarks("a", "b")) is None
     assert asides() == []
 
 
 def test_a_document_that_was_damaged_meanwhile_is_put_aside_and_told() -> None:
-    keep(SESSION)
-    kept_file(SESSION.scan).write_text("{")
-    assert "put aside" in str(keep(SESSION))
-    assert kept(SESSION.scan) == SESSION
+    store(SESSION)
+    stored_file(SESSION.scan).write_text("{")
+    assert "put aside" in str(store(SESSION))
+    assert stored(SESSION.scan) == SESSION
 
 
 def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> None:
-    keep(SESSION)
-    file = kept_file(SESSION.scan)
+    store(SESSION)
+    file = stored_file(SESSION.scan)
     text = json.dumps(json.loads(file.read_text()) | {"format": 2})
     file.write_text(text)
     for _ in range(2):
         with pytest.raises(InputError, match=r"has the format 2.* It stays unchanged in"):
-            kept(SESSION.scan)
+            stored(SESSION.scan)
         with pytest.raises(InputError, match="has the format 2"):
-            keep(replace(SESSION, pose=1))
+            store(replace(SESSION, pose=1))
     assert [path.read_text() for path in file.parent.iterdir()] == [text]
 
 
 def test_a_document_that_the_system_refuses_to_read_is_neither_moved_nor_written_over() -> None:
-    file = kept_file(SESSION.scan)
+    file = stored_file(SESSION.scan)
     file.mkdir(parents=True)  # which root cannot read either
     with pytest.raises(InputError, match="It stays unchanged in"):
-        kept(SESSION.scan)
+        stored(SESSION.scan)
     with pytest.raises(InputError, match="cannot be read"):
-        keep(SESSION)
+        store(SESSION)
     assert [path.name for path in file.parent.iterdir()] == [file.name]
     assert file.is_dir()
 
@@ -414,12 +414,12 @@ _KEEP_ON = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from viewer.document.saved_session import SavedSession, keep
+from viewer.document.saved_session import SavedSession, store
 session = SavedSession.load(Path(sys.argv[1]))
-keep(session)
+store(session)
 print("begins", flush=True)
 for number in range(10**9):
-    keep(replace(session, pose=number % 1000))
+    store(replace(session, pose=number % 1000))
 """
 
 
@@ -432,7 +432,7 @@ def test_a_kill_leaves_a_whole_document_and_nothing_else(tmp_path: Path, home: P
             process.stdout.readline()
             time.sleep(0.05 + 0.013 * moment)
             process.send_signal(signal.SIGKILL)
-        found = kept(SESSION.scan)
+        found = stored(SESSION.scan)
         assert found is not None
         assert replace(found, pose=3) == SESSION
     shutil.rmtree(home)

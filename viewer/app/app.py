@@ -17,7 +17,7 @@ from ..gpu.context import Gpu
 from ..scan.timeline import Timeline
 from . import keys
 from .failures import Failures
-from .files.opener import find_kept
+from .files.opener import find_stored
 from .files.opening import begin
 from .menus import Commands
 from .notices import Notices
@@ -54,11 +54,11 @@ class App:
         """stored: name of a part -> the values that come back, as JSON has them. session: to open the first
         scan with."""
         self.window, self.commands, self.notices = window, Commands(), Notices()
-        log.debug("%s", window.place)
+        log.debug("%s", window.placement)
         self.failures = Failures(self.notices.tell_of_scan)
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
-        opened = begin(timeline, lambda: find_kept(scans[0], stated.up), session)
+        opened = begin(timeline, lambda: find_stored(scans[0], stated.up), session)
         settings = usable(SessionSettings(), stored.get(Session.name, {}))
         document = settings.document if stated.up is None else settings.document.with_up(stated.up)
         self.session = Session(scans[0], document, settings.pace, opened.left)
@@ -87,7 +87,7 @@ class App:
         """Let all parts take in what time and workers have brought; whether there is something to show."""
         changed = False
         for part in self.parts:
-            with self.failures.told(part.doing):
+            with self.failures.reported(part.doing):
                 changed |= bool(part.advance(now))
         return changed
 
@@ -105,5 +105,5 @@ class App:
         ends += [(part.doing, part.close) for part in last_first]
         ends += [("Drawing", self.viewport.release), ("Preparing", self.renderer.release)]
         for name, end in ends:
-            with self.failures.told(name):
+            with self.failures.reported(name):
                 end()

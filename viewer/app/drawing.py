@@ -96,7 +96,7 @@ class Drawing(WindowPart):
     def refine(self) -> None:
         """Draw one more sample of a picture at rest, in a turn in which nothing else is to be drawn."""
         if time.monotonic() >= self._refines_at:
-            with self.failures.told("Refining"):
+            with self.failures.reported("Refining"):
                 if self.viewport.refine():
                     self.window.touch(frames=1)
 
@@ -120,7 +120,7 @@ class Drawing(WindowPart):
         held = self.steering.moves or self.glide.is_on
         drew = self.viewport.draw(request, playing=self.playback.player.playing, held=held)
         if drew and self.viewport.problem is not None:
-            self.failures.tell("Drawing", self.viewport.problem)
+            self.failures.report("Drawing", self.viewport.problem)
         elif drew:
             self.capture.note_shown()
         if drew and not self.activity.is_moving:

@@ -44,16 +44,16 @@ class Failures:
         self._last: dict[str, float] = {}  # by the clock, when each happened
 
     @contextmanager
-    def told(self, what: str) -> Iterator[None]:
-        """Whatever goes wrong inside is told; the widgets that were begun there are ended. what: goes on."""
+    def reported(self, what: str) -> Iterator[None]:
+        """Report whatever goes wrong inside, and end the widgets that were begun there. what: goes on."""
         try:
             with widgets_ended():
                 yield
         except (Exception, Cancelled) as error:
-            self.tell(what, error)
+            self.report(what, error)
 
-    def tell(self, what: str, error: BaseException, words: str = "") -> None:
-        """Tell what went wrong: once, however many frames in a row it does.
+    def report(self, what: str, error: BaseException, words: str = "") -> None:
+        """Report what went wrong: once, however many frames in a row it does.
 
         what: was being done. words: to tell it in; else those of `failure_in_words`.
         """

@@ -16,7 +16,7 @@ from .commands import Command, Menu
 from .keys import Keys
 from .menus import Commands
 from .notices import Notices
-from .part import Place, WindowPart
+from .part import ViewArea, WindowPart
 
 _PAGES = ("Keys and mouse", "Messages", "About")
 _SIZE = ImVec2(60.0, 34.0)  # in heights of the font
@@ -70,7 +70,7 @@ class Help(WindowPart):
         """Close the page that was opened last; whether one was open."""
         return self.open.pop() is not None if self.open else False
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare the windows of the open pages."""
         self.focused = None
         pages = self._draw_keys, self._draw_messages, self._draw_about

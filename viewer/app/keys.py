@@ -21,7 +21,7 @@ class CommandTable(Protocol):
 
 
 FILE = "keys.toml"
-_MOST_BYTES, _MOST_TOLD = 64 * 2**10, 5
+_MOST_BYTES, _MOST_SHOWN = 64 * 2**10, 5
 _MODIFIERS = {"Ctrl": imgui.Key.mod_ctrl, "Shift": imgui.Key.mod_shift, "Alt": imgui.Key.mod_alt}
 _NAMED = {
     "Space": "space", "Enter": "enter", "Tab": "tab", "Backspace": "backspace", "Delete": "delete",
@@ -105,13 +105,13 @@ def load_keys(path: Path, commands: CommandTable) -> tuple[Keys, list[str]]:
     """
     given, problems = _read(path)
     changes = _checked(given, commands, problems)
-    told = [
+    shown = [
         str(InputError(problem.what, problem.where or path, problem.hint))
-        for problem in problems[:_MOST_TOLD]
+        for problem in problems[:_MOST_SHOWN]
     ]
-    if len(problems) > _MOST_TOLD:
-        told.append(f"{path}: {len(problems) - _MOST_TOLD} more lines cannot be used")
-    return Keys(commands, changes), told
+    if len(problems) > _MOST_SHOWN:
+        shown.append(f"{path}: {len(problems) - _MOST_SHOWN} more lines cannot be used")
+    return Keys(commands, changes), shown
 
 
 def _read(path: Path) -> tuple[dict[str, Any], list[InputError]]:

@@ -13,7 +13,7 @@ from ..scan.pose import Pose
 
 Numbers = Mapping[str, NDArray[np.generic]]
 NumbersOf = Callable[[Pose], Numbers]
-PlaceOf = Callable[[int], Rigid]
+MotionOf = Callable[[int], Rigid]
 
 
 class Laid:
@@ -29,28 +29,28 @@ class Laid:
     def __init__(self) -> None:
         self.names: set[str] = set()
         self.version = 0
-        self._by_tool: dict[str, tuple[NumbersOf, PlaceOf]] = {}
+        self._by_tool: dict[str, tuple[NumbersOf, MotionOf]] = {}
         self._replayed: tuple[int, Rigid] | None = None
         self._found: tuple[Pose, Layers] | None = None
 
-    def lay(self, tool: str, numbers: NumbersOf, place: PlaceOf) -> None:
+    def lay(self, tool: str, numbers: NumbersOf, world_from_pose: MotionOf) -> None:
         """Lay a tool's numbers and places over the poses, instead of what it laid before.
 
-        numbers: of a pose. place: of a pose, by its index.
+        numbers: of a pose. world_from_pose: of a pose, by its index.
         """
         self.take_away(tool)
-        self._by_tool[tool] = numbers, place
+        self._by_tool[tool] = numbers, world_from_pose
 
     def take_away(self, tool: str) -> None:
         """Take away what a tool laid."""
         self._by_tool.pop(tool, None)
         self._forget()
 
-    def replay(self, index: int, place: Rigid) -> None:
+    def replay(self, index: int, world_from_pose: Rigid) -> None:
         """Have a pose stand where a recording has it, and its scan's own numbers stand for layers of the same
         name; until another pose is replayed, or a tool lays something.
         """
-        self._replayed, self._found = (index, place), None
+        self._replayed, self._found = (index, world_from_pose), None
 
     def clear(self) -> None:
         """Take away all, since another scan is opened."""
@@ -63,14 +63,14 @@ class Laid:
             self._found = pose, self._merged(pose)
         return self._found[1]
 
-    def place(self, index: int) -> Rigid:
+    def world_from_pose(self, index: int) -> Rigid:
         """The motion of a pose, by its index, which need not have been read."""
         if self._replayed is not None and self._replayed[0] == index:
             return self._replayed[1]
-        place = STILL
-        for _, place_of in list(self._by_tool.values()):  # a tool that fails is taken away
-            place = place_of(index).after(place)
-        return place
+        world_from_pose = STILL
+        for _, motion_of in list(self._by_tool.values()):  # a tool that fails is taken away
+            world_from_pose = motion_of(index).after(world_from_pose)
+        return world_from_pose
 
     def _forget(self) -> None:
         """Forget what was replayed and found."""
@@ -85,5 +85,5 @@ class Laid:
         self.names |= scalars.keys()
         if self._replayed is not None and self._replayed[0] == pose.index:
             scalars = {name: values for name, values in scalars.items() if name not in pose.overview.scalars}
-        place = self.place(pose.index)
-        return Layers(scalars, place) if scalars or not place.is_identity else NO_LAYERS
+        world_from_pose = self.world_from_pose(pose.index)
+        return Layers(scalars, world_from_pose) if scalars or not world_from_pose.is_identity else NO_LAYERS

@@ -12,7 +12,7 @@ from .failures import Failures
 from .keyboard import NO_KEYS, Keyboard
 from .menu import MenuBar
 from .panel import Panel
-from .part import Parts, Place, WindowPart
+from .part import Parts, ViewArea, WindowPart
 from .playing.timeline_bar import TimelineBar
 from .scene.full_view import FullView
 from .scene.view import SceneView
@@ -49,31 +49,31 @@ class WindowLayout(WindowPart):
     tasks: Tasks
     full_view: FullView
 
-    def draw(self) -> Place:
+    def draw(self) -> ViewArea:
         """Declare all widgets; returns where the 3D view is. Where a part fails, the others are there."""
-        told = self.failures.told
+        reported = self.failures.reported
         self.keyboard.begin_frame()
         self.shortcuts.handle()
-        with told("Escape"):
+        with reported("Escape"):
             enders = [ender for part in self.parts for ender in part.enders()]
             escape.handle(end for _, end in sorted(enders, key=lambda ender: -ender[0]))
         view = self._draw_view_alone() if self.full_view.is_on else self._draw_parts()
         for part in sorted(self.parts, key=lambda part: part.layer):
-            with told(part.shows):
+            with reported(part.shows):
                 part.dialog(view)
         return view
 
-    def _draw_view_alone(self) -> Place:
+    def _draw_view_alone(self) -> ViewArea:
         whole = imgui.get_io().display_size
-        place = self._draw_view(0, int(whole.x), int(whole.y))
-        with self.failures.told("The list of work"):
-            self.tasks.draw_alone(place)
-        return place
+        view = self._draw_view(0, int(whole.x), int(whole.y))
+        with self.failures.reported("The list of work"):
+            self.tasks.draw_alone(view)
+        return view
 
-    def _draw_parts(self) -> Place:
+    def _draw_parts(self) -> ViewArea:
         whole = imgui.get_io().display_size
         top = 0
-        with self.failures.told("The menu"):
+        with self.failures.reported("The menu"):
             top = self._draw_head(whole.x)
         em = imgui.get_font_size()
         # Whole numbers, so that the picture's edges fall on pixels.
@@ -84,34 +84,34 @@ class WindowLayout(WindowPart):
         below = whole.y - drawer if self.drawer.is_open else whole.y
         bottom = int(below - bar)
         height = max(1, bottom - top)
-        place = self._draw_view(top, width, height)
-        with self.failures.told("The panel"):
-            _place_grip("grip", width, top, grip, height)
+        view = self._draw_view(top, width, height)
+        with self.failures.reported("The panel"):
+            _begin_grip("grip", width, top, grip, height)
             self.side_panel.draw_grip(height)
             imgui.end()
-            _place("panel", width + grip, top, whole.x - width - grip, height)
+            _begin_window("panel", width + grip, top, whole.x - width - grip, height)
             self.side_panel.draw()
             imgui.end()
-        with self.failures.told("The timeline"):
-            _place("timeline", 0, bottom, whole.x, below - bottom, self.keyboard.flags("timeline"))
+        with self.failures.reported("The timeline"):
+            _begin_window("timeline", 0, bottom, whole.x, below - bottom, self.keyboard.flags("timeline"))
             self.keyboard.take("timeline")
             self.timeline_bar.draw()
             imgui.end()
         if below < whole.y:
-            with self.failures.told("What is under the timeline"):
-                _place_grip("grip below", 0, below, whole.x, grip)
+            with self.failures.reported("What is under the timeline"):
+                _begin_grip("grip below", 0, below, whole.x, grip)
                 self.drawer.draw_grip(whole.x)
                 imgui.end()
-                _place("drawer", 0, below + grip, whole.x, whole.y - below - grip)
+                _begin_window("drawer", 0, below + grip, whole.x, whole.y - below - grip)
                 self.drawer.draw()
                 imgui.end()
-        return place
+        return view
 
-    def _draw_view(self, top: int, width: int, height: int) -> Place:
+    def _draw_view(self, top: int, width: int, height: int) -> ViewArea:
         """Declare the view; returns where it is."""
-        with self.failures.told("The view"):
+        with self.failures.reported("The view"):
             imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
-            _place("view", 0, top, width, height)
+            _begin_window("view", 0, top, width, height)
             imgui.pop_style_var()
             self.view.draw()
             imgui.end()
@@ -124,7 +124,7 @@ class WindowLayout(WindowPart):
         padding = ImVec2(padding.x, 0.4 * padding.y)  # not the style's own, which the next line changes
         imgui.push_style_var(imgui.StyleVar_.window_padding, padding)
         height = imgui.get_frame_height() + 2 * padding.y
-        _place("toolbar", 0, below, width, height)
+        _begin_window("toolbar", 0, below, width, height)
         self.menu_bar.draw_toolbar()
         imgui.end()
         imgui.pop_style_var()
@@ -138,15 +138,17 @@ def drawer_height(wanted: float, window: float, room: float) -> float:
     return min(wanted, room - min(_VIEW_SHARE * window, _VIEW_PART * room))
 
 
-def _place_grip(name: str, left: float, top: float, width: float, height: float) -> None:
+def _begin_grip(name: str, left: float, top: float, width: float, height: float) -> None:
     """Begin an ImGui window that is nothing but a grip."""
     imgui.push_style_var(imgui.StyleVar_.window_padding, ImVec2(0, 0))
     imgui.push_style_var(imgui.StyleVar_.window_min_size, ImVec2(1, 1))
-    _place(name, left, top, width, height)
+    _begin_window(name, left, top, width, height)
     imgui.pop_style_var(2)
 
 
-def _place(name: str, left: float, top: float, width: float, height: float, keys: int = NO_KEYS) -> None:
+def _begin_window(
+    name: str, left: float, top: float, width: float, height: float, keys: int = NO_KEYS
+) -> None:
     """Begin an ImGui window. keys: flags that say whether the keyboard goes through its widgets."""
     imgui.set_next_window_pos(ImVec2(left, top))
     imgui.set_next_window_size(ImVec2(width, height))

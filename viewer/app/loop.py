@@ -31,7 +31,7 @@ class Loop:
         failures = self._app.failures
         while not self._ends():
             before = failures.count
-            with failures.told("The window"):
+            with failures.reported("The window"):
                 self._turn()
             if self._watch is not None:
                 self._watch(self._app)
@@ -40,7 +40,7 @@ class Loop:
 
     def _turn(self) -> None:
         app, patience = self._app, _WATCH
-        with app.failures.told("The window"):  # the turn goes on without it
+        with app.failures.reported("The window"):  # the turn goes on without it
             patience = app.patience(_AWAIT, _WATCH, time.monotonic())
         self._turns.add("late", 1e3 * app.window.wait(patience))
         with self._turns.part("advance"):
@@ -67,14 +67,14 @@ class Loop:
         app, start = self._app, time.perf_counter()
         with self._turns.part("widgets"):
             app.window.begin()
-            with app.failures.told("The window"):
+            with app.failures.reported("The window"):
                 app.drawing.place(app.window.to_pixels(*app.layout.draw()))
         start_picture, drew = time.perf_counter(), False
-        with app.failures.told("Drawing"):
+        with app.failures.reported("Drawing"):
             drew = app.drawing.draw()
         self._turns.add("picture" if drew else "upload", (time.perf_counter() - start_picture) * 1e3)
         with self._turns.part("show"):
-            with app.failures.told("Showing the picture"):
+            with app.failures.reported("Showing the picture"):
                 app.drawing.present(is_dimmed=app.loading.awaited is not None)
             app.window.end()
         if drew:

@@ -167,7 +167,7 @@ class MenuBar(WindowPart):
         if is_on:
             imgui.push_style_color(imgui.Col_.text, theme.packed(self.window_look.palette.accent))
         if imgui.button(text):
-            with self.failures.told(command.title):
+            with self.failures.reported(command.title):
                 command.act()
         if is_on:
             imgui.pop_style_color()
@@ -193,7 +193,7 @@ class MenuBar(WindowPart):
             if imgui.menu_item(
                 widgets.labelled(title, entry.name), self.keys.of[entry.name], is_on, entry.can()
             )[0]:
-                with self.failures.told(entry.title):
+                with self.failures.reported(entry.title):
                     entry.act()
         elif isinstance(entry, Listing) and not entry.title:
             self._draw_items(entry)

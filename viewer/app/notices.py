@@ -16,14 +16,14 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from ..files import printable
 from . import theme, widgets
 from .keyboard import Keyboard
-from .part import Place, WindowPart
+from .part import ViewArea, WindowPart
 from .window import Window
 from .window_look import WindowLook
 
 log = logging.getLogger(__name__)
 _LASTS = 4.0, 0.06  # seconds, and as much more for each letter
 _MOST_SHOWN = 3
-_MOST_KEPT = 1000
+_MOST_STORED = 1000
 _WIDTH, _NARROW, _FOOT = 34.0, 21.0, 4.5  # in heights of the font; the foot is where the scale bar is
 _STILL = (
     imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize | imgui.WindowFlags_.no_move
@@ -97,7 +97,7 @@ class Notices(WindowPart):
         new = Notice(text, datetime.now(), until, is_problem, offer, of)
         self.all = [self._gone(each) if _replaces(new, each) else each for each in self.all]
         self.all.append(new)
-        del self.all[:-_MOST_KEPT]
+        del self.all[:-_MOST_STORED]
         self.count += 1
 
     def tell_of_scan(self, text: str) -> None:
@@ -164,7 +164,7 @@ class Notices(WindowPart):
             draw_text(notice.text, corner, extent, wrap, pad)
             bottom = corner.y - 2 * pad.y - 0.4 * em
 
-    def draw_staying(self, view: Place, color: int, keyboard: Keyboard) -> None:
+    def draw_staying(self, view: ViewArea, color: int, keyboard: Keyboard) -> None:
         """Declare a window with problems and offers, over the 3D view. color: 0xRRGGBB, of the mark beside
         each problem. keyboard: which goes there as well."""
         left, top, width, height = view
@@ -241,7 +241,7 @@ class StayingNotices(WindowPart):
             self.window.touch()  # ImGui shows a window that fits its content from the second frame on
             self._seen = seen
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare it over the 3D view."""
         self.notices.draw_staying(view, self.window_look.palette.broken, self.keyboard)
 

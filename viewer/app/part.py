@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .ui import Ui
 
 _REMEMBERED = "remembered"  # in the metadata of a field
-Place = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
+ViewArea = tuple[float, float, float, float]  # left, top, width, height in ImGui's coordinates
 
 
 class Section(NamedTuple):
@@ -107,7 +107,7 @@ class WindowPart:
     def panel(self, ui: Ui) -> None:
         """Declare the widgets of the section."""
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare windows of its own. view: where the 3D view is."""
 
     def on_escape(self) -> bool:

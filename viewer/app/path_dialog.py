@@ -116,7 +116,7 @@ class PathDialog(ABC):
         if self._view.refusal:
             foot += 2 * imgui.get_text_line_height_with_spacing()
         imgui.begin_child("places", ImVec2(_PLACES * imgui.get_font_size(), -foot), imgui.ChildFlags_.borders)
-        self._view.draw_places()
+        self._view.draw_known_folders()
         imgui.end_child()
         imgui.same_line()
         imgui.begin_child("rows", ImVec2(0, -foot), imgui.ChildFlags_.borders)

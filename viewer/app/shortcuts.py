@@ -79,7 +79,7 @@ class Shortcuts(WindowPart):
                 continue
             if not imgui.shortcut(pressed, _REPEATED if command.repeats else imgui.InputFlags_.route_global):
                 continue
-            with self.failures.told(command.title):
+            with self.failures.reported(command.title):
                 if command.can():
                     self._used = imgui.Key(pressed & ~MODIFIER_BITS)
                     command.act()

@@ -13,7 +13,7 @@ from . import widgets
 from .files.opener import Opener
 from .output.capture import Capture
 from .output.exporting import Exporting
-from .part import Place, WindowPart
+from .part import ViewArea, WindowPart
 from .playing.playback import Playback
 from .scene.viewport import Viewport
 from .session import Session
@@ -93,13 +93,13 @@ class Tasks(WindowPart):
 
     def cancel(self, task: Task) -> None:
         """Stop a piece of the work; what was shown before it stays."""
-        is_told = task is self.playback.timeline.reading  # by what the timeline says of the frame
+        is_reported = task is self.playback.timeline.reading  # by what the timeline says of the frame
         if task is self.opener.job.task:
             self.opener.job.cancel()
         elif task is self.viewport.renderer.work.preparing:
             self._choose_prepared()
         task.cancel()
-        if not is_told:
+        if not is_reported:
             self.note(f"Cancelled: {task.name}.")
 
     def _choose_prepared(self) -> None:
@@ -114,7 +114,7 @@ class Tasks(WindowPart):
             before = replace(self.session.document.drawn_by(str(request.backend)), look=look)
             self.session.history.change("Cancel preparing", before)
 
-    def draw_alone(self, view: Place) -> None:
+    def draw_alone(self, view: ViewArea) -> None:
         """Declare the work in a corner of the 3D view, where there is no status bar."""
         if not self.shown:
             return

@@ -20,7 +20,7 @@ from ..scan.units import Scale
 from ..task import Cancelled, Task, in_background
 from .clicks import Click, Clicks
 from .followed import Followed
-from .laid import NumbersOf, PlaceOf
+from .laid import MotionOf, NumbersOf
 from .playing.playback import Playback
 from .scene.viewport import Viewport
 from .session import Session, named_like
@@ -60,13 +60,13 @@ class Work:
 class Lay(Protocol):
     """Lays something over the open scan for a tool."""
 
-    def __call__(self, numbers: NumbersOf | None = None, place: PlaceOf | None = None) -> None:
+    def __call__(self, numbers: NumbersOf | None = None, motion: MotionOf | None = None) -> None:
         """Lay numbers over the points of the open scan, and move its poses; what the tool laid before goes.
 
         numbers: gives those of a pose, name -> (N,) array by row of its cloud, empty where there are none;
         they are colours to choose, and are picked, like the scan's own. It is asked when a pose comes to be
         shown, so it answers with arrays that are there already; those that it gave before are not uploaded
-        again. place: gives the motion of a pose by its index. Without either, nothing is laid. To change
+        again. motion: gives the motion of a pose by its index. Without either, nothing is laid. To change
         something, lay it anew. All is taken away when another scan is opened, and none of it is kept.
         """
 
@@ -160,7 +160,7 @@ class ToolContext:
         not come to an end. Raises TypeError where a part holds what cannot be kept, and changes nothing.
         """
         for part in parts:
-            part.check_kept(self.document.part(type(part)))
+            part.check_storable(self.document.part(type(part)))
         self.session.change(name, *parts, merge=merge, **fields)
 
     # --- the window -------------------------------------------------------------------

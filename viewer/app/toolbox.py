@@ -31,10 +31,10 @@ from .clicks import Clicks
 from .commands import Command, Item, Listing, Menu
 from .failures import Failures
 from .followed import Followed
-from .laid import Numbers, NumbersOf, PlaceOf
+from .laid import MotionOf, Numbers, NumbersOf
 from .menus import Commands
 from .notices import Problem
-from .part import Place, WindowPart, chosen
+from .part import ViewArea, WindowPart, chosen
 from .playing.playback import Playback
 from .scene.canvas import Canvas, ViewPlace
 from .scene.viewport import Viewport
@@ -215,11 +215,11 @@ class Toolbox(WindowPart):
             self.clicks.owner = None
         slot.context.cancel_work()
         words = f"Scan4D switched off {slot.title} until the next start: {failures.reason(error)}"
-        self.failures.tell(f"The tool '{slot.context.name}'", error, words)
+        self.failures.report(f"The tool '{slot.context.name}'", error, words)
 
-    def _lay(self, name: str, numbers: NumbersOf | None = None, place: PlaceOf | None = None) -> None:
+    def _lay(self, name: str, numbers: NumbersOf | None = None, motion: MotionOf | None = None) -> None:
         """Lay over the open scan what a tool gives, or nothing; what it gives wrong switches it off."""
-        if numbers is None and place is None:
+        if numbers is None and motion is None:
             self.session.laid.take_away(name)
         else:
             slot = self._slots[name]
@@ -227,10 +227,10 @@ class Toolbox(WindowPart):
             def numbers_of(pose: Pose) -> Numbers:
                 return self._ask(slot, lambda _: _checked(numbers(pose), pose)) or {} if numbers else {}
 
-            def place_of(index: int) -> Rigid:
-                return self._ask(slot, lambda _: _checked_place(place(index))) or STILL if place else STILL
+            def motion_of(index: int) -> Rigid:
+                return self._ask(slot, lambda _: _checked_motion(motion(index))) or STILL if motion else STILL
 
-            self.session.laid.lay(name, numbers_of, place_of)
+            self.session.laid.lay(name, numbers_of, motion_of)
         self.redraw()
 
     # --- in the window ----------------------------------------------------------------
@@ -269,7 +269,7 @@ class Toolbox(WindowPart):
             found = found.with_more(self._call(slot, "drawn", frame) or NOTHING_DRAWN)
         return found
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Have the tools declare windows of their own."""
         for slot in self._slots.values():
             self._declare(slot, "dialog")
@@ -402,11 +402,11 @@ def _checked(numbers: Numbers, pose: Pose) -> Numbers:
     return numbers
 
 
-def _checked_place(place: Rigid) -> Rigid:
-    """The place. Raises TypeError where it is none."""
-    if not isinstance(place, Rigid):
-        raise TypeError(f"a place is a viewer.rigid.Rigid, not a {type(place).__name__}")
-    return place
+def _checked_motion(motion: Rigid) -> Rigid:
+    """The motion. Raises TypeError where it is none."""
+    if not isinstance(motion, Rigid):
+        raise TypeError(f"a motion is a viewer.rigid.Rigid, not a {type(motion).__name__}")
+    return motion
 
 
 def _problems_of_packages() -> list[str]:

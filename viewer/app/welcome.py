@@ -8,7 +8,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..scan.open import DEMO
-from .part import Place, WindowPart, remembered
+from .part import ViewArea, WindowPart, remembered
 from .session import Session
 
 _LINES = (
@@ -45,7 +45,7 @@ class Welcome(WindowPart):
         self.is_over = self.is_over or was_shown
         return was_shown
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare it at the top of the 3D view, where the demo is shown, until the first act, which is done
         as without it."""
         if not self._is_shown:

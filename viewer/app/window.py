@@ -25,7 +25,7 @@ from ..gpu import gl
 from ..gpu.context import obstacle
 from ..gpu.shader_cache import shader_cache
 from . import theme
-from .place import Place, reachable
+from .placement import WindowPlacement, reachable
 
 _GL = (4, 3)
 _SIZE = (1600, 1000)
@@ -45,8 +45,8 @@ _ENDS_ALT = (imgui.backends.glfw_mouse_button_callback, imgui.backends.glfw_wind
 class Window(GlfwWindow):
     """Opens at once. Raises NoOpenGLError where there is no display or no OpenGL for it."""
 
-    def __init__(self, title: str, place: Place | None = None) -> None:
-        """place: where it was before; the usual one where that is None, or on no screen any more."""
+    def __init__(self, title: str, placement: WindowPlacement | None = None) -> None:
+        """placement: where it was before; the usual one where that is None, or on no screen any more."""
         problems: list[str] = []
 
         def note_problem(code: int, text: Any) -> None:
@@ -72,7 +72,7 @@ class Window(GlfwWindow):
                 ),
             ) from error
         self.dropped: list[str] = []
-        self._restore(place)
+        self._restore(placement)
         # On a scaled display it is larger than asked for, which moderngl-window does not notice.
         self._width, self._height = glfw.get_window_size(self._window)
         width, height = (round(side * self._display_scale) for side in _LEAST)
@@ -151,30 +151,34 @@ class Window(GlfwWindow):
         paths, self.dropped = self.dropped, []
         return paths
 
-    def _restore(self, place: Place | None) -> None:
+    def _restore(self, placement: WindowPlacement | None) -> None:
         """Go where it was, and show."""
-        found = place and reachable(place, [glfw.get_monitor_workarea(one) for one in glfw.get_monitors()])
+        found = placement and reachable(
+            placement, [glfw.get_monitor_workarea(one) for one in glfw.get_monitors()]
+        )
         if found:
             glfw.set_window_pos(self._window, found.left, found.top)
             glfw.set_window_size(self._window, found.width, found.height)
             if found.maximised:
                 glfw.maximize_window(self._window)
-        self._last_place = found or None
+        self._last_placement = found or None
         self.visible = True
 
     @property
-    def place(self) -> Place | None:
+    def placement(self) -> WindowPlacement | None:
         """The place of the window; while it fills a screen or is an icon, that before. None: never seen."""
         seen = self._window, glfw.ICONIFIED
         if glfw.get_window_monitor(self._window) or glfw.get_window_attrib(*seen):
-            return self._last_place
+            return self._last_placement
         if glfw.get_window_attrib(self._window, glfw.MAXIMIZED):
-            before = self._last_place or Place(*glfw.get_window_pos(self._window), *_initial_size())
-            self._last_place = replace(before, maximised=True)
+            before = self._last_placement or WindowPlacement(
+                *glfw.get_window_pos(self._window), *_initial_size()
+            )
+            self._last_placement = replace(before, maximised=True)
         else:
             size = glfw.get_window_size(self._window)
-            self._last_place = Place(*glfw.get_window_pos(self._window), *size)
-        return self._last_place
+            self._last_placement = WindowPlacement(*glfw.get_window_pos(self._window), *size)
+        return self._last_placement
 
     def _start_imgui(self) -> None:
         imgui.create_context()

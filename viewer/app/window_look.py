@@ -13,7 +13,7 @@ from ..errors import InputError
 from . import theme
 from .commands import Command, Item, Listing
 from .part import WindowPart, remembered
-from .place import Place
+from .placement import WindowPlacement
 from .theme import Palette
 from .window import Window
 
@@ -36,7 +36,7 @@ class WindowLook(WindowPart):
 
     def remembered(self) -> dict[str, object]:
         """The values that come back at the next start, as JSON has them."""
-        return super().remembered() | {"window": plain(self.window.place)}
+        return super().remembered() | {"window": plain(self.window.placement)}
 
     def choose(self, name: str) -> None:
         """Show panels in the colours of one of `theme.PALETTES`; the picture's are the look's."""
@@ -77,9 +77,9 @@ class WindowLook(WindowPart):
     )
 
 
-def stored_placement(stored: Mapping[str, Any]) -> Place | None:
+def stored_placement(stored: Mapping[str, Any]) -> WindowPlacement | None:
     """The placement of the window among the values of all parts that come back; None: it was never open."""
     values: Any = stored.get(WindowLook.name)
     with suppress(InputError, RecursionError):
-        return structured(Place, values.get("window")) if is_object(values) else None
+        return structured(WindowPlacement, values.get("window")) if is_object(values) else None
     return None

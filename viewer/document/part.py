@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, ClassVar
 
-from .schema import check_declaration, check_kept
+from .schema import check_declaration, check_storable
 
 
 class Part:
@@ -48,12 +48,12 @@ class Part:
                 raise TypeError(f"{name}.{field.name} has no default, which a scan without a '{name}' has")
         check_declaration(cls, name)
 
-    def check_kept(self, known: Part | None = None) -> None:
+    def check_storable(self, known: Part | None = None) -> None:
         """Check that it can be kept as it is; raises TypeError, which names the place: "notes.all[0]".
 
         known: one that was checked, of which this one is a change; only what is new is checked.
         """
-        check_kept(self, self.part_name, known)
+        check_storable(self, self.part_name, known)
 
 
 def _full_name(kind: type) -> str:

@@ -55,15 +55,15 @@ def make(
     the process said.
     """
     with _folder_beside(out) as folder:
-        told_once, made = folder / "recording.json", folder / "made"
-        recording.save(told_once)
+        reported_once, made = folder / "recording.json", folder / "made"
+        recording.save(reported_once)
         new_folder(made)
-        arguments = ["render", "--replay", str(told_once), "-o", str(made / out.name)]
+        arguments = ["render", "--replay", str(reported_once), "-o", str(made / out.name)]
         arguments += ["--fps", f"{fps:.17g}", "--progress", *(["--anonymous"] if anonymous else [])]
         scan = recording.entries[0].scan
         if scan is not None and far_place(scan):  # which a recording may not ask for
             arguments += ["--", scan]
-        device, code, text = _run(task, arguments, folder / "said", told_once)
+        device, code, text = _run(task, arguments, folder / "said", reported_once)
         for inner in (made, folder):  # as it says them, also where they are no UTF-8
             name = str(inner).encode(errors="backslashreplace").decode()
             text = text.replace(name, printable(str(out.parent)))
@@ -105,22 +105,22 @@ def _folder_beside(out: Path) -> Iterator[Path]:
         raise InputError(f"cannot be written: {what}", out, hint) from error
 
 
-def _run(task: Task, arguments: list[str], said: Path, told_once: Path) -> tuple[str, int, str]:
+def _run(task: Task, arguments: list[str], said: Path, reported_once: Path) -> tuple[str, int, str]:
     """Run a command line of Scan4D and report its progress.
 
-    said: a file for what it says on standard error. told_once: what it reads at first, deleted then, as it
-    names the scan. Returns the device that drew, the exit code, and what was said. Raises Cancelled.
+    said: a file for what it says on standard error. reported_once: what it reads at first, deleted then, as
+    it names the scan. Returns the device that drew, the exit code, and what was said. Raises Cancelled.
     """
     program = f"from runpy import run_module; run_module({_PROGRAM!r}, run_name='__main__')"
     with (
         os.fdopen(new_file(said), "wb") as stream,
         start_python(program, *arguments, nice=_NICE, stdin=subprocess.DEVNULL, stderr=stream) as process,
     ):
-        device = _follow(task, process, told_once)
+        device = _follow(task, process, reported_once)
     return device, process.returncode, said.read_text("utf-8", errors="replace")
 
 
-def _follow(task: Task, process: subprocess.Popen[bytes], told_once: Path) -> str:
+def _follow(task: Task, process: subprocess.Popen[bytes], reported_once: Path) -> str:
     """Report the progress of the process until it ends; the device that it names. Raises Cancelled."""
     device = ""
     try:
@@ -128,7 +128,7 @@ def _follow(task: Task, process: subprocess.Popen[bytes], told_once: Path) -> st
             for line in process.stdout or ():
                 step = json.loads(line) if line.startswith(b"{") else {}
                 if "device" in step:  # it has read all that it was told
-                    told_once.unlink()
+                    reported_once.unlink()
                     device = step["device"]
                 if "drawn" in step:
                     task.report(step["drawn"] / step["of"])

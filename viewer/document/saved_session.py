@@ -43,7 +43,7 @@ from .schema import (
 
 FORMAT = 1
 SUFFIX = ".scan4d.json"
-MOST_KEPT = 200  # documents in the user's folder beyond which those go that hold nothing a user made
+MOST_STORED = 200  # documents in the user's folder beyond which those go that hold nothing a user made
 _seen: dict[
     Path, tuple[bytes, object]
 ] = {}  # file -> what this process read or wrote last: digest, what was made
@@ -135,20 +135,20 @@ def _named_from(folder: Path, scan: str) -> str:
 # --- those of all scans -----------------------------------------------------------------------
 
 
-def kept_file(scan: str) -> Path:
+def stored_file(scan: str) -> Path:
     """File of a scan's document. scan: its path from the root, or "demo"."""
     digest = hashlib.sha256(os.fsencode(scan)).hexdigest()[:32]
     return user_folder() / "scans" / f"{digest}.json"
 
 
-def keep(session: SavedSession) -> str | None:
-    """Keep the document of a scan, which is named from the root; older ones beyond MOST_KEPT go in which
+def store(session: SavedSession) -> str | None:
+    """Keep the document of a scan, which is named from the root; older ones beyond MOST_STORED go in which
     nothing was made (see `Document.made`).
 
     Where another window has written it meanwhile, what was made there is put aside; returns words of that for
     the user. Raises InputError where it cannot be written, or there is one that only others can read.
     """
-    path = kept_file(session.scan)
+    path = stored_file(session.scan)
     is_new = not os.path.lexists(path)
     aside = None if is_new else _spared(path, session.document)
     try:
@@ -167,13 +167,13 @@ def keep(session: SavedSession) -> str | None:
     return str(InputError(what, session.scan, f"That is put aside; open {aside} to see it"))
 
 
-def kept(scan: str) -> SavedSession | None:
+def stored(scan: str) -> SavedSession | None:
     """Read what is kept of a scan; None where there is nothing. scan: its path from the root, or "demo".
 
     Raises InputError where that cannot be read: it is put aside where it is damaged, and stays as it is where
     it was written by a later Scan4D or the system refuses.
     """
-    path = kept_file(scan)
+    path = stored_file(scan)
     if not os.path.lexists(path):
         return None
     try:
@@ -192,13 +192,13 @@ def kept(scan: str) -> SavedSession | None:
         raise InputError(what, scan, f"Scan4D renamed it to {aside}; the scan opens without it") from error
 
 
-def kept_elsewhere(scan: str, hash: str) -> list[SavedSession]:
+def stored_elsewhere(scan: str, hash: str) -> list[SavedSession]:
     """Kept sessions of other scans with this hash, or put aside, that hold what a user has made: the last
     written first, of equal ones that alone. What cannot be read is left out.
 
     scan: its path from the root; what is kept of this itself does not count.
     """
-    folder, own = kept_file(scan).parent, kept_file(scan)
+    folder, own = stored_file(scan).parent, stored_file(scan)
     found: list[SavedSession] = []
     for path in sorted((path for path in folder.glob("*.json") if path != own), key=_age):
         with suppress(InputError, OSError):
@@ -211,11 +211,11 @@ def kept_elsewhere(scan: str, hash: str) -> list[SavedSession]:
 
 
 def set_aside(session: SavedSession) -> None:
-    """Keep a copy of a session as it is, where `kept_elsewhere` finds it; what was made in it once alone.
+    """Keep a copy of a session as it is, where `stored_elsewhere` finds it; what was made in it once alone.
 
     Raises InputError where it cannot be written.
     """
-    path = kept_file(session.scan)
+    path = stored_file(session.scan)
     if session.document.made not in _made_aside(path):
         session.save(_free_aside(path))
 
@@ -289,10 +289,10 @@ def _free_aside(path: Path) -> Path:
 
 
 def _delete_oldest(folder: Path) -> None:
-    """Delete documents beyond MOST_KEPT, those written first, in which a user has made nothing."""
+    """Delete documents beyond MOST_STORED, those written first, in which a user has made nothing."""
 
-    kept_files = [path for path in folder.glob("*.json") if _is_kept_file(path)]
-    for path in sorted(kept_files, key=_age)[MOST_KEPT:]:
+    stored_files = [path for path in folder.glob("*.json") if _is_stored_file(path)]
+    for path in sorted(stored_files, key=_age)[MOST_STORED:]:
         with suppress(InputError, OSError):  # what cannot be read stays
             if not SavedSession.load(path).document.made:
                 path.unlink(missing_ok=True)
@@ -305,6 +305,6 @@ def _age(path: Path) -> float:
     return 0.0
 
 
-def _is_kept_file(path: Path) -> bool:
-    """Whether a file has a name as `kept_file` gives it; what was put aside has not."""
+def _is_stored_file(path: Path) -> bool:
+    """Whether a file has a name as `stored_file` gives it; what was put aside has not."""
     return "." not in path.stem

@@ -211,7 +211,7 @@ def check_declaration(kind: Any, where: str) -> None:
         raise TypeError(f"{where} cannot be kept as {name}: {_KEPT}")
 
 
-def check_kept(value: Any, name: str, known: Any = None) -> None:
+def check_storable(value: Any, name: str, known: Any = None) -> None:
     """Check that a value of a declared dataclass is read again from JSON as it is.
 
     known: one of the same kind that was checked; what its tuples have in common with the value's, as the very
@@ -220,10 +220,10 @@ def check_kept(value: Any, name: str, known: Any = None) -> None:
     """
     if type(known) is type(value):
         try:
-            return _check_kept(_new_in(value, known), name)
+            return _check_storable(_new_in(value, known), name)
         except (TypeError, InputError):
             pass  # told with its place in the whole
-    _check_kept(value, name)
+    _check_storable(value, name)
 
 
 def _new_in(value: Any, known: Any) -> Any:
@@ -238,7 +238,7 @@ def _new_in(value: Any, known: Any) -> Any:
     return replace(value, **new)
 
 
-def _check_kept(value: Any, name: str) -> None:
+def _check_storable(value: Any, name: str) -> None:
     from cattrs.errors import BaseValidationError
 
     try:

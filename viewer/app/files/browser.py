@@ -18,7 +18,7 @@ from ...scan.open import DEMO, is_demo
 from ...scan.timeline import Timeline
 from .. import widgets
 from ..commands import Command
-from ..part import Place, WindowPart
+from ..part import ViewArea, WindowPart
 from ..session import Session, known_as
 from ..window import Window
 from .folder_view import FolderView, date_in_words, size_in_words
@@ -110,7 +110,7 @@ class Browser(WindowPart):
             self._previewer.ask(row.path if row is not None and row.frames else None)
         return self._view.advance() or changed
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare the dialog where it is open."""
         if self._asked:
             imgui.open_popup(_TITLE)
@@ -193,12 +193,12 @@ class Browser(WindowPart):
         if (row := self._view.row) is not None:
             imgui.text_wrapped(printable(row.title))
             imgui.text_wrapped(printable(self._previewer.words))
-            told = [size_in_words(row.size), date_in_words(row.changed, "%Y-%m-%d %H:%M")]
-            widgets.faint(", ".join(filter(None, told)))
+            shown = [size_in_words(row.size), date_in_words(row.changed, "%Y-%m-%d %H:%M")]
+            widgets.faint(", ".join(filter(None, shown)))
 
     def _draw_known(self) -> None:
         """Declare the places to look in, and the lists of what can be opened at once, wherever it is."""
-        self._view.draw_places()
+        self._view.draw_known_folders()
         is_open = self.session.scan == DEMO
         if imgui.selectable(f"{icons.ICON_FA_CUBE}  Demo scan###Demo scan", is_open)[0]:
             self._open_known(DEMO)
@@ -235,8 +235,8 @@ class Browser(WindowPart):
         left = imgui.get_content_region_avail().x - room
         imgui.align_text_to_frame_padding()
         waits = self._asks_for is not None
-        told = f"Opening {printable(title(self._asks_for))} ..." if self._asks_for is not None else _HINT
-        imgui.text_disabled(widgets.fitted(told, left - gap))
+        shown = f"Opening {printable(title(self._asks_for))} ..." if self._asks_for is not None else _HINT
+        imgui.text_disabled(widgets.fitted(shown, left - gap))
         imgui.same_line(imgui.get_cursor_start_pos().x + left)
         imgui.begin_disabled(row is None or waits)
         if imgui.button(texts[0]) and row is not None:

@@ -82,12 +82,12 @@ class Changes(WindowPart):
         """Offer to read the scan anew. new: how many files it has more."""
         scan = self.session.scan
         choices = {"Reload": lambda: self.open_scan(scan)}
-        told = (
+        text = (
             f"The scan has {new} more files on disk."
             if new > 0
             else "Files of the scan have changed on disk."
         )
-        self.note_of_scan(Offer(told.replace("1 more files", "1 more file"), choices, "changes"))
+        self.note_of_scan(Offer(text.replace("1 more files", "1 more file"), choices, "changes"))
 
 
 def _stamp(path: Path) -> _Stamp:

@@ -15,7 +15,7 @@ from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed
 from ...task import Task, in_background
 from .. import widgets
-from .places import KnownPlace, known_places
+from .known_folders import KnownFolder, known_folders
 
 _ICON_ROOM, _COUNT_ROOM, _DATE_ROOM = 1.6, 5.5, 5.5  # in heights of the font
 _NAME_ROOM = 7.0  # that a name has at least, before the columns beside it
@@ -53,7 +53,7 @@ class FolderView:
         """take: uses a path that the user has picked or typed, and that is no folder to go into. choose: is
         told which row the user has moved to. nothing: the words on a folder without rows. filters: whether
         letters that are typed narrow the rows."""
-        self._list_folder, self._take_path, self._told = list_folder, take, choose
+        self._list_folder, self._take_path, self._on_choice = list_folder, take, choose
         self._nothing, self._filters = nothing, filters
         self.folder = working_folder()
         self.refusal = ""
@@ -61,8 +61,8 @@ class FolderView:
         self.chosen_at = 0.0
         self._all: list[Listed] = []  # in the folder
         self._rows: list[Listed] = []  # those whose names have the filter in them
-        self._places: list[KnownPlace] = []
-        self._looking: Future[list[KnownPlace]] | None = None
+        self._known: list[KnownFolder] = []
+        self._looking: Future[list[KnownFolder]] | None = None
         self._problem: str | None = None
         self._listing: Future[list[Listed]] | None = None
         self._chosen = 0  # row
@@ -77,14 +77,14 @@ class FolderView:
 
     def show(self, folder: Path, select: str = "") -> None:
         """Show a folder in a dialog that opens. select: the path to choose in it."""
-        self._looking = in_background(Task("Looking for disks"), known_places)
+        self._looking = in_background(Task("Looking for disks"), known_folders)
         self.go(folder, select)
 
     def advance(self) -> bool:
         """Take in the places and the folder's list; whether that has come."""
         if self._looking is not None and self._looking.done():
             looking, self._looking = self._looking, None
-            self._places = [] if looking.exception() else looking.result()
+            self._known = [] if looking.exception() else looking.result()
         return self._take_list()
 
     def _take_list(self) -> bool:
@@ -175,7 +175,7 @@ class FolderView:
 
     def _move(self, number: int, scroll: bool = False) -> None:
         self._choose(number, scroll)
-        self._told(self._rows[number])
+        self._on_choice(self._rows[number])
 
     # --- widgets ----------------------------------------------------------------------
 
@@ -199,21 +199,21 @@ class FolderView:
         if self.refusal:
             imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(self.refusal)}")
 
-    def draw_places(self) -> None:
+    def draw_known_folders(self) -> None:
         """Declare the places to look in."""
         imgui.text_disabled("Places")
-        for place in self._places:
-            label = widgets.labelled(f"{place.icon}  {place.title}", place.title)
-            if imgui.selectable(label, place.folder == self.folder)[0]:
-                self.go(place.folder)
-            widgets.tooltip(printable(str(place.folder)))
+        for known in self._known:
+            label = widgets.labelled(f"{known.icon}  {known.title}", known.title)
+            if imgui.selectable(label, known.folder == self.folder)[0]:
+                self.go(known.folder)
+            widgets.tooltip(printable(str(known.folder)))
 
     def draw_rows(self) -> None:
         """Declare the rows, in a window that scrolls."""
         if not self._rows:
             nothing = f"No name contains '{self.filter}'." if self._all else self._nothing
-            told = "Reading ..." if self._listing else self._problem or nothing
-            imgui.text_wrapped(printable(told))
+            shown = "Reading ..." if self._listing else self._problem or nothing
+            imgui.text_wrapped(printable(shown))
             return
         clipper = imgui.ListClipper()
         clipper.begin(len(self._rows))

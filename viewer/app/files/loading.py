@@ -13,7 +13,7 @@ from ...files import printable
 from ...scan.times import frame_in_words
 from ...task import Task
 from .. import widgets
-from ..part import Place, WindowPart
+from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
 from ..scene.viewport import Viewport
 from ..session import Session
@@ -79,7 +79,7 @@ class Loading(WindowPart):
         doing = "Preparing" if is_read else "Loading"
         return Awaited(f"{doing} {frame_in_words(self.session.index)}", task)
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare it in the middle of the view."""
         if self.awaited is None:
             return

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from ...backends import backend
-from ...document.saved_session import SavedSession, kept
+from ...document.saved_session import SavedSession, stored
 from ...errors import Scan4DError
 from ...scan.open import DEMO, open_scan
 from ...scan.pose import Pose
@@ -20,7 +20,7 @@ from ..playing.playback import Playback
 from ..session import Session, known_as
 from ..window import Window
 from .opening import Opened, Opening, find_facts
-from .same_content import offer_of_change, offer_of_kept
+from .same_content import offer_of_change, offer_of_stored
 from .scans import title
 
 log = logging.getLogger(__name__)
@@ -66,7 +66,7 @@ class Opener(WindowPart):
         """
         self.notices.end("opening")
         left = self.session.left(scan)
-        find = (lambda: find_kept(scan, self.up)) if left is None else lambda: left
+        find = (lambda: find_stored(scan, self.up)) if left is None else lambda: left
         self.job.start(scan, title(scan), find, lambda: open_scan(scan, self.unit, self.fps), session)
 
     def advance(self, now: float) -> None:
@@ -108,7 +108,7 @@ class Opener(WindowPart):
             self.notices.tell_of_scan(problem)
         self._check(session or left)
         if session is None and not (left and left.document.made):
-            self._look_for_kept()
+            self._look_for_stored()
         self._messages_read = 0
         self.window.title = f"{timeline.name} - Scan4D"
 
@@ -136,11 +136,11 @@ class Opener(WindowPart):
             scan, found = self.session.scan, self.session.hash_found
             self.tell_later(partial(offer_of_change, saved, found, partial(self._begin_anew, scan)))
 
-    def _look_for_kept(self) -> None:
+    def _look_for_stored(self) -> None:
         """Offer what is kept of the open scan's files under another name, as soon as it is found."""
         scan = known_as(self.session.scan)
         use = partial(self.open_with, scan=self.session.scan)
-        self.tell_later(partial(offer_of_kept, scan, self.session.hash_found, use))
+        self.tell_later(partial(offer_of_stored, scan, self.session.hash_found, use))
 
     def _begin_anew(self, scan: str) -> None:
         """Leave aside what the user made on other files than those of a scan, where it is still open."""
@@ -148,7 +148,7 @@ class Opener(WindowPart):
             return
         self.abandon()
         self.session.change("Start without the saved changes", bookmarks=(), parts={}, unread={})
-        self._look_for_kept()
+        self._look_for_stored()
 
     def _pass_on_messages(self) -> None:
         """Report what the timeline has to say.
@@ -177,8 +177,8 @@ class Opener(WindowPart):
         self.job.cancel()
 
 
-def find_kept(scan: str, up: str | None) -> SavedSession | None:
+def find_stored(scan: str, up: str | None) -> SavedSession | None:
     """Find what is kept of a scan. up: the up axis that the command line states. Raises InputError where that
     is damaged."""
-    found = kept(known_as(scan))
+    found = stored(known_as(scan))
     return found if found is None or up is None else replace(found, document=found.document.with_up(up))

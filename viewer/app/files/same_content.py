@@ -9,7 +9,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from ...document.saved_session import SavedSession, kept_elsewhere, set_aside
+from ...document.saved_session import SavedSession, set_aside, stored_elsewhere
 from ...errors import InputError
 from ...files import printable
 from ..notices import Offer
@@ -17,12 +17,12 @@ from ..notices import Offer
 _ABOUT = "kept"  # what these offers are about: one takes the place of the other
 
 
-def offer_of_kept(scan: str, hash: Future[str | None], use: Callable[[SavedSession], object]) -> str:
+def offer_of_stored(scan: str, hash: Future[str | None], use: Callable[[SavedSession], object]) -> str:
     """An offer to use what is kept of the same files under another name; empty where nothing is.
 
     Waits for the hash. scan: its path from the root, or "demo". use: takes what the user chooses.
     """
-    found = kept_elsewhere(scan, found_hash) if (found_hash := hash.result()) else []
+    found = stored_elsewhere(scan, found_hash) if (found_hash := hash.result()) else []
     if not found:
         return ""
     named = [f"{printable(each.scan)} ({_made(each)})" for each in found]

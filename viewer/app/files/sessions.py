@@ -14,7 +14,7 @@ from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
 from ..commands import Command
 from ..notices import Problem
-from ..part import Place, WindowPart
+from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
 from ..save_dialog import SaveDialog
 from ..session import Session, known_as, named_like
@@ -100,7 +100,7 @@ class Sessions(WindowPart):
         else:
             self.open_scan(scan, session)
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare the dialog that saves."""
         self.saving.draw()
 

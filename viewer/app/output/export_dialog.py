@@ -13,7 +13,7 @@ from ...output.export import numbered
 from ...output.legend import Marks
 from ...params import describe
 from .. import widgets
-from ..part import Place, WindowPart
+from ..part import ViewArea, WindowPart
 from ..window import Window
 from .export_plan import AS_SHOWN, EXR, FRAMES, MP4, PNG, TURNTABLE, VIEW, Choices
 from .exporting import Exporting
@@ -46,7 +46,7 @@ class ExportDialog(WindowPart):
     exporting: Exporting
     window: Window
 
-    def dialog(self, view: Place) -> None:
+    def dialog(self, view: ViewArea) -> None:
         """Declare the dialogs that are open."""
         _draw(self.exporting, self.window.close)
 
@@ -60,7 +60,7 @@ def _draw(exporting: Exporting, quit: Callable[[], None]) -> None:
             choices = _edit_size(choices, exporting.size, problems)
             choices = _edit_quality(choices, exporting.quality)
             marks = _edit_marks(exporting.marks, choices)
-            choices, asks = _edit_place(choices, problems)
+            choices, asks = _edit_folder(choices, problems)
             exporting.change(choices, marks)
             _draw_end(exporting, can=not exporting.problems())
             if asks:
@@ -154,7 +154,7 @@ def _edit_marks(marks: Marks, choices: Choices) -> Marks:
     return marks
 
 
-def _edit_place(choices: Choices, problems: dict[str, str]) -> tuple[Choices, bool]:
+def _edit_folder(choices: Choices, problems: dict[str, str]) -> tuple[Choices, bool]:
     """Declare where the files go; the choices, and whether the user wants to go through folders."""
     widgets.label("Anonymise (no names, paths)", _HELP["anonymous"])
     imgui.begin_disabled(choices.format == MP4)

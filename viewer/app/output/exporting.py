@@ -156,7 +156,7 @@ class Exporting(WindowPart):
             self.replaced = [] if self.own else there
             return
         self.is_open, self.replaced = False, []
-        pivot, place = self.session.document.pivot, self.session.laid.place
+        pivot, place = self.session.document.pivot, self.session.laid.world_from_pose
         recording = export_plan.recording(
             choices, shown, self.marks, timeline.times, pivot, place, self.drawn
         )

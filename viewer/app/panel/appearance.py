@@ -65,16 +65,16 @@ def _draw(
     is_here = drawable(look, names, found) == look
     drawn_by, params = session.document.chosen(pose)
     idle = idle_parameters(look, pose, is_here, _why_unlit(look, drawn_by, params, pose))
-    told = _in_unit(look, factor)
+    displayed = _in_unit(look, factor)
     shown = shown and (factor * shown[0], factor * shown[1])
     edited = widgets.edit(
-        told, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
+        displayed, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
         dict(zip(("low", "high"), shown or (), strict=False)), idle,
         {"range": partial(_edit_range, shown), "background": _edit_background}, "More appearance options",
     )  # fmt: skip
     ends = _in_unit(edited, 1 / factor)
-    low = look.low if edited.low == told.low else ends.low  # what is not edited stays to the last bit
-    high = look.high if edited.high == told.high else ends.high
+    low = look.low if edited.low == displayed.low else ends.low  # what is not edited stays to the last bit
+    high = look.high if edited.high == displayed.high else ends.high
     rendering.edit_look(replace(edited, low=low, high=high))
     imgui.begin_disabled(rendering.is_default)
     if ui.row("Reset appearance").button():

@@ -115,7 +115,7 @@ def _expected(choice: Choice) -> str:
 def _draw_curve(comparison: Comparison, choice: Choice) -> None:
     """Plot the error of all ways over their time, the bound as a line; the mouse tells which is which."""
     candidates = sorted(comparison.candidates, key=lambda each: each.expected.ms)
-    times, errors = (np.array(row) for row in zip(*map(_place, candidates), strict=True))
+    times, errors = (np.array(row) for row in zip(*map(_position, candidates), strict=True))
     goal, em = comparison.goal, imgui.get_font_size()
     text = imgui.get_style_color_vec4(imgui.Col_.text)
     accent = imgui.get_style_color_vec4(imgui.Col_.check_mark)
@@ -141,11 +141,11 @@ def _draw_curve(comparison: Comparison, choice: Choice) -> None:
     pointed = _pointed(candidates, _REACH * em) if imgui.is_window_hovered() else None
     implot.end_plot()
     if pointed is not None:
-        time, error = _place(pointed)
+        time, error = _position(pointed)
         imgui.set_tooltip(f"{way_in_words(pointed.way)}\n{time:.3g} ms, error {error:.2g} px")
 
 
-def _place(candidate: Candidate) -> tuple[float, float]:
+def _position(candidate: Candidate) -> tuple[float, float]:
     return candidate.expected.ms, candidate.expected.error
 
 
@@ -154,7 +154,7 @@ def _pointed(candidates: list[Candidate], reach: float) -> Candidate | None:
     mouse = imgui.get_mouse_pos()
 
     def distance(each: Candidate) -> float:
-        at = implot.plot_to_pixels(*_place(each))
+        at = implot.plot_to_pixels(*_position(each))
         return math.hypot(at.x - mouse.x, at.y - mouse.y)
 
     nearest = min(candidates, key=distance)

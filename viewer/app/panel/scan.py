@@ -97,8 +97,8 @@ class ScanSection(WindowPart):
     def _draw_unit(self, pose: Pose) -> None:
         """Declare what chooses the unit of length, a guess where nobody has told it, and what lengths are
         shown in."""
-        told, document = self.playback.timeline.unit, self.session.document
-        own = "not set" if told == UNKNOWN_UNIT else f"{told} (from file)"
+        stated, document = self.playback.timeline.unit, self.session.document
+        own = "not set" if stated == UNKNOWN_UNIT else f"{stated} (from file)"
         names = [*UNIT_WORDS, *([document.unit] if document.unit and document.unit not in UNIT_WORDS else [])]
         titles = {_OWN: own} | {name: UNIT_WORDS.get(name, name) for name in names}
         widgets.label(
@@ -107,7 +107,7 @@ class ScanSection(WindowPart):
         )
         chosen = widgets.combo("unit", document.unit or _OWN, list(titles), titles)
         guess = guess_unit(self.steering.bounds(pose), document.look.up)
-        if told == UNKNOWN_UNIT and document.unit is None and guess is not None:
+        if stated == UNKNOWN_UNIT and document.unit is None and guess is not None:
             widgets.label("")
             if imgui.button(widgets.labelled(f"Set to {_PLURALS[guess[0]]}?", "accept"), ImVec2(-1, 0)):
                 chosen = guess[0]

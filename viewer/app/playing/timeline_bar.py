@@ -66,9 +66,9 @@ class TimelineBar(WindowPart):
         several = len(self.playback.timeline) > 1
         em, gap = imgui.get_font_size(), imgui.get_style().item_spacing.x
         button = widgets.ICON_WIDTH * imgui.get_frame_height() + gap
-        place = _widest_place(self.playback) + em
+        time_width = _widest_time(self.playback) + em
         room = imgui.get_content_region_avail().x - _STEPS * button - _SHORTEST_TRACK * em
-        has_pace = room > _PACES * button + _SPEED_WIDTH * em + gap + place
+        has_pace = room > _PACES * button + _SPEED_WIDTH * em + gap + time_width
         imgui.begin_disabled(not several)
         self._draw_steps()
         if has_pace:
@@ -76,8 +76,8 @@ class TimelineBar(WindowPart):
         else:
             self._draw_list_of_pace()
         imgui.end_disabled()
-        if has_pace or room > button + place:
-            _draw_place(self.playback, place)
+        if has_pace or room > button + time_width:
+            _draw_time(self.playback, time_width)
         report = _report(self.playback) if self.playback.player.playing else ""
         # Its width stays while it says nothing: the track must not move under the mouse.
         room = (
@@ -191,23 +191,23 @@ class TimelineBar(WindowPart):
             imgui.end_tooltip()
 
 
-def _draw_place(playback: Playback, width: float) -> None:
+def _draw_time(playback: Playback, width: float) -> None:
     """Write time and frame, in a width that does not change while playing."""
     timeline, index = playback.timeline, playback.session.index
     left = imgui.get_cursor_pos_x()
     imgui.align_text_to_frame_padding()
-    imgui.text(_place(timeline.times[index], index, len(timeline)))
+    imgui.text(_time_and_frame(timeline.times[index], index, len(timeline)))
     widgets.tooltip(timeline.label(index))
     imgui.same_line(left + width)
 
 
-def _widest_place(playback: Playback) -> float:
+def _widest_time(playback: Playback) -> float:
     times, count = playback.timeline.times, len(playback.timeline)
-    ends = (_place(time, count - 1, count) for time in (times[0], times[-1]))
+    ends = (_time_and_frame(time, count - 1, count) for time in (times[0], times[-1]))
     return max(imgui.calc_text_size(text).x for text in ends)
 
 
-def _place(time: float, index: int, count: int) -> str:
+def _time_and_frame(time: float, index: int, count: int) -> str:
     return f"{time:.2f} s    {index + 1}/{count}"
 
 
@@ -307,12 +307,12 @@ def beside(
 ) -> float:
     """Move a text aside as little as needed; returns where it begins. left, wide: of the text. taken: from
     where to where it must not be. first, last: of the room for it."""
-    places = [left, *(to for _, to in taken), *(start - wide for start, _ in taken)]
+    starts = [left, *(to for _, to in taken), *(start - wide for start, _ in taken)]
     free = [
-        place for place in (min(max(place, first), last - wide) for place in places)
-        if all(place + wide <= start or to <= place for start, to in taken)
+        edge for edge in (min(max(edge, first), last - wide) for edge in starts)
+        if all(edge + wide <= start or to <= edge for start, to in taken)
     ]  # fmt: skip
-    return min(free, key=lambda place: abs(place - left), default=min(max(left, first), last - wide))
+    return min(free, key=lambda edge: abs(edge - left), default=min(max(left, first), last - wide))
 
 
 def _pointed(words: list[str], room: float) -> str:

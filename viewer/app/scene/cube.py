@@ -60,7 +60,7 @@ class OrientationCube(WindowPart):
         one. size: of the view. is_drawn: whether the cube is.
         """
         document, steering = self.session.document, self.steering
-        where, camera = cube_place(size.x, size.y, imgui.get_font_size()), document.camera
+        where, camera = cube_position(size.x, size.y, imgui.get_font_size()), document.camera
         self.under_mouse = None
         if camera is None or seen is None or where is None or not is_drawn:
             self.is_held = steering.is_turned = False
@@ -91,7 +91,7 @@ class OrientationCube(WindowPart):
 
     def draw(self, seen: Camera | None, size: ImVec2) -> None:
         """Draw the cube over the view in the current ImGui window. seen, size: as for `take_mouse`."""
-        document, where = self.session.document, cube_place(size.x, size.y, imgui.get_font_size())
+        document, where = self.session.document, cube_position(size.x, size.y, imgui.get_font_size())
         if seen is None or where is None:
             return
         x, y, half = where
@@ -102,7 +102,7 @@ class OrientationCube(WindowPart):
     COMMANDS = (Command("cube", "Orientation cube", toggle, is_on=lambda cube: cube.is_shown),)
 
 
-def cube_place(width: float, height: float, em: float) -> tuple[float, float, float] | None:
+def cube_position(width: float, height: float, em: float) -> tuple[float, float, float] | None:
     """Centre from the view's upper left corner, and half an edge; None in a view that is too small.
 
     width, height: of the view. em: the font's height.

@@ -77,15 +77,15 @@ class ViewMarks(WindowPart):
         if camera is None or request is None or surface is None or not self.viewport.is_there:
             return
         pose, scale, count = request.pose, self.playback.scale, len(self.playback.timeline)
-        told = Legend(
+        legend = Legend(
             self.shown, camera, surface.look, scale.unit, pose.index, count, float(pose.time),
             self.ranging.words(), factor=scale.factor,
         )  # fmt: skip
         corner = imgui.get_window_pos()
         canvas = _View(corner)
-        self.boxes = marks.draw(canvas, (size.x, size.y), told, surface.color_range, surface.value_kind)
+        self.boxes = marks.draw(canvas, (size.x, size.y), legend, surface.color_range, surface.value_kind)
         if self.shown.scale_bar and self.steering.gesture is None and imgui.is_window_hovered():
-            left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), told)
+            left, top, right, bottom = marks.scale_bar_box(canvas, (size.x, size.y), legend)
             if imgui.is_mouse_hovering_rect(corner + ImVec2(left, top), corner + ImVec2(right, bottom)):
                 imgui.set_tooltip(_scale_bar_help(self.steering.is_orthographic))
 

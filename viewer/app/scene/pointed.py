@@ -34,7 +34,8 @@ class Pointer(WindowPart):
     def __post_init__(self) -> None:
         self.picked: Picked | None = None
         self.words: list[str] = []
-        self._told: tuple[Scale, bool] | None = None  # the unit of the words, and whether they have details
+        # The unit of the words, and whether they have details:
+        self._displayed: tuple[Scale, bool] | None = None
 
     def toggle_details(self) -> None:
         """Switch whether the words have all that is known of the point."""
@@ -43,10 +44,10 @@ class Pointer(WindowPart):
     def point_at(self, pixel: tuple[int, int] | None) -> None:
         """Take in which pixel of the view is under the mouse, None where the mouse is elsewhere."""
         picked = self.viewport.probe.pick(pixel) if pixel else None
-        told = self.playback.scale, self.has_details
-        if picked is self.picked and told == self._told:
+        displayed = self.playback.scale, self.has_details
+        if picked is self.picked and displayed == self._displayed:
             return
-        self.picked, self.words, self._told = picked, [], told
+        self.picked, self.words, self._displayed = picked, [], displayed
         if picked is not None and (request := self.viewport.request) is not None:
             pose = request.pose
             frame = f"{frame_in_words(pose.index)}/{len(self.playback.timeline)}"

@@ -295,7 +295,7 @@ class Steering(WindowPart):
     def _center(self, pose: Pose) -> NDArray[np.float64]:
         """The middle of a subject, (3,) in the world: far outliers do not move it."""
         middle = np.median(pose.sample, axis=0) + pose.origin
-        return self.session.laid.place(pose.index).points(middle)
+        return self.session.laid.world_from_pose(pose.index).points(middle)
 
     def begin_scan(self, timeline: Timeline) -> None:
         """Take in that another scan is shown from now on."""

@@ -10,7 +10,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...geometry import AXES
 from .. import widgets
-from .cube import OrientationCube, cube_place
+from .cube import OrientationCube, cube_position
 from .steering import Steering
 
 _MENU = "turn upright"
@@ -24,7 +24,7 @@ def declare(cube: OrientationCube, up: str, size: ImVec2, pick: Callable[[], obj
     up: the scan's. size: of the view. pick: has the next click tell what is up.
     """
     em = imgui.get_font_size()
-    where = cube_place(size.x, size.y, em)
+    where = cube_position(size.x, size.y, em)
     if where is None:
         return False
     text = f"Up: {up if up in AXES else 'custom'} {icons.ICON_FA_CARET_DOWN}"

@@ -75,7 +75,7 @@ class SceneView(WindowPart):
 
     def draw(self) -> None:
         """Declare the view in the current ImGui window, which it fills."""
-        size, told = imgui.get_content_region_avail(), self.failures.told
+        size, reported = imgui.get_content_region_avail(), self.failures.reported
         cube, has_cube = self.cube, self.cube.is_shown and not self.full_view.is_on
         camera = self.session.document.camera and self.glide.seen(
             self.session.document.camera
@@ -89,17 +89,17 @@ class SceneView(WindowPart):
         if cube.under_mouse is not None or on_menu:
             imgui.set_next_item_allow_overlap()  # so that the view is not hovered there
         imgui.invisible_button("view", size, _BUTTONS)
-        with told("Finding what is under the mouse"):
+        with reported("Finding what is under the mouse"):
             self.pointer.point_at(self._pixel() if imgui.is_item_hovered() else None)
         if self.session.document.camera is not None and self.playback.pose is not None:
-            with told("Moving the view"):
+            with reported("Moving the view"):
                 self._move(self.playback.pose, size)
-            with told("Tools"):
+            with reported("Tools"):
                 self._serve_tools(size)
-        with told("The cube"):
+        with reported("The cube"):
             if has_cube:
                 cube.draw(camera, size)
-        with told("Scale bar and colour bar"):
+        with reported("Scale bar and colour bar"):
             self.marks.draw(size)
         text = printable(self.words_over() or "")
         if self.naming.shown is not None:

@@ -66,7 +66,7 @@ class Paths:
         if wanted == self._laid:
             return False
         self._laid = wanted
-        self._context.lay(place=None if still is None else lambda index: still[index] or STILL)
+        self._context.lay(motion=None if still is None else lambda index: still[index] or STILL)
         return True
 
     def trajectories(self, settings: Settings, choices: CurveChoices) -> dict[str, Trajectory]:

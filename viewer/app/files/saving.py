@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from ...document.keeper import Keeper
-from ...document.saved_session import SavedSession, keep
+from ...document.saved_session import SavedSession, store
+from ...document.saver import Saver
 from ...folders import user_folder
 from .. import settings
 from ..notices import Problem
@@ -21,11 +21,11 @@ _EVERY_DOCUMENT = 0.5  # the same in the document
 
 
 @dataclass(eq=False)
-class Keeping(WindowPart):
+class Saving(WindowPart):
     """Saves what has changed, beside the window. stored: the settings that their file holds already."""
 
-    name = "keeping"
-    doing = "Keeping"
+    name = "saving"
+    doing = "Saving what has changed"
     turn = 10
     session: Session
     playback: Playback
@@ -35,9 +35,9 @@ class Keeping(WindowPart):
 
     def __post_init__(self) -> None:
         save = partial(settings.save, path=user_folder() / settings.FILE)
-        self._settings = Keeper("Settings", save, self.stored, _EVERY)
-        self._document: Keeper[SavedSession] = Keeper(
-            "Changes of scans", keep, None, _EVERY_DOCUMENT, lambda session: session.scan
+        self._settings = Saver("Settings", save, self.stored, _EVERY)
+        self._document: Saver[SavedSession] = Saver(
+            "Changes of scans", store, None, _EVERY_DOCUMENT, lambda session: session.scan
         )
         self._index = 0
 
@@ -56,7 +56,7 @@ class Keeping(WindowPart):
     def leave_scan(self) -> None:
         """Save the document of the open scan before another one is shown."""
         if self.session.document.camera is not None:
-            self._document.keep(self._saved())
+            self._document.note(self._saved())
 
     def finish(self) -> None:
         """Save all, and wait for it."""

@@ -13,7 +13,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 
 
 @dataclass(frozen=True)
-class KnownPlace:
+class KnownFolder:
     """A folder by the name that users know it by. icon: beside its name."""
 
     title: str
@@ -21,19 +21,19 @@ class KnownPlace:
     folder: Path
 
 
-def known_places() -> list[KnownPlace]:
+def known_folders() -> list[KnownFolder]:
     """Home, desktop, documents and downloads where they are there, then disks. It may wait for a disk."""
     import platformdirs
 
     own = [
-        KnownPlace("Home", icons.ICON_FA_HOUSE, Path(os.path.expanduser("~"))),
-        KnownPlace("Desktop", icons.ICON_FA_DISPLAY, platformdirs.user_desktop_path()),
-        KnownPlace("Documents", icons.ICON_FA_FILE_LINES, platformdirs.user_documents_path()),
-        KnownPlace("Downloads", icons.ICON_FA_DOWNLOAD, platformdirs.user_downloads_path()),
+        KnownFolder("Home", icons.ICON_FA_HOUSE, Path(os.path.expanduser("~"))),
+        KnownFolder("Desktop", icons.ICON_FA_DISPLAY, platformdirs.user_desktop_path()),
+        KnownFolder("Documents", icons.ICON_FA_FILE_LINES, platformdirs.user_documents_path()),
+        KnownFolder("Downloads", icons.ICON_FA_DOWNLOAD, platformdirs.user_downloads_path()),
     ]
-    disks = [KnownPlace(_disk_title(disk), icons.ICON_FA_HARD_DRIVE, disk) for disk in _disks()]
-    there = [place for place in own + disks if os.path.isdir(place.folder)]
-    return list({place.folder: place for place in reversed(there)}.values())[::-1]  # the first of each folder
+    disks = [KnownFolder(_disk_title(disk), icons.ICON_FA_HARD_DRIVE, disk) for disk in _disks()]
+    there = [known for known in own + disks if os.path.isdir(known.folder)]
+    return list({known.folder: known for known in reversed(there)}.values())[::-1]  # the first of each folder
 
 
 def _disk_title(disk: Path) -> str:

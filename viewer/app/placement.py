@@ -17,7 +17,7 @@ Pixels = Annotated[int, Kind("a place on screens", lambda value: abs(value) < _F
 
 
 @dataclass(frozen=True)
-class Place:
+class WindowPlacement:
     """A window without its frame, in screen coordinates; where it goes back to while it is maximised."""
 
     left: Pixels
@@ -27,11 +27,11 @@ class Place:
     maximised: bool = False
 
 
-def reachable(place: Place, screens: Sequence[Area]) -> Place | None:
+def reachable(placement: WindowPlacement, screens: Sequence[Area]) -> WindowPlacement | None:
     """The place, no larger than its screen; None where no screen shows enough of its upper edge."""
     for left, top, width, height in screens:
-        visible = min(place.left + place.width, left + width) - max(place.left, left)
-        if visible >= _GRIP and top <= place.top <= top + height - _GRIP:
-            fitted = (max(_LEAST, min(place.width, width)), max(_LEAST, min(place.height, height)))
-            return Place(place.left, place.top, *fitted, place.maximised)
+        visible = min(placement.left + placement.width, left + width) - max(placement.left, left)
+        if visible >= _GRIP and top <= placement.top <= top + height - _GRIP:
+            fitted = (max(_LEAST, min(placement.width, width)), max(_LEAST, min(placement.height, height)))
+            return WindowPlacement(placement.left, placement.top, *fitted, placement.maximised)
     return None

@@ -20,7 +20,7 @@ class _Failure:
     at: float
 
 
-class Keeper(Generic[T]):
+class Saver(Generic[T]):
     """Saves values on a thread of its own: what has changed, now and then. Nobody waits but in `close`.
 
     What cannot be saved is tried again after pauses that grow, and told once until it was saved.
@@ -59,13 +59,13 @@ class Keeper(Generic[T]):
         self._next_look = now + self._every
         self._take_written(now)
         if not self._writing:
-            self.keep(current())
+            self.note(current())
             for file, failure in self._failures.items():
                 if now >= failure.at:
                     self._write(self._unsaved[file])
         return self._words.pop(0) if self._words else None
 
-    def keep(self, current: T) -> None:
+    def note(self, current: T) -> None:
         """Save a value at once, where it is another one, after what is being written; where its file could
         not be written, when that is tried again."""
         if current != self._last:
@@ -75,13 +75,13 @@ class Keeper(Generic[T]):
 
     def close(self, current: T) -> str | None:
         """Save all, and wait for it. Returns what the user should know, and what went wrong."""
-        self.keep(current)
+        self.note(current)
         self._wait()
         for value in self._unsaved.values():
             self._write(value)
         self._wait()
         self._worker.shutdown()
-        self._words += [self._told(failure.error) for failure in self._failures.values()]
+        self._words += [self._message(failure.error) for failure in self._failures.values()]
         return "\n".join(dict.fromkeys(self._words)) or None
 
     def _write(self, value: T) -> None:
@@ -91,7 +91,7 @@ class Keeper(Generic[T]):
         wait([future for _, future in self._writing])
         self._take_written(0.0)
 
-    def _told(self, error: BaseException) -> str:
+    def _message(self, error: BaseException) -> str:
         return f"{self._what} are not kept: {error}"
 
     def _take_written(self, now: float) -> None:
@@ -105,7 +105,7 @@ class Keeper(Generic[T]):
                 pause = min(2 * former.pause if former else self._every, _LONGEST_PAUSE)
                 self._failures[file] = _Failure(error, pause, now + pause)
                 if former is None:
-                    self._words.append(self._told(error))
+                    self._words.append(self._message(error))
                 continue
             if words := future.result():
                 self._words.append(words)

@@ -6,10 +6,10 @@ from __future__ import annotations
 import threading
 from itertools import count
 
-from viewer.document.keeper import Keeper
+from viewer.document.saver import Saver
 
 
-def finish(keeper: Keeper[int]) -> None:
+def finish(keeper: Saver[int]) -> None:
     """Wait until it has written."""
     for _, future in keeper._writing:
         future.exception()
@@ -17,7 +17,7 @@ def finish(keeper: Keeper[int]) -> None:
 
 def test_it_saves_now_and_then_also_what_goes_on_changing() -> None:
     written: list[int] = []
-    keeper = Keeper("Numbers", written.append, 0, every=3.0)
+    keeper = Saver("Numbers", written.append, 0, every=3.0)
     looks = 0
 
     def current() -> int:
@@ -43,9 +43,9 @@ def test_it_saves_now_and_then_also_what_goes_on_changing() -> None:
 
 def test_closing_saves_only_what_has_changed() -> None:
     written: list[int] = []
-    assert Keeper("Numbers", written.append, 1, 3.0).close(1) is None
+    assert Saver("Numbers", written.append, 1, 3.0).close(1) is None
     assert written == []
-    assert Keeper("Numbers", written.append, 0, 3.0).close(1) is None
+    assert Saver("Numbers", written.append, 0, 3.0).close(1) is None
     assert written == [1]
 
 
@@ -57,18 +57,18 @@ def test_nobody_waits_for_a_slow_disk_and_nothing_is_lost_meanwhile() -> None:
         goes_on.wait()
         written.append(number)
 
-    keeper = Keeper("Numbers", save, 0, every=3.0)
+    keeper = Saver("Numbers", save, 0, every=3.0)
     for number in (1, 2, 3):
         keeper.look(10.0 * number, lambda number=number: number)  # type: ignore[misc]
-    keeper.keep(4)
+    keeper.note(4)
     goes_on.set()
     assert keeper.close(5) is None
     assert written == [1, 4, 5]
 
 
 def test_what_saving_has_to_say_is_told() -> None:
-    keeper = Keeper("Numbers", lambda number: f"{number} is much", 0, every=3.0)
-    keeper.keep(7)
+    keeper = Saver("Numbers", lambda number: f"{number} is much", 0, every=3.0)
+    keeper.note(7)
     finish(keeper)
     assert keeper.look(5.0, lambda: 7) == "7 is much"
     assert keeper.look(10.0, lambda: 7) is None
@@ -79,7 +79,7 @@ def test_what_cannot_be_kept_is_told_once() -> None:
     def fail(number: int) -> None:
         raise OSError("no room")
 
-    keeper = Keeper("Numbers", fail, 0, every=3.0)
+    keeper = Saver("Numbers", fail, 0, every=3.0)
 
     def look(now: float) -> str | None:
         problem = keeper.look(now, lambda: 7)
@@ -111,7 +111,7 @@ class Saved:
     """Looks at a number each three seconds, until it is written."""
 
     def __init__(self, disk: Disk) -> None:
-        self.keeper = Keeper("Numbers", disk.save, None, 3.0, lambda number: number // 10)
+        self.keeper = Saver("Numbers", disk.save, None, 3.0, lambda number: number // 10)
         self.now = 0.0
 
     def look(self, number: int, times: int = 1) -> list[str]:
@@ -146,9 +146,9 @@ def test_each_file_that_cannot_be_written_is_told_and_none_is_forgotten() -> Non
     disk = Disk()
     saved = Saved(disk)
     disk.is_full = True
-    saved.keeper.keep(11)
+    saved.keeper.note(11)
     finish(saved.keeper)
-    saved.keeper.keep(21)  # before anybody looked
+    saved.keeper.note(21)  # before anybody looked
     assert saved.look(21, 4) == ["Numbers are not kept: no room"] * 2
     saved.look(21, 100)
     disk.is_full = False
