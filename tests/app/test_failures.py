@@ -23,7 +23,7 @@ def notes() -> list[str]:
 
 
 @pytest.fixture
-def told(notes: list[str]) -> Failures:
+def failures(notes: list[str]) -> Failures:
     return Failures(notes.append)
 
 
@@ -67,50 +67,50 @@ def widgets(go_wrong: Callable[[], object]) -> None:
     ],
 )
 def test_widgets_that_were_begun_are_ended(
-    told: Failures, notes: list[str], go_wrong: Callable[[], object], capfd: pytest.CaptureFixture[str]
+    failures: Failures, notes: list[str], go_wrong: Callable[[], object], capfd: pytest.CaptureFixture[str]
 ) -> None:
     for _ in range(3):
         imgui.new_frame()
-        with told.told("The panel"):
+        with failures.reported("The panel"):
             widgets(go_wrong)
         imgui.begin("another")
         imgui.text("still there")
         imgui.end()
         imgui.render()  # it would fail were something left open
-    assert (told.count, len(notes)) == (3, 1)
+    assert (failures.count, len(notes)) == (3, 1)
     assert notes[0].startswith("The panel failed")
     assert "\n" not in notes[0]
     assert "Missing" not in "".join(capfd.readouterr()), "not a line for each widget and frame"
 
 
 def test_the_same_is_told_again_after_a_while(
-    told: Failures, notes: list[str], monkeypatch: pytest.MonkeyPatch
+    failures: Failures, notes: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = 100.0
     monkeypatch.setattr(failures.time, "monotonic", lambda: now)
     for seconds in (0, 1, 9, 9, 9):  # it goes on
         now += seconds
-        told.report("Drawing", ValueError("x"))
+        failures.report("Drawing", ValueError("x"))
     assert len(notes) == 1
-    told.report("Measuring", ValueError("x"))
+    failures.report("Measuring", ValueError("x"))
     assert len(notes) == 2
     now += 60
-    told.report("Drawing", ValueError("x"))
+    failures.report("Drawing", ValueError("x"))
     assert len(notes) == 3
 
 
-def test_words_are_for_users(told: Failures, notes: list[str]) -> None:
-    with told.told("Opening"):
+def test_words_are_for_users(failures: Failures, notes: list[str]) -> None:
+    with failures.reported("Opening"):
         raise InputError("has no points", "a.ply", "Use another")
-    with told.told("Drawing"):
+    with failures.reported("Drawing"):
         raise ValueError("of many\n  lines " * 100)
     assert notes[0] == "a.ply: has no points. Use another"
     assert notes[1].startswith("Drawing failed (ValueError: of many lines of many lines")
     assert len(notes[1]) < 300
 
 
-def test_what_ends_the_program_is_not_held_up(told: Failures) -> None:
-    with pytest.raises(KeyboardInterrupt), told.told("Drawing"):
+def test_what_ends_the_program_is_not_held_up(failures: Failures) -> None:
+    with pytest.raises(KeyboardInterrupt), failures.reported("Drawing"):
         raise KeyboardInterrupt
 
 
