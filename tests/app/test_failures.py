@@ -10,7 +10,7 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import ImVec2, imgui
 
-from viewer.app import failures
+from viewer.app import failures as module
 from viewer.app.failures import Failures
 from viewer.app.widgets import edited
 from viewer.errors import InputError
@@ -87,7 +87,7 @@ def test_the_same_is_told_again_after_a_while(
     failures: Failures, notes: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = 100.0
-    monkeypatch.setattr(failures.time, "monotonic", lambda: now)
+    monkeypatch.setattr(module.time, "monotonic", lambda: now)
     for seconds in (0, 1, 9, 9, 9):  # it goes on
         now += seconds
         failures.report("Drawing", ValueError("x"))

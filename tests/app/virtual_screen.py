@@ -412,4 +412,5 @@ def running_app(
     finally:
         process.kill()
         process.wait()
-        process.stdin.close()
+        if process.stdin is not None:
+            process.stdin.close()
