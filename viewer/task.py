@@ -49,7 +49,7 @@ class Task:
 
     @property
     def cancelled(self) -> bool:
-        """Whether it was told to stop."""
+        """Whether the task was cancelled."""
         return self._cancelled
 
     def cancel(self) -> None:
@@ -61,7 +61,7 @@ class Task:
             stop()
 
     def check(self) -> None:
-        """Raise Cancelled where it was told to stop."""
+        """Raise Cancelled if the task was cancelled."""
         if self._cancelled:
             raise Cancelled(self.name)
 
@@ -98,7 +98,7 @@ _current: ContextVar[Task | None] = ContextVar("task", default=None)
 def checkpoint(progress: float | None = None) -> None:
     """Long work calls this now and then, with how far it has come (0..1) where it knows.
 
-    Raises Cancelled where the task that this thread works on was told to stop; without a task it
+    Raises Cancelled where the task that this thread works on was cancelled; without a task it
     does nothing.
     """
     task = _current.get()
@@ -111,7 +111,7 @@ def checkpoint(progress: float | None = None) -> None:
 def announce(what: str) -> None:
     """Say why work takes longer than at other times: the task of this thread bears it as its name.
 
-    It does so until `over` is called. Whoever is `listening` is told as well.
+    It does so until `over` is called. Callbacks of `listening` hear of it as well.
     """
     task = _current.get()
     if task is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,15 +127,20 @@ def uniform_radius(cloud: PointCloud, params: Params) -> float:
     return 1.0 if suffices or not len(cloud) else _RADIUS_PER_SPACING * cloud.remember(typical_spacing)
 
 
-def word_look(
-    pose: Pose, view: View, look: Look, layers: Layers = NO_LAYERS
-) -> tuple[Materials, NDArray[np.uint8], Light]:
-    """Materials, which of them each point is of, (N,), and the light. Raises InputError for a number that
-    the pose has not."""
+class WordLook(NamedTuple):
+    """A look, as code words have it."""
+
+    materials: Materials
+    assigned: NDArray[np.uint8]  # (N,), the material of each point
+    light: Light
+
+
+def word_look(pose: Pose, view: View, look: Look, layers: Layers = NO_LAYERS) -> WordLook:
+    """The look of a pose in code words. Raises InputError for a number that the pose does not have."""
     palette, index = point_materials(pose, view, look, layers)
     lights = word_lights(look, pose.cloud.normals is not None)
     shares = (look.ambient, look.diffuse, look.specular) if lights.is_lit else (0.0, 1.0, 0.0)
-    return Materials.of_palette(palette, *shares), index, lights
+    return WordLook(Materials.of_palette(palette, *shares), index, lights)
 
 
 def word_lights(look: Look, has_normals: bool) -> Light:

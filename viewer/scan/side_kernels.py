@@ -32,10 +32,10 @@ def link(
             if j == i:
                 continue
             if j < i:
-                told = False  # by the other one
+                is_linked = False  # by the other one
                 for n in range(near.shape[1]):
-                    told |= near[j, n] == i
-                if told:
+                    is_linked |= near[j, n] == i
+                if is_linked:
                     continue
             along, along_other, cosine, squared = 0.0, 0.0, 0.0, 0.0
             for axis in range(3):

@@ -159,9 +159,9 @@ def test_masks_are_ordered_by_what_is_known_of_their_nodes() -> None:
             sides = [(x - 1, y, z), (x + 1, y, z), (x, y - 1, z), (x, y + 1, z), (x, y, z - 1), (x, y, z + 1)]
             around = sum((side in there) << bit for bit, side in enumerate(sides))
             rows.append((told.get((x, y, z), 0), around, row))
-        stored = coder.sort(masks, told=True)
+        stored = coder.sort(masks, predicted=True)
         assert stored.tolist() == [int(masks[row]) ^ known for known, _, row in sorted(rows)]
-        stored = coder.sort(masks, told=False)
+        stored = coder.sort(masks, predicted=False)
         assert stored.tolist() == [masks[row] for _, row in sorted(row[1:] for row in rows)]
         coder.descend(masks)
 
@@ -215,16 +215,16 @@ def test_a_pose_stands_alone_where_none_can_tell_it() -> None:
     assert read_header(to_bytes(octree, octree, chain=256))[0].before == 0
 
 
-def test_each_level_is_told_where_that_is_shorter() -> None:
+def test_each_level_is_predicted_where_that_is_shorter() -> None:
     """Coarse levels of other points of the same surface are alike, fine ones are not."""
     stop = Stop(rule="depth", depth=6)
     first, second = (bare(build(ball(3000, seed=seed), stop, CUBE)) for seed in (1, 2))
     alone, told = to_bytes(second), to_bytes(second, first)
     header, plain = read_header(told)[0], read_header(alone)[0]
-    assert header.told & 0b1000
-    assert not header.told >> second.depth - 1
+    assert header.predicted & 0b1000
+    assert not header.predicted >> second.depth - 1
     for level, (one, other) in enumerate(zip(header.levels[1:], plain.levels[1:], strict=True)):
-        assert (one.masks < other.masks) == bool(header.told >> level & 1)
+        assert (one.masks < other.masks) == bool(header.predicted >> level & 1)
     assert_same_geometry(from_bytes(told, first), second)
 
 
@@ -267,7 +267,7 @@ def test_files_of_the_first_version_are_read(name: str) -> None:
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.002, 0.4])
-def test_attributes_are_told_by_the_pose_before(turn: float) -> None:
+def test_attributes_are_predicted_from_the_pose_before(turn: float) -> None:
     """Where octants are the same, and not where parents tell more; back come the same bytes."""
     first, second = (build(ball(4000, turn=angle), cube=CUBE) for angle in (0.0, turn))
     alone, told = to_bytes(second), to_bytes(second, from_bytes(to_bytes(first)))
@@ -278,7 +278,7 @@ def test_attributes_are_told_by_the_pose_before(turn: float) -> None:
         assert np.array_equal(mine.normals, theirs.normals)
     sizes = [sum(each.attributes for each in read_header(data)[0].levels) for data in (told, alone)]
     assert sizes[0] < {0.0: 0.02, 0.002: 0.6, 0.4: 1.001}[turn] * sizes[1]
-    assert bool(read_header(told)[0].told_attributes) == (turn < 0.4)
+    assert bool(read_header(told)[0].predicted_attributes) == (turn < 0.4)
     if turn < 0.4:
         with pytest.raises(InputError, match="depends on the octree before it"):
             from_bytes(told, bare(first))
@@ -292,7 +292,7 @@ def test_only_octants_with_the_same_attributes_tell_them() -> None:
             first, attributes=tuple(Attributes(**{kept: getattr(a, kept)}) for a in first.attributes)
         )
         told = to_bytes(second, of_one)
-        assert not read_header(told)[0].told_attributes
+        assert not read_header(told)[0].predicted_attributes
         assert_same_attributes(from_bytes(told, of_one), second)
 
 
@@ -347,7 +347,7 @@ def test_headers_that_contradict_themselves_are_refused() -> None:
         replace(header, edge=np.nan),
         replace(header, low=np.array([0, np.inf, 0])),
         replace(header, time=np.nan),
-        replace(header, told=1),
+        replace(header, predicted=1),
         replace(header, before=1),
         replace(header, points=header.distinct - 1),
         replace(header, distinct=0),

@@ -142,7 +142,7 @@ def _masks(octree: Octree, previous: Octree | None) -> int:
     coder = MaskCoder(1, previous.masks if previous else ())
     size = 0
     for masks in octree.masks:
-        size += len(coding.pack(coder.sort(masks, told=True)))
+        size += len(coding.pack(coder.sort(masks, predicted=True)))
         coder.descend(masks)
     return size
 

@@ -98,7 +98,7 @@ class PointPattern:
         if not self._is_distinct(sure.information, self._alike):
             return None
         rows = np.where(best.off <= _MATCHED * np.sqrt(self._area), best.rows, -1)
-        return self._told(surface, rows, best.linear)
+        return self._judged(surface, rows, best.linear)
 
     def followed(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
         """The pattern in another frame, where some of its points are known, (n,), others are -1; None where
@@ -111,7 +111,7 @@ class PointPattern:
         place, linear = self._weighted(surface, rows, linear)
         rows = rows.copy()
         fill_pattern(self._offsets, surface.held, linear, place, reach, rows)
-        return self._told(surface, rows, linear)
+        return self._judged(surface, rows, linear)
 
     def _fitted(
         self, surface: MomentSurface, place: Float, linear: Float, search: float
@@ -139,7 +139,7 @@ class PointPattern:
         )
         return place, linear
 
-    def _told(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
+    def _judged(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
         """Drop points that are far off, and compute the covariance of the place from the others."""
         from .pattern_fit_kernels import FREE
 

@@ -129,7 +129,7 @@ class Tracker:
             if is_kept and old:
                 self._tracks[landmark.name] = old._tracks[landmark.name]
             else:
-                self._update(landmark, self._told_frames(landmark))
+                self._update(landmark, self._known_frames(landmark))
         self._whole = sum(part.left for part in self._passes.values())
 
     @property
@@ -324,15 +324,15 @@ class Tracker:
         bound = self.settings.bound_at(self._spacing)
         self._tracks[landmark.name] = track_of(landmark, seen, bound, self._tracks[landmark.name], frames)
 
-    def _told_frames(self, landmark: Landmark) -> Iterable[int]:
+    def _known_frames(self, landmark: Landmark) -> Iterable[int]:
         """The frames of which anything is known of a landmark."""
         count = len(self._timeline)
-        told = {frame for frame in landmark.missing if frame < count}
+        missing = {frame for frame in landmark.missing if frame < count}
         keyed = {key.frame for key in landmark.keys if key.frame < count}
         if not keyed:
             return range(count)  # it was set elsewhere: a gap in all of them
         return (
-            told
+            missing
             | keyed
             | {frame for key in landmark.keys for _, part in self._of_key(key) for frame in part.seen}
         )

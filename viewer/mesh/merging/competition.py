@@ -254,8 +254,8 @@ def _weights(surface: RangeSurface, confident: bool) -> NDArray[np.float64]:
     confidence = surface.view.confidence
     if not confident or confidence is None:
         return facing
-    told = np.nan_to_num(confidence[surface.view.valid()].astype(np.float64), posinf=0)
-    return facing * np.maximum(told, 0)
+    stated = np.nan_to_num(confidence[surface.view.valid()].astype(np.float64), posinf=0)
+    return facing * np.maximum(stated, 0)
 
 
 def _corners_all(points: NDArray[np.bool_], faces: Triangles) -> NDArray[np.bool_]:

@@ -1,4 +1,4 @@
-"""Range views of one moment made into one surface, and what is to be told of it."""
+"""Range views of one moment made into one surface, and what Scan4D reports of it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class MergedViews:
         return {pair: drift for pair, drift in pairs.items() if drift.is_significant}
 
     def facts(self) -> dict[str, Any]:
-        """All of it as plain values: lengths in scan units, angles in degrees; None: cannot be told."""
+        """All of it as plain values: lengths in scan units, angles in degrees; None: unknown."""
         names, competition = [view.name for view in self.given], self.competition
         before, after = competition.overlap
         return {

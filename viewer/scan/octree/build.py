@@ -131,7 +131,7 @@ def sort_points(positions: NDArray[np.float32], grid: Grid) -> Sorted:
 
 
 def _distinct(positions: NDArray[np.float32], rows: NDArray[np.uint32], levels: NDArray[np.uint8]) -> int:
-    """How many different positions there are; most are told apart by their cells alone."""
+    """How many different positions there are; the cells alone distinguish most."""
     from . import sort_kernels
 
     crowds = np.empty((len(rows) // sort_kernels.CROWD + 1, 2), np.int64)

@@ -59,22 +59,22 @@ class MaskCoder:
         self._before = before
         self.counterparts = np.zeros(root, np.int32)  # the same octants in the tree before, -1: there is none
 
-    def sort(self, masks: Bytes, told: bool) -> Bytes:
-        """Order the masks of this level as they are stored, (n,). told: by the tree before."""
-        known, order = self._known(told)
+    def sort(self, masks: Bytes, predicted: bool) -> Bytes:
+        """Order the masks of this level as they are stored, (n,). predicted: by the tree before."""
+        known, order = self._known(predicted)
         return (masks ^ known)[order]
 
-    def restore(self, stored: Bytes, told: bool) -> Bytes:
+    def restore(self, stored: Bytes, predicted: bool) -> Bytes:
         """The masks of this level, (n,), from what is stored of it."""
-        known, order = self._known(told)
+        known, order = self._known(predicted)
         masks = np.empty_like(stored)
         masks[order] = stored
         return masks ^ known
 
-    def _known(self, told: bool) -> tuple[Bytes, NDArray[np.intp]]:
+    def _known(self, predicted: bool) -> tuple[Bytes, NDArray[np.intp]]:
         """The masks of the same octants in the tree before, 0 for none; the order of what is stored."""
         known = np.zeros(len(self.counterparts), np.uint8)
-        if told and self._before:
+        if predicted and self._before:
             known = np.append(self._before[0], np.uint8(0))[self.counterparts]
         key = known.astype(np.uint16) << np.uint16(6) | self._neighbors.around()
         return known, np.argsort(key, kind="stable")
@@ -127,9 +127,9 @@ def _expected(above: Bytes, masks: Bytes, before: Counterparts | None) -> tuple[
     if before is None:
         return expected, siblings
     known = before.nodes[siblings] >= 0
-    told = siblings[known]
-    expected[told] = before.values[before.nodes[told]]
-    return expected, np.concatenate([told, siblings[~known]])
+    predicted = siblings[known]
+    expected[predicted] = before.values[before.nodes[predicted]]
+    return expected, np.concatenate([predicted, siblings[~known]])
 
 
 def sibling_count(masks: Bytes) -> int:

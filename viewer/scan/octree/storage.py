@@ -27,17 +27,17 @@ VERSION = 2
 _VERSIONS = (
     1,
     VERSION,
-)  # that can be read: the first has no strays, and attributes are told by parents alone
+)  # that can be read: the first has no strays, and attributes are predicted from parents alone
 _FREE = 1 << 22  # nodes of any tree: some 300 MB as points
 MOST_BEFORE = 255  # trees that have to be read before one
 
 _PACKED, _COLORS, _NORMALS = 1, 2, 4  # bits of `Header.flags`
 _FIXED = struct.Struct("<4s6BI5d2Q")  # magic, version, flags, before, depth, size of the unit, 0; numbers
 _LEVEL = struct.Struct("<4I")  # see `Level`
-_SECOND = struct.Struct("<5I")  # what version 2 adds: `told_attributes`, and the strays as a `Level`
+_SECOND = struct.Struct("<5I")  # what version 2 adds: `predicted_attributes`, and the strays as a `Level`
 _CHECK = struct.Struct("<I")  # CRC-32 of the header before it
 _MOST_UNIT = 255  # bytes
-_WORTH = 31 / 32  # of the bytes of masks that stand alone: what takes more is not told by another tree
+_WORTH = 31 / 32  # of the bytes of masks that stand alone: what takes more is not predicted from another tree
 _OF_ATTRIBUTES = 1 << 12  # of unpacked to packed: how many nodes there are is bounded by their masks
 _LARGEST = 1e18  # coordinates that a cloud may have
 LARGEST_HEADER = _FIXED.size + _SECOND.size + _MOST_UNIT + (DEEPEST + 1) * _LEVEL.size + _CHECK.size  # bytes
@@ -93,13 +93,14 @@ class Header:
     """The header of a tree, which stands before its levels.
 
     flags: 1: packed, 2: with colours, 4: with normals. before: how many trees have to be read before this
-    one, each told by the one before it; 0: it stands alone. told: bit n: the masks of level n are told by the
-    tree before, told_attributes: its attributes. time: seconds. strays: their entry. Others: see `Octree`.
+    one, each predicted from the one before it; 0: it stands alone. predicted: bit n: the masks of level n are
+    predicted from the tree before; predicted_attributes: its attributes are. time: seconds. strays: their
+    entry. Others: see `Octree`.
     """
 
     flags: int
     before: int
-    told: int
+    predicted: int
     time: float
     low: NDArray[np.float64]
     edge: float
@@ -107,7 +108,7 @@ class Header:
     distinct: int
     unit: str
     levels: tuple[Level, ...]
-    told_attributes: int = 0
+    predicted_attributes: int = 0
     strays: Level = _NO_STRAYS
 
     @property
@@ -124,8 +125,8 @@ class Header:
         """The bytes that stand before the levels."""
         unit = self.unit.encode()
         kind = (MAGIC, VERSION, self.flags, self.before, len(self.levels) - 1, len(unit), 0)
-        place = (self.told, self.time, *self.low.tolist(), self.edge, self.points, self.distinct)
-        second = _SECOND.pack(self.told_attributes, *astuple(self.strays))
+        place = (self.predicted, self.time, *self.low.tolist(), self.edge, self.points, self.distinct)
+        second = _SECOND.pack(self.predicted_attributes, *astuple(self.strays))
         levels = (_LEVEL.pack(*astuple(each)) for each in self.levels)
         data = _FIXED.pack(*kind, *place) + second + unit + b"".join(levels)
         return data + _CHECK.pack(zlib.crc32(data))
@@ -145,7 +146,7 @@ def to_bytes(
 
     Geometry and colours come back bit for bit, normals to a degree, cones and rows not at all.
     previous: the tree of the pose before. Where it has the same cube, and that saves more than a 32nd of the
-    bytes, masks and attributes of the levels that get shorter are told by it, and it is needed to read them.
+    bytes, masks and attributes of the levels that get shorter are predicted from it. Reading them needs it.
     chain: how many trees have to be read for it, itself included. packed: False stores the masks as they are,
     breadth-first. strays: the points outside, which are left out where they are not given.
     Raises InputError where the name of the unit or the tree is larger than the header can say.
@@ -163,8 +164,8 @@ def to_bytes(
     outside = _store_strays(strays)
     header = Header(
         flags=_PACKED * packed | _kinds(octree),
-        before=chain if blocks.told or blocks.told_attributes else 0,
-        told=blocks.told,
+        before=chain if blocks.predicted or blocks.predicted_attributes else 0,
+        predicted=blocks.predicted,
         time=time,
         low=octree.low,
         edge=octree.edge,
@@ -172,7 +173,7 @@ def to_bytes(
         distinct=octree.distinct,
         unit=unit,
         levels=levels,
-        told_attributes=blocks.told_attributes,
+        predicted_attributes=blocks.predicted_attributes,
         strays=Level(len(strays or ()), *_sizes_and_check(*outside)),
     )
     if packed and _are_too_many(int(octree.counts.sum()), header.stored):
@@ -211,8 +212,8 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
             if header.flags & _PACKED:
                 coder.descend(masks[-1], deepest=number == len(whole) - 1)
         if attributes and header.width:
-            told = before is not None and header.told_attributes >> number & 1
-            known = _counterparts(before, coder.counterparts, number) if before and told else None
+            predicted = before is not None and header.predicted_attributes >> number & 1
+            known = _counterparts(before, coder.counterparts, number) if before and predicted else None
             values = _read_attributes(own, header.width, masks, values, known)
             found.append(_attributes(values, header.flags))
     return Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, tuple(found))
@@ -251,7 +252,7 @@ def read_header(data: bytes) -> tuple[Header, int]:
             f"holds octrees of version {version}",
             hint=f"This version of Scan4D reads format versions up to {VERSION}",
         )
-    told_attributes, *strays = _SECOND.unpack_from(data, _FIXED.size) if version > 1 else [0] * 5
+    predicted_attributes, *strays = _SECOND.unpack_from(data, _FIXED.size) if version > 1 else [0] * 5
     named = _FIXED.size + (_SECOND.size if version > 1 else 0)
     start = named + unit_size
     end = start + (depth + 1) * _LEVEL.size
@@ -260,11 +261,13 @@ def read_header(data: bytes) -> tuple[Header, int]:
     if _CHECK.unpack_from(data, end)[0] != zlib.crc32(data[:end]):
         raise InputError("the header of an octree is damaged")
     levels = tuple(Level(*values) for values in _LEVEL.iter_unpack(data[start:end]))
-    told, time, x, y, z, edge, points, distinct = place
+    predicted, time, x, y, z, edge, points, distinct = place
     unit = data[named:start].decode(errors="replace")
     low = np.array([x, y, z])
-    kind = flags, before, told
-    header = Header(*kind, time, low, edge, points, distinct, unit, levels, told_attributes, Level(*strays))
+    kind = flags, before, predicted
+    header = Header(
+        *kind, time, low, edge, points, distinct, unit, levels, predicted_attributes, Level(*strays)
+    )
     if not _is_possible(header):
         raise InputError("the header of an octree contradicts itself")
     return header, end + _CHECK.size
@@ -281,8 +284,8 @@ def _is_possible(header: Header) -> bool:
         and nodes[0] == min(header.points, 1)
         and all(0 < below <= 8 * above for above, below in itertools.pairwise(nodes))
         and header.levels[0].masks == 0
-        and (header.before > 0) == (header.told > 0 or header.told_attributes > 0)
-        and (header.width or not header.told_attributes)
+        and (header.before > 0) == (header.predicted > 0 or header.predicted_attributes > 0)
+        and (header.width or not header.predicted_attributes)
         and (header.flags & _PACKED or not header.before)
     )
 
@@ -295,7 +298,7 @@ def _are_too_many(nodes: int, stored: int) -> bool:
 
 def _can_tell(header: Header, previous: Octree, attributes: bool) -> bool:
     """Whether the tree before is the one that a header needs. attributes: of which they are asked for."""
-    missing = attributes and header.told_attributes and _kinds(previous) != header.flags & ~_PACKED
+    missing = attributes and header.predicted_attributes and _kinds(previous) != header.flags & ~_PACKED
     return _same_cube(header, previous) and not missing
 
 
@@ -334,12 +337,12 @@ def _store_strays(strays: Strays | None) -> tuple[bytes, bytes]:
 
 
 class _Blocks(NamedTuple):
-    """Stored masks and attributes of each level. told, told_attributes: as in a `Header`."""
+    """Stored masks and attributes of each level. predicted, predicted_attributes: as in a `Header`."""
 
     masks: list[bytes]
     attributes: list[bytes]
-    told: int = 0
-    told_attributes: int = 0
+    predicted: int = 0
+    predicted_attributes: int = 0
 
     @property
     def size(self) -> int:
@@ -347,20 +350,20 @@ class _Blocks(NamedTuple):
 
 
 def _store(octree: Octree, previous: Octree | None, packed: bool) -> _Blocks:
-    """Blocks of each level, of which the shorter ones are told by the tree before, if that is worth it."""
+    """Blocks of each level; the shorter ones are predicted from the tree before, if that is worth it."""
     if not packed:
         return _Blocks([b"", *(masks.tobytes() for masks in octree.masks)], _store_attributes(octree))
     coder = MaskCoder(int(octree.counts[0]), previous.masks if previous else ())
-    alone, told, places = [b""], [b""], [coder.counterparts]
+    alone, predicted, places = [b""], [b""], [coder.counterparts]
     for number, masks in enumerate(octree.masks, 1):
-        alone.append(coding.pack(coder.sort(masks, told=False)))
-        told.append(coding.pack(coder.sort(masks, told=True)) if previous else alone[-1])
+        alone.append(coding.pack(coder.sort(masks, predicted=False)))
+        predicted.append(coding.pack(coder.sort(masks, predicted=True)) if previous else alone[-1])
         coder.descend(masks, deepest=number == octree.depth)
         places.append(coder.counterparts)
     by_itself = _Blocks(alone, _store_attributes(octree))
     if previous is None:
         return by_itself
-    of_masks, of_attributes = told, _store_attributes(octree, previous, places)
+    of_masks, of_attributes = predicted, _store_attributes(octree, previous, places)
     shorter = _Blocks(
         [min(pair, key=len) for pair in zip(by_itself.masks, of_masks, strict=True)],
         [min(pair, key=len) for pair in zip(by_itself.attributes, of_attributes, strict=True)],
@@ -370,9 +373,9 @@ def _store(octree: Octree, previous: Octree | None, packed: bool) -> _Blocks:
     return shorter if shorter.size <= _WORTH * by_itself.size else by_itself
 
 
-def _shorter(told: list[bytes], alone: list[bytes]) -> int:
-    """Bit n: the block of level n is shorter where it is told by the tree before."""
-    is_shorter = (len(one) < len(other) for one, other in zip(told, alone, strict=True))
+def _shorter(predicted: list[bytes], alone: list[bytes]) -> int:
+    """Bit n: the block of level n is shorter where it is predicted from the tree before."""
+    is_shorter = (len(one) < len(other) for one, other in zip(predicted, alone, strict=True))
     return sum(1 << level for level, yes in enumerate(is_shorter) if yes)
 
 
@@ -380,7 +383,7 @@ def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> 
     """The masks of a level, whose nodes below are as many as the header says."""
     masks = coding.unpack(stored, header.levels[level].nodes)
     if header.flags & _PACKED:
-        masks = coder.restore(masks, told=bool(header.told >> level & 1))
+        masks = coder.restore(masks, predicted=bool(header.predicted >> level & 1))
     if np.bitwise_count(masks).sum(dtype=np.int64) != header.levels[level + 1].nodes:
         raise InputError(f"level {level + 1} of an octree has not as many nodes as its header says")
     return masks
