@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -209,23 +209,6 @@ def slope(x: Sequence[float], y: Sequence[float]) -> float:
 
 
 # --- what is written ------------------------------------------------------------------
-
-
-def curves(
-    panels: Mapping[str, Sequence[tuple[float, float]]], levels: Mapping[str, float], *labels: str
-) -> Figure:
-    """A panel for each curve (x, y), x logarithmic, with a dashed level. labels: of x, of y, of the level."""
-    of_x, of_y, of_level = labels
-
-    def panel(axes: Axes, name: str) -> None:
-        axes.plot(*zip(*panels[name], strict=True), color=_COLORS[0], marker=_MARKERS[0], markersize=4)
-        axes.axhline(levels[name], color=_COLORS[1], linestyle="--", label=of_level)
-        axes.set(title=name, xlabel=of_x, ylabel=of_y)
-        _logarithmic(axes, "x", [x for x, _ in panels[name]])
-        axes.set_ylim(bottom=0)
-        axes.legend(loc="lower right")
-
-    return _grid(list(panels), panel, {})
 
 
 def svg(figure: Figure, name: str) -> str:
