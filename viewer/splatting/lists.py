@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -33,6 +35,19 @@ _SPARE = 4  # times the points that there is room for, beyond which room is give
 _LARGE_HEAD = 24  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
+
+
+class ListPurpose(NamedTuple):
+    """The use of lists of discs."""
+
+    # `run` goes over the first lists, too: "work" is then all tiles where there are large discs, and "rest"
+    # those that have first lists alone and open pixels.
+    both: bool = False
+    sends: bool = (
+        False  # discs of a few pixels are in no list, but their depths on the surface, which is empty
+    )
+    looks: bool = False  # the looks of discs are wanted, for blending
+    numbered: bool = False  # the disc of each point is stored
 
 
 class TileLists:
@@ -71,23 +86,16 @@ class TileLists:
         surface: Surface,
         splats: Splats,
         side: int = ALL,
-        *,
-        both: bool = False,
-        sends: bool = False,
-        looks: bool = False,
-        numbered: bool = False,
+        purpose: ListPurpose | None = None,
     ) -> bool:
         """List the discs of points for the surface's view; False where the lists would grow too long.
 
         side: ALL; TOWARDS, those that face the eye; AWAY, the others that it found, in lists beside, unless
         they are hidden by what `show` found of the first; NOT_HIDDEN, all that lie before `farthest`. Large
-        ones are counted but for AWAY. both: whether `run` goes over the first lists, too: "work" is then all
-        tiles where there are large discs, and "rest" those that have first lists alone and open pixels.
-        sends: whether discs of a few pixels are in none, but their depths on the surface, which is empty.
-        looks: whether what they look like is wanted, for blending. numbered: whether it is kept which disc
-        each point has.
+        ones are counted but for AWAY.
         """
-        gpu, second = self._gpu, side == AWAY
+        purpose = purpose or ListPurpose()
+        gpu, second, both, sends = self._gpu, side == AWAY, purpose.both, purpose.sends
         bins = self._away_bins if second else self._bins
         if not second:
             self._reserve(max(points.count, 1))
@@ -123,6 +131,21 @@ class TileLists:
         if entries > gpu.max_storage_bytes // 4 or longest + both * self._longest > _LONGEST:
             return False
 
+        self._write(points, bins, given, splats, (discs, first_disc, entries), purpose)
+        return True
+
+    def _write(
+        self,
+        points: Points,
+        bins: Bins,
+        given: Mapping[str, object],
+        splats: Splats,
+        sizes: tuple[int, int, int],
+        purpose: ListPurpose,
+    ) -> None:
+        """Write the lists. given: macros. sizes: how many discs there are, the first of them, all entries."""
+        gpu, (discs, first_disc, entries) = self._gpu, sizes
+
         def bind_homes(program: Program) -> None:
             gpu.set(program, first_disc=first_disc, first_home=self.length)
             for name in ("reach", "noted"):
@@ -134,17 +157,16 @@ class TileLists:
             gpu.set(program, first_disc=first_disc, first_home=self.length)
             self._textures["reach"].bind(Texture.REACH)
             bins.items.bind(Texture.LISTED)
-            if looks:
+            if purpose.looks:
                 looks_of(points).bind(Texture.LOOKS)
             self._bind_storage("places", "forms", "disc_looks")
 
-        if numbered:
+        if purpose.numbered:
             gl.clear_words(self._buffer("numbers"), NOTHING, points.count)
-        homes = {**given, "NUMBERED": int(numbered)}
+        homes = {**given, "NUMBERED": int(purpose.numbered)}
         bins.fill(Visits("surfels/tiles/homes.glsl", discs, bind_homes, homes), entries)
-        listed = {**given, "LOOKS": int(looks)}
+        listed = {**given, "LOOKS": int(purpose.looks)}
         bins.fill(Visits("surfels/tiles/discs.glsl", discs, bind_discs, listed, splats), entries)
-        return True
 
     def take_sent(self, points: Points, surface: Surface, splats: Splats) -> None:
         """Find the points of the discs that were sent to pixels, whose depths the surface has."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -153,7 +154,7 @@ def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
         large = show_all(points, surface, lists, splats, LIMIT if lists.away else 0)
     else:
         surface.clear()
-        blend_by_tiles(points, surface, lists, None, splats, FIRST, partly=lists.away > 0)
+        blend_by_tiles(points, surface, lists, None, splats, Sides(FIRST, partly=lists.away > 0))
         if not lists.away:
             return True
     if lists.away and not fill_away(points, surface, lists, splats, blends=True):
@@ -161,7 +162,7 @@ def _two_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool:
     if lists.away and large is not None:
         show(points, surface, lists, splats, found=True, away=True)
     take = SECOND if large is None else 0
-    blend_by_tiles(points, surface, lists, large, splats, take, away=lists.away > 0)
+    blend_by_tiles(points, surface, lists, large, splats, Sides(take, away=lists.away > 0))
     return True
 
 
@@ -181,22 +182,29 @@ def _enlarged_by_tiles(points: Points, surface: Surface, splats: Splats) -> bool
     return True
 
 
+class Sides(NamedTuple):
+    """The lists that blending goes over.
+
+    take: whether the nearest of the FIRST or the SECOND lists, of what faces away, are still to be found.
+    away: whether there are such second lists. partly: whether they follow. Then only pixels that they hardly
+    reach are blended, and tiles get how far behind splats still count.
+    """
+
+    take: int = 0
+    away: bool = False
+    partly: bool = False
+
+
 def blend_by_tiles(
     points: Points,
     surface: Surface,
     lists: TileLists,
     large: Points | None,
     splats: Splats,
-    take: int = 0,
-    away: bool = False,
-    partly: bool = False,
+    sides: Sides | None = None,
 ) -> None:
-    """The second pass, as `blend`, of the splats that are listed and of the large ones.
-
-    take: whether the nearest of the FIRST or the SECOND lists, of what faces away, are still to be found.
-    away: whether there are such second lists. partly: whether they follow, so that only pixels are blended
-    that they hardly reach, and tiles are told how far behind splats still count.
-    """
+    """The second pass, as `blend`, of the splats that are listed and of the large ones."""
+    take, away, partly = sides or Sides()
     if large is not None:
         sums = _add(points, large, surface, FALLBACK, splats)
         sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)

@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from ..gpu.context import Gpu
 from ..picture.surface import Surface
 from .amplify import Points, amplify
-from .lists import ALL, AWAY, DISC_BITS, DISC_BYTES, TOWARDS, TileLists
+from .lists import ALL, AWAY, DISC_BITS, DISC_BYTES, TOWARDS, ListPurpose, TileLists
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 
 _MOST_PIXELS = (1 << 16) - 1  # along an edge of the picture: what cells.glsl's words have bits for
@@ -62,7 +62,7 @@ def fill_away(
 ) -> bool:
     """List what faces away; False where the rasteriser has to do it all. blends: whether all lists are gone
     over next, to blend what they hold."""
-    fits = lists.fill(points, surface, splats, AWAY, both=blends, looks=blends)
+    fits = lists.fill(points, surface, splats, AWAY, ListPurpose(both=blends, looks=blends))
     if not fits:
         surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"
     return fits
@@ -85,10 +85,10 @@ def tile_lists(
     reason = _unfit(points, surface)
     if not reason:
         lists = surface.cached(TileLists)
-        fits = lists.fill(points, surface, splats, side, looks=looks, numbered=numbered)
+        fits = lists.fill(points, surface, splats, side, ListPurpose(looks=looks, numbered=numbered))
         if sends and not fits:
             surface.clear()
-            fits = lists.fill(points, surface, splats, side, sends=True)
+            fits = lists.fill(points, surface, splats, side, ListPurpose(sends=True))
         if not fits:
             reason = f"too long lists, {lists.length:,} entries"
         elif not lists.away and lists.large * _LARGE_COST > lists.length + lists.sent:
