@@ -10,7 +10,7 @@ import pytest
 from scenes import rarely
 from virtual_screen import PANEL, RunningApp, Screen, running_app
 
-from viewer.app.scene.cube import cube_place
+from viewer.app.scene.cube import cube_position
 
 KINDS = ("lists", "pages", "is_export_open", "is_browser_open", "clicking", "shown_notes", "works")
 EM = 16.0  # height of the font, pixels
@@ -39,7 +39,7 @@ def running(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterato
 def test_the_menu_of_up_axes_comes_again_only_with_the_mouse(app: RunningApp) -> None:
     """It drops while the mouse comes to its button; Escape closes it though the mouse rests there."""
     left, top, width, height = app.view()
-    x, y, _ = cube_place(width, height, EM) or pytest.fail("there is no cube")
+    x, y, _ = cube_position(width, height, EM) or pytest.fail("there is no cube")
     button = round(left + x), round(top + 2.02 * y + 0.7 * EM)
     away = left + width // 2, top + height // 2
     for _ in range(2):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from virtual_screen import PANEL, RunningApp, Screen, running_app, stored_of
 
-from viewer.app.scene.cube import cube_place
+from viewer.app.scene.cube import cube_position
 from viewer.camera import Camera
 from viewer.geometry import up_vector
 
@@ -46,7 +46,7 @@ def camera_of(app: RunningApp) -> Camera:
 def below_cube(app: RunningApp) -> tuple[int, int]:
     """The middle of the button below the orientation cube, on the screen."""
     left, top, width, height = app.view()
-    x, y, _ = cube_place(width, height, EM) or pytest.fail("there is no cube")
+    x, y, _ = cube_position(width, height, EM) or pytest.fail("there is no cube")
     return round(left + x), round(top + 2.02 * y + 0.7 * EM)
 
 

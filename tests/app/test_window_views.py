@@ -60,10 +60,10 @@ def chord(app: RunningApp, modifier: str, key: str) -> None:
 
 def on_cube(app: RunningApp, right: float, up: float) -> tuple[int, int]:
     """A place on the screen, from the cube's centre in half edges."""
-    from viewer.app.scene.cube import cube_place
+    from viewer.app.scene.cube import cube_position
 
     left, top, width, height = app.view()
-    x, y, half = cube_place(width, height, EM) or pytest.fail("there is no cube")
+    x, y, half = cube_position(width, height, EM) or pytest.fail("there is no cube")
     return round(60 + left + x + right * half), round(30 + top + y - up * half)
 
 
