@@ -211,8 +211,6 @@ def test_a_link_that_leads_nowhere_is_there(refused: Refused, folder: Path) -> N
         ("notes.txt", "numerics"),
         ("plots/mine.png", "numerics"),
         ("pictures/sphere--points.png", "scenes"),
-        ("table-two.md", "slomp"),
-        ("octree-tables.json", "octrees"),
     ],
 )
 def test_a_benchmark_replaces_nothing_that_is_not_told(
