@@ -125,7 +125,7 @@ def test_notes_are_shown_in_their_frame_and_left_out_of_anonymous_pictures(tmp_p
     request = Request(POSE, FIRST.camera, "points", FIRST.params, Look())
 
     def entry(marks: Marks) -> Entry:
-        return Entry.of(request, "knot", None, (96, 64), "mm", marks, notes=notes)
+        return Entry.of(request, "knot", None, (96, 64), "mm", marks).with_notes(notes)
 
     shown = entry(Marks(notes=True))
     assert (shown.notes, entry(Marks(stamp=True)).notes) == (notes, ())
@@ -146,7 +146,7 @@ def test_landmarks_and_lines_are_kept_where_marks_show_them_and_lose_their_names
     request = Request(POSE, FIRST.camera, "points", FIRST.params, Look())
 
     def entry(**marks: bool) -> Entry:
-        return Entry.of(request, "knot", None, (96, 64), "mm", Marks(**marks), drawn=drawn)
+        return Entry.of(request, "knot", None, (96, 64), "mm", Marks(**marks)).with_drawn(drawn)
 
     assert entry(notes=True) == replace(entry(), marks=Marks(notes=True))
     assert (entry(landmarks=True).landmarks, entry(landmarks=True).trajectories) == ((landmark,), ())

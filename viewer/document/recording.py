@@ -47,7 +47,6 @@ from ..output.legend import Legend, Marks
 from ..output.overlays import (
     LINE_COLOR,
     LINE_SLACK,
-    NOTHING_DRAWN,
     DrawnLandmark,
     DrawnMarks,
     DrawnPath,
@@ -147,17 +146,12 @@ class Entry:
         size: tuple[int, int],
         unit: str,
         marks: Marks | None = None,
-        shown_unit: str | None = None,
-        notes: tuple[Note, ...] = (),
-        drawn: DrawnMarks = NOTHING_DRAWN,
         choice: Choice | None = None,
     ) -> Entry:
         """The entry of a picture that was asked for with a backend's name and its parameters.
 
-        notes, drawn: kept where the marks show them. choice: that backend and parameters come
-        from.
-
-        Raises InputError where its colours come from a layer: these numbers are in no file.
+        choice: that backend and parameters come from. Raises InputError where its colours come from a layer:
+        these numbers are in no file.
         """
         layers, marks = request.layers, marks or Marks()
         names = layers.names(request.pose.overview.scalars)
@@ -165,15 +159,17 @@ class Entry:
         if source in layers.scalars:
             what = f"the colours come from '{source}', which is computed and not in the scan's files"
             raise InputError(what, hint="It can be drawn again in other colours")
-        entry = cls(
+        return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
-            shown_unit, matrix_of(layers.world_from_pose),
-            notes=notes if marks.notes else (),
+            place=matrix_of(layers.world_from_pose),
             scale=1.0 if choice is None else choice.way.scale,
             automatic=None if choice is None else choice.told,
         )  # fmt: skip
-        return entry.with_drawn(drawn)
+
+    def with_notes(self, notes: tuple[Note, ...]) -> Entry:
+        """The entry with the notes of its scan, if the marks show them."""
+        return replace(self, notes=notes if self.marks.notes else ())
 
     def with_drawn(self, drawn: DrawnMarks) -> Entry:
         """The entry with what tools draw over its frame, as far as the marks show it."""

@@ -85,11 +85,12 @@ class Capture(WindowPart):
             return None
         entry = Entry.of(
             request, session.scan, session.hash, viewport.size, self.playback.unit,
-            self.marks_of_files() if marks is None else marks, session.document.shown_unit,
-            session.document.part(Landmarks).notes,
-            self.drawn(request.pose.index), self.choice_of(request),
+            self.marks_of_files() if marks is None else marks, self.choice_of(request),
         )  # fmt: skip
-        return replace(entry, labels=self.label_places().spots if entry.marks else ())
+        entry = entry.with_notes(session.document.part(Landmarks).notes)
+        entry = entry.with_drawn(self.drawn(request.pose.index))
+        labels = self.label_places().spots if entry.marks else ()
+        return replace(entry, shown_unit=session.document.shown_unit, labels=labels)
 
     def screenshot(self) -> None:
         """Save the picture as it is shown, in full and without panels; what is not drawn of it yet is drawn
