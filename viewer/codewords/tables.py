@@ -25,7 +25,6 @@ from ..errors import InputError
 
 BITMAP = 8  # pixels along an edge of the bitmap that a word stands for
 EMPTY_ROW = 0b000111  # first column 7, last column 0: no pixel
-EMPTY_SCANS = EMPTY_ROW * 0b000001_000001_000001_000001
 LARGE = 1 << 31  # in an entry of a table: the rest is the place of its rows
 _HALF = BITMAP // 2
 _NEVER = (1, 0)  # first and last pixel of an empty row

@@ -12,7 +12,6 @@ from scenes import rarely
 from viewer.bench.scenes.samples import on_sphere
 from viewer.scan.octree.build import Stop, build
 from viewer.scan.octree.leaves import leaf_points
-from viewer.scan.octree.neighbors import Neighbors
 from viewer.scan.octree.octree import Octree
 from viewer.scan.points import PointCloud
 
@@ -137,12 +136,3 @@ def test_centers_of_some_nodes_are_those_of_all() -> None:
         near = octree.centers_of(octree.codes(level)[::3], level, origin)
         assert near.dtype == np.float32
         np.testing.assert_array_equal(near, (centers[::3] - origin).astype(np.float32))
-
-
-def test_what_is_around_below_is_what_is_around_there() -> None:
-    octree = build(PointCloud.from_arrays(np.random.default_rng(5).normal(size=(100_000, 3))))
-    neighbors = Neighbors(1)
-    for masks in octree.masks:
-        _, around = neighbors.around_below(masks)
-        neighbors.descend(masks)
-        np.testing.assert_array_equal(around, neighbors.around())

@@ -60,14 +60,6 @@ class Neighbors:
             self.beside[face] = self._below(children, face)
         return children
 
-    def around_below(self, masks: Bytes) -> tuple[Children, Bytes]:
-        """The level below the one that has these masks and its `around`, without going there."""
-        children = Children(masks)
-        bits = np.zeros(len(children.parents), np.uint8)
-        for face in range(6):
-            bits |= (self._below(children, face) >= 0).view(np.uint8) << np.uint8(face)
-        return children, bits
-
     def _below(self, children: Children, face: int) -> Nodes:
         """`beside` of the level below."""
         axis, side = divmod(face, 2)
