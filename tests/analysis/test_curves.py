@@ -167,7 +167,7 @@ def test_repeats_lie_over_one_another_with_their_mean_and_deviation() -> None:
     assert np.isnan(repeats.curves).any(axis=1).tolist() == [False, True, False, False]
     downwards = peaks_of(times, -values, Smoothing())
     np.testing.assert_allclose(downwards, events)
-    with pytest.raises(ValueError, match="no event"):
+    with pytest.raises(ValueError, match="no peak"):
         repeats_of(times, values, np.zeros(0))
 
 

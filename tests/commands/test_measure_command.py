@@ -163,12 +163,12 @@ def test_previews_are_told_and_not_measured(run: Run) -> None:
     write("preview", "defined")
     done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "out.csv")
     assert done.code == 0, done.err
-    assert "m.mrk.json: 1 is a preview, which nobody has confirmed, such as 'a'" in done.err
+    assert "m.mrk.json: 1 point is a preview, which nobody has confirmed, such as 'a'" in done.err
     assert {row["name"] for row in table(Path("out.csv")) if row["state"]} == {"b"}
     write("preview", "preview")
     done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "none.csv")
     assert done.code == 2
-    assert "2 are previews, which nobody has confirmed" in done.err
+    assert "2 points are previews, which nobody has confirmed" in done.err
     assert "has no landmark that is placed" in done.err
     assert not Path("none.csv").exists()
 
@@ -237,7 +237,7 @@ def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
 @pytest.mark.parametrize(
     ("places", "words", "told"),
     [
-        ({"a": [5000, 0, 0]}, (), "landmarks.csv: the landmarks lie off the scan"),
+        ({"a": [5000, 0, 0]}, (), "landmarks.csv: all landmarks lie off the scan"),
         ({"a": [0, 0, 10000.0], "b": [0, 9900.0, 0]}, (), "they are in another unit"),
         ({"a": ["nan", 0, 0]}, (), "landmarks.csv"),
         ({}, (), "landmarks.csv"),
@@ -260,16 +260,16 @@ def test_what_cannot_be_measured_is_told(run: Run, places: dict, words: tuple[st
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[]", "has no list of 'measures'"),
-        ('{"measures": [3]}', "measures[0]: is no object"),
-        ('{"measures": [{"name": "m", "kind": "distance", "landmarks": "ab"}]}', "are no list of names"),
+        ("[]", "needs 'measures'"),
+        ('{"measures": [3]}', "measures[0]: is not a JSON object"),
+        ('{"measures": [{"name": "m", "kind": "distance", "landmarks": "ab"}]}', "is not a list of names"),
         ('{"measures": [{"name": "m", "kind": "distance", "landmarks": ["a"]}]}', "takes 2 landmarks, not 1"),
         (
             '{"measures": [{"name": "m", "kind": "dist", "landmarks": ["a", "c"]}]}',
             "unknown kind of measure 'dist'",
         ),
         ('{"measures": [{"name": "m", "kinds": 1}]}', "has an unknown field 'kinds'"),
-        (json.dumps({"measures": 2 * MEASURES["measures"]}), "two measures are called 'öffnung'"),
+        (json.dumps({"measures": 2 * MEASURES["measures"]}), "two measures have the name 'öffnung'"),
         ('{"measures": [', "is neither JSON nor TOML"),
     ],
 )

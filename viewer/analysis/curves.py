@@ -274,7 +274,7 @@ def repeats_of(
     interpolated linearly, and not known where one of the two frames is not.
     """
     if not len(events):
-        raise ValueError("there is no event to align by")
+        raise ValueError("there is no peak to align the curves by")
     apart = float(np.diff(np.sort(events)).min()) / 2 if len(events) > 1 else float(times[-1] - times[0])
     before, after, step = before or apart, after or apart, _step(times)
     steps = range(-_steps_in(before / step), _steps_in(after / step) + 1)

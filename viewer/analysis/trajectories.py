@@ -80,10 +80,14 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     unknown = [name for name in anchors if name not in tracks]
     if unknown:
         raise InputError(
-            f"the rigid reference '{unknown[0]}' is not placed", hint="Place it first, or leave it out"
+            f"the rigid reference '{unknown[0]}' is not placed",
+            hint="Place it first, or remove it from the references",
         )
     if len(set(anchors)) < 3:
-        hint = "Choose landmarks that move as one rigid body, such as the corners of the eyes"
+        hint = (
+            "Choose landmarks that keep their distances from each other, such as the inner corners of "
+            "the eyes"
+        )
         raise InputError("removing head motion needs three rigid references", hint=hint)
     places = np.stack([tracks[name].positions for name in dict.fromkeys(anchors)], axis=1)  # (T, A, 3)
     known = np.logical_and.reduce(np.isfinite(places), axis=2)
@@ -94,8 +98,8 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     )
     if motions[reference] is None:
         raise InputError(
-            "no frame has three rigid references that are not on one line",
-            hint="Place them, or choose others",
+            "every frame lacks three rigid references that do not lie on a line",
+            hint="Place them, or choose other landmarks",
         )
     return motions
 

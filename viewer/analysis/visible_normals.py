@@ -79,9 +79,9 @@ def estimate_normals(
     NoOpenGLError.
     """
     if not 3 <= k <= MOST_NEIGHBORS:
-        raise InputError(f"a neighborhood of {k} points; from 3 to {MOST_NEIGHBORS} are possible")
+        raise InputError(f"a neighborhood has from 3 to {MOST_NEIGHBORS} points, not {k}")
     if not growth >= 1:
-        raise InputError(f"a growth of {growth:g} is less than 1")
+        raise InputError(f"growth must be at least 1, not {growth:g}")
     if isinstance(pose, PointCloud):
         pose = Pose(0, 0.0, "points", pose)
     renderer = shared_renderer()

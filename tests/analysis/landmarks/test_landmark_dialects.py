@@ -100,8 +100,8 @@ def test_states_of_markups(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.known[0], [placed, pending, pending, pending, placed, pending])
     np.testing.assert_array_equal(found.positions[0, 1], [1, 2, 3])  # a preview
     assert found.remarks == (
-        "2 are marked as defined without a position, such as 'd'",
-        "1 is a preview, which nobody has confirmed, such as 'b'",
+        "2 points are marked as defined without a position, such as 'd'",
+        "1 point is a preview, which nobody has confirmed, such as 'b'",
     )
 
 
@@ -176,7 +176,7 @@ def test_tps_of_other_programs(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.positions[0, 0], [0.5, 1, 0])
     assert np.isnan(found.positions[0, 1]).all()
     np.testing.assert_array_equal(found.positions[1], [[1, 2, 3], [4, -5, 6]])
-    assert [text.split()[0:2] for text in found.remarks] == [["1", "curves"], ["Its", "landmarks"]]
+    assert [text.split()[0:2] for text in found.remarks] == [["Scan4D", "leaves"], ["Its", "landmarks"]]
 
 
 MORPHOLOGIKA = """[Individuals]
@@ -211,7 +211,7 @@ def test_morphologika_of_other_programs(tmp_path: Path) -> None:
         found = read(tmp_path, name, MORPHOLOGIKA)
         np.testing.assert_array_equal(found.positions[1], [[7, 8, 9], [-1, -2, -3]])
         assert len(found) == 2
-        assert found.remarks == ("Its labels and lines are left out",)
+        assert found.remarks == ("Scan4D leaves out its labels and lines",)
     flat = read(
         tmp_path, "m.txt", "[individuals]\n1\n[landmarks]\n1\n[dimensions]\n2\n[rawpoints]\n'a\n1 2\n"
     )

@@ -52,10 +52,10 @@ BOX = Bounds(np.array([-90.0, 20, 500]), np.array([90.0, 240, 650]))
     ("factor", "words"),
     [
         (1.0, None),
-        (0.001, "1000 times as large"),
-        (1000.0, "0.001 times as large"),
-        (np.array([-1, -1, 1]), "x and y turned"),
-        (-7.0, "of another scan"),
+        (0.001, "multiplied by 1000 they"),
+        (1000.0, "multiplied by 0.001 they"),
+        (np.array([-1, -1, 1]), "signs of x and y reversed"),
+        (-7.0, "belong to another scan"),
     ],
 )
 def test_landmarks_of_another_scan_are_told(factor: float, words: str | None) -> None:
@@ -75,7 +75,7 @@ def test_landmarks_that_any_unit_would_shrink_into_the_scan_tell_none() -> None:
     points = 1000.0 + 20 * np.random.default_rng(2).random((1, 9, 3))
     told = why_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, unit="mm"), about_the_origin)
     assert told is not None
-    assert told.endswith("they are of another scan")
+    assert told.endswith("they belong to another scan")
 
 
 def test_one_place_that_is_off_is_told() -> None:
@@ -84,5 +84,5 @@ def test_one_place_that_is_off_is_told() -> None:
     points[0, 5] = np.nan
     told = why_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, unit="mm"), BOX)
     assert told is not None
-    assert told.startswith("1 of 8 places lie off the scan")
+    assert told.startswith("1 of 8 positions lie off the scan")
     assert why_apart(LandmarkSet.of(["a"], np.full((1, 1, 3), np.nan)), BOX) is None

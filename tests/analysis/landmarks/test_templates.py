@@ -76,7 +76,7 @@ def test_a_template_of_present_landmarks_is_read_again(tmp_path: Path) -> None:
     assert template.measures == (width,)
     save_template(tmp_path / "own.json", template)
     assert read_template(tmp_path / "own.json") == template
-    with pytest.raises(InputError, match="no landmarks"):
+    with pytest.raises(InputError, match="at least one landmark"):
         template_of("own", (), ())
 
 
@@ -91,26 +91,26 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"format": 2}, "has the format 2, and 1 is read"),
+        ({"format": 2}, "has the format 2, but Scan4D reads 1"),
         ({"landmarks": []}, "has no landmarks"),
-        ({"landmarks": 3}, "'landmarks' is no list"),
-        ({"landmarks": [3]}, r"landmarks\[0\]: is no object"),
-        ({"landmarks": [{"name": ""}]}, r"landmarks\[0\]: has no 'name'"),
-        ({"landmarks": [{"name": "a\nb"}]}, "no text of one line"),
+        ({"landmarks": 3}, "'landmarks' is not a list"),
+        ({"landmarks": [3]}, r"landmarks\[0\]: is not a JSON object"),
+        ({"landmarks": [{"name": ""}]}, r"landmarks\[0\]: 'name' is missing"),
+        ({"landmarks": [{"name": "a\nb"}]}, "must be a text of one line"),
         ({"landmarks": [{"name": "a" * 300}]}, "longer than 200"),
         ({"landmarks": [{"name": "a"}, {"name": "a"}]}, "the landmark 'a' appears twice"),
-        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "but not the reverse"),
+        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "which has another partner"),
         ({"landmarks": [{"name": "a", "colour": "b"}]}, "unknown field 'colour'"),
         (
             {"measures": [{"name": "w", "kind": "distance", "landmarks": ["x", "y"]}]},
-            r"measures\[0\]: no landmark",
+            r"measures\[0\]: the template has no landmark",
         ),
-        ({"measures": [{"name": "w"}]}, r"measures\[0\]: has no 'name' and 'kind'"),
-        ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "options are no words"),
+        ({"measures": [{"name": "w"}]}, r"measures\[0\]: needs a 'name' and a 'kind'"),
+        ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "options must be an object"),
         ({"measures": [{"name": "w", "kind": "width"}]}, r"measures\[0\]: unknown kind of measure 'width'"),
         ({"measures": [{"name": "w", "kind": "angle", "landmarks": ["aL"]}]}, "takes 3 landmarks, not 1"),
         ({"more": 1}, "unknown field 'more'"),
-        ({"name": " mine"}, "blanks around"),
+        ({"name": " mine"}, "ends with blanks"),
     ],
 )
 def test_a_template_that_is_wrong(changes: dict[str, Any], words: str, tmp_path: Path) -> None:

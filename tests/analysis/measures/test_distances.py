@@ -187,13 +187,13 @@ def test_lengths_are_converted(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("former", "new", "words"),
     [
-        ("ear", "nose", "is of 'the \"left\", nose', not of"),
+        ("ear", "nose", "belongs to the scan 'the \"left\", nose', not to"),
         ("mm", "furlong", "lengths are in 'furlong'"),
-        (",placed,", ",", "a column is missing"),
-        ("Distance 1,1,", "Distance 1,4,", "'frame' is 4, and not from 1 to 3"),
+        (",placed,", ",", "a missing column"),
+        ("Distance 1,1,", "Distance 1,4,", "'frame' is 4, but must be from 1 to 3"),
         ("Distance 1,1,", "Distance 1,1.5,", "'frame' is 1.5"),
-        (",placed,3,", ",placed,3,nan,", "a column is missing"),
-        (",placed,", ",tracked,", "does not say where both ends of 'Distance 1' were placed"),
+        (",placed,3,", ",placed,3,nan,", "a missing column"),
+        (",placed,", ",tracked,", "lacks the position of an end of 'Distance 1'"),
     ],
 )
 def test_what_cannot_be_used_is_one_message(former: str, new: str, words: str, tmp_path: Path) -> None:

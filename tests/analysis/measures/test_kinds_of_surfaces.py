@@ -204,10 +204,10 @@ def test_where_there_is_no_surface_the_reason_is_told() -> None:
     patch = sphere_points(4000, R)
     two = np.concatenate([patch, patch + np.array([60, 0, 0])])
     surface = PoseSurface(pose_of(two, normals=np.concatenate([patch, patch]) / R))
-    assert refused(surface, "path", np.array([[0, 0, R], [60, 0, R]])) == "no surface joins 0 and 1"
+    assert refused(surface, "path", np.array([[0, 0, R], [60, 0, R]])) == "no surface connects 0 and 1"
     assert refused(surface, "path", np.array([[0, 0, R], [0, 0, 2 * R]])) == "1 is off the surface"
     assert refused(surface, "area", np.array([[0, 0, R], [0, R, 0], [30, 0, 0]])) == "2 is off the surface"
     in_a_line = np.array([[0.0, 0, R], [0, 0, 0], [0, 0, -R]])
-    assert "give no plane" in refused(surface, "section", in_a_line)
+    assert "define no plane" in refused(surface, "section", in_a_line)
     few = PoseSurface(pose_of(np.eye(3)[:2]))
     assert refused(few, "path", np.eye(3)[:2]) == "there is no surface near 0"

@@ -159,7 +159,7 @@ def test_what_is_missing_is_told_with_values_and_warns_of_numbers(tmp_path: Path
     shown = taken(lips, replace(whole, name="other"))
     first, second = shown.curves
     assert value_in_words(lips, 100, MM) == f"- ({why})"
-    assert value_in_words(lips, 30, MM).endswith(" mm² (95 %) (surface fills 70 % of the outline)")
+    assert value_in_words(lips, 30, MM).endswith(" mm² (95 %) (the surface fills 70 % of the outline)")
     assert value_in_words(whole, 30, MM).endswith("mm² (95 %)")
     assert numbers_in_words(first)[0].startswith("(!) ")
     assert not numbers_in_words(second)[0].startswith("(!)")

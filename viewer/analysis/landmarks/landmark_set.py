@@ -72,8 +72,8 @@ class LandmarkSet:
         count = len(positions)
         usable, of_names = _usable_names(names)
         if unit and usable_unit(unit) is None:
-            named = f"'{shortened(unit)}', which is no short word such as mm"
-            of_names = [*of_names, f"Lengths are in {named}: they are used without conversion"]
+            named = f"'{shortened(unit)}', which is not a known unit such as mm"
+            of_names = [*of_names, f"Lengths are in {named}: Scan4D does not convert them"]
         there = np.isfinite(positions).all(axis=2)
         if known is None:
             known = np.where(there, Known.PLACED, Known.PENDING)
@@ -159,8 +159,7 @@ class LandmarkSet:
         factor = conversion(self.unit, unit)
         if factor is None:
             remark = (
-                f"Lengths are in '{self.unit}', those of the scan in '{unit}': they are used without "
-                "conversion"
+                f"Lengths are in '{self.unit}', but the scan is in '{unit}': Scan4D does not convert them"
             )
             return replace(self, unit=unit, remarks=(*self.remarks, remark))
         with np.errstate(over="ignore"):
@@ -184,7 +183,7 @@ class LandmarkSet:
 def check_cells(frames: int, names: int) -> None:
     """Raise InputError, before anything is allocated, for more landmarks in more frames than any scan has."""
     if frames * names > _MOST_CELLS:
-        raise InputError(f"has {names:,} landmarks in {frames:,} frames, more than are read")
+        raise InputError(f"has {names:,} landmarks in {frames:,} frames, which is too many")
 
 
 def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
@@ -207,12 +206,12 @@ def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     remarks = []
     if twice:
         remarks.append(
-            f"{_counted(len(twice), 'name')} there more than once, such as '{shortened(twice[0])}'"
+            f"{_counted(len(twice), 'name')} appeared more than once and got a number: '{shortened(twice[0])}'"
         )
     if unnamed:
         remarks.append(f"{_counted(unnamed, 'landmark')} had no name and got a number")
     if changed:
-        remarks.append(f"{_counted(changed, 'name')} could not be shown and was shortened or cleaned")
+        remarks.append(f"Scan4D shortened or cleaned {_counted(changed, 'name')} that it cannot show")
     return tuple(usable), remarks
 
 
@@ -233,12 +232,12 @@ def why_apart(landmarks: LandmarkSet, bounds: Bounds) -> str | None:
     unit = landmarks.unit or "units"
     few = int((off > _MARGIN * bounds.radius).sum())
     head = (
-        f"{few} of {len(points)} places lie off the scan, up to {off.max():.4g} {unit}"
+        f"{few} of {len(points)} positions lie off the scan, by up to {off.max():.4g} {unit}"
         if few < len(points)
-        else f"the landmarks lie off the scan, by {off.min():.4g} {unit} and more"
+        else f"all landmarks lie off the scan, by at least {off.min():.4g} {unit}"
     )
     cause = _cause(points, bounds)
-    return f"{head}: {cause or 'they are of another scan'}"
+    return f"{head}: {cause or 'they belong to another scan'}"
 
 
 def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
@@ -250,11 +249,14 @@ def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
     if fits(points):
         return None
     if fits(points * _TURNED):
-        return "with x and y turned they lie on it, so that one of the two is in RAS and the other in LPS"
+        return (
+            "with the signs of x and y reversed they lie on it, so one of the two is in RAS and the "
+            "other in LPS"
+        )
     span = float(np.linalg.norm(np.ptp(points, axis=0)))
     for factor in _FACTORS:
         if factor * span >= _WIDE * bounds.radius and fits(points * factor):
-            return f"{factor:.4g} times as large they lie on it, so that they are in another unit"
+            return f"multiplied by {factor:.4g} they lie on it, so they are in another unit"
     return None
 
 

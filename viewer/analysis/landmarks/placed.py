@@ -68,7 +68,8 @@ def why_beside(landmarks: Sequence[Landmark]) -> str | None:
         return None
     some = ", ".join(map(shortened, beside[:3]))
     return (
-        f"{len(beside)} of {len(set_here)} landmarks lie beside the surface ({some}): are they of this scan?"
+        f"{len(beside)} of {len(set_here)} landmarks lie off the surface ({some}). Do they belong to "
+        "this scan?"
     )
 
 

@@ -58,7 +58,7 @@ def read_template(path: Path | str) -> Template:
 def _template(data: Any) -> Template:
     fields = _fields(data, _FIELDS, "")
     if fields.get("format") != _FORMAT:
-        raise InputError(f"has the format {shortened(fields.get('format'))}, and {_FORMAT} is read")
+        raise InputError(f"has the format {shortened(fields.get('format'))}, but Scan4D reads {_FORMAT}")
     landmarks = tuple(
         _landmark(value, f"landmarks[{number}]") for number, value in enumerate(_list(fields, "landmarks"))
     )
@@ -68,7 +68,9 @@ def _template(data: Any) -> Template:
     partners = {landmark.name: landmark.partner for landmark in landmarks if landmark.partner}
     for name, partner in partners.items():
         if partners.get(partner) != name:
-            raise InputError(f"'{name}' has the partner '{partner}', but not the reverse", "landmarks")
+            raise InputError(
+                f"'{name}' has the partner '{partner}', which has another partner or none", "landmarks"
+            )
     names = {landmark.name for landmark in landmarks}
     measures = tuple(
         _measure(value, names, f"measures[{number}]")
@@ -93,13 +95,13 @@ def _measure(data: Any, names: set[str], where: str) -> Measure:
     measure = measure_of(data, where)
     for name in measure.landmarks:
         if name not in names:
-            raise InputError(f"no landmark is called {shortened(name)!r}", where)
+            raise InputError(f"the template has no landmark {shortened(name)!r}", where)
     return measure
 
 
 def _fields(data: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
     if not isinstance(data, dict):
-        raise InputError("is no object", where or None)
+        raise InputError("is not a JSON object", where or None)
     for name in data:
         if name not in known:
             raise InputError(f"has an unknown field '{shortened(name)}'", where or None)
@@ -109,16 +111,16 @@ def _fields(data: Any, known: tuple[str, ...], where: str) -> dict[str, Any]:
 def _list(fields: Mapping[str, Any], key: str, where: str = "") -> list[Any]:
     values = fields.get(key, [])
     if not isinstance(values, list) or len(values) > _MOST:
-        raise InputError(f"'{key}' is no list of at most {_MOST}", where or None)
+        raise InputError(f"'{key}' is not a list of at most {_MOST} entries", where or None)
     return values
 
 
 def _text(fields: Mapping[str, Any], key: str, where: str, *, needed: bool = False) -> str:
     value = fields.get(key, "")
     if not isinstance(value, str) or not (value.isprintable() and len(value) <= _LONGEST):
-        raise InputError(f"'{key}' is no text of one line but {shortened(value)}", where or None)
+        raise InputError(f"'{key}' must be a text of one line, not {shortened(value)}", where or None)
     if (needed and value.strip() != value) or (needed and not value):
-        raise InputError(f"has no '{key}', or one with blanks around", where or None)
+        raise InputError(f"'{key}' is missing, or begins or ends with blanks", where or None)
     return value
 
 
@@ -135,7 +137,7 @@ def template_of(name: str, landmarks: Sequence[Landmark], measures: Sequence[Mea
     InputError where there is no landmark.
     """
     if not landmarks:
-        raise InputError("There are no landmarks to make a template of.")
+        raise InputError("A template needs at least one landmark.")
     partners = {one.name: one.partner for one in landmarks}
     listed = tuple(
         Landmark(

@@ -83,7 +83,7 @@ class Series:
     def _filled(self, share: float, least: str = "") -> str:
         if self.quantity == "length":
             return f"{least}{100 * share:.0f} % of the line lies on the surface"
-        return f"surface fills {least}{100 * share:.0f} % of the outline"
+        return f"the surface fills {least}{100 * share:.0f} % of the outline"
 
     @property
     def warning(self) -> str:

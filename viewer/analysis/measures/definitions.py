@@ -46,30 +46,30 @@ def errors_of(path: Path, not_parsed: str, hint: str) -> Iterator[None]:
 def _measures(data: Any) -> tuple[Measure, ...]:
     held = data.get("measures") if isinstance(data, dict) else data
     if not isinstance(held, list) or not 0 < len(held) <= _MOST:
-        raise InputError(f"has no list of 'measures', of 1 to {_MOST}")
+        raise InputError(f"needs 'measures', a list of 1 to {_MOST} measures")
     found = tuple(measure_of(each, f"measures[{number}]") for number, each in enumerate(held))
     names = [measure.name for measure in found]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"two measures are called {shortened(name)!r}", "measures")
+            raise InputError(f"two measures have the name {shortened(name)!r}", "measures")
     return found
 
 
 def measure_of(data: Any, where: str) -> Measure:
     """The measure of an object of a file, which stands there. Raises InputError for what is wrong in it."""
     if not isinstance(data, dict):
-        raise InputError("is no object", where)
+        raise InputError("is not a JSON object", where)
     for field in data:
         if field not in _FIELDS:
             raise InputError(f"has an unknown field '{shortened(field)}'", where)
     name, kind = data.get("name"), data.get("kind")
     landmarks, options = data.get("landmarks", []), data.get("options", {})
     if not (isinstance(name, str) and name and name.isprintable() and isinstance(kind, str)):
-        raise InputError("has no 'name' and 'kind' that are text", where)
+        raise InputError("needs a 'name' and a 'kind', each a text", where)
     if not (isinstance(landmarks, list) and all(isinstance(landmark, str) for landmark in landmarks)):
-        raise InputError("its 'landmarks' are no list of names", where)
+        raise InputError("'landmarks' is not a list of names", where)
     if not (isinstance(options, dict) and all(isinstance(value, str) for value in options.values())):
-        raise InputError("its options are no words by name", where)
+        raise InputError("options must be an object whose values are texts", where)
     measure = Measure(name, kind, tuple(landmarks), options)
     try:
         kind_of(measure)

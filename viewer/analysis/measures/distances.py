@@ -124,16 +124,16 @@ def read_distances(
             continue
         factor = conversion(row["unit"], unit)
         if factor is None:
-            what = f"lengths are in '{row['unit']}', those of the scan in '{unit}'"
-            raise InputError(what, where, "Set the scan's unit in the panel first")
+            what = f"lengths are in '{row['unit']}', but the scan is in '{unit}'"
+            raise InputError(what, where, "First set the scan unit in the panel")
         for number, points in enumerate(found.setdefault(text_of_cell(row["measure"]), ([], [])), 1):
             if row[f"state_{number}"] == STATES[Known.PLACED]:
                 points.append(_surface_point(row, number, where, factor, count, pose_of))
     if others or not found:
-        what = f"is of '{min(others)}', not of '{scan}'" if others else "holds no distances"
+        what = f"belongs to the scan '{min(others)}', not to '{scan}'" if others else "holds no distances"
         raise InputError(what, path, "Open that scan first" if others else _HINT)
     if unplaced := next((name for name, ends in found.items() if not all(ends)), None):
-        raise InputError(f"does not say where both ends of '{unplaced}' were placed", path, _HINT)
+        raise InputError(f"lacks the position of an end of '{unplaced}'", path, _HINT)
     return {name: (tuple(first), tuple(second)) for name, (first, second) in found.items()}
 
 
@@ -145,16 +145,16 @@ def _rows(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
         what, hint = explained(error)
         raise InputError(f"cannot be read: {what}", path, hint) from error
     except UnicodeDecodeError as error:
-        raise InputError("is no text in UTF-8", path, _HINT) from error
+        raise InputError("is not a UTF-8 text", path, _HINT) from error
     rows = csv.DictReader(StringIO(text, newline=""), strict=True)
     try:
         for row in rows:
             where = f"{path}, line {rows.line_num}"
             if None in row or None in row.values() or not row.keys() >= set(COLUMNS):
-                raise InputError("a column is missing, or one too many", where, _HINT)
+                raise InputError("has a missing column, or one too many", where, _HINT)
             yield where, row
     except csv.Error as error:
-        raise InputError(f"is no table: {error}", f"{path}, line {rows.line_num}", _HINT) from error
+        raise InputError(f"is not a table: {error}", f"{path}, line {rows.line_num}", _HINT) from error
 
 
 def _surface_point(
@@ -173,12 +173,12 @@ def _surface_point(
         except ValueError:
             value = math.nan
         if not math.isfinite(value):
-            raise InputError(f"'{column}' is no number but '{row[column][:40]}'", where, _HINT)
+            raise InputError(f"'{column}' is not a number: '{row[column][:40]}'", where, _HINT)
         return value
 
     frame = read("frame")
     if not (frame == int(frame) and 1 <= frame <= count):
-        raise InputError(f"'frame' is {frame:g}, and not from 1 to {count}", where, _HINT)
+        raise InputError(f"'frame' is {frame:g}, but must be from 1 to {count}", where, _HINT)
     position = np.array([read(f"{axis}_{number}") for axis in "xyz"]) * factor
     sure = abs(read(f"uncertainty_{number}")) * factor if row[f"uncertainty_{number}"] else math.nan
     return surface_point_at(position, pose_of(int(frame) - 1), sure / SURE)

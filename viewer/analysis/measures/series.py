@@ -22,7 +22,7 @@ from .kinds import MeasureKind, kind_of
 from .regions import Refused
 from .surface import Found, PoseSurface
 
-_NO_DIRECTION = "its landmarks lie in one place or on a line"
+_NO_DIRECTION = "its landmarks coincide or lie on a line"
 _DRAWN = 48  # places of a line along the surface that are kept, in each frame
 
 
@@ -133,7 +133,7 @@ def _asked(measure: Measure, tracks: Mapping[str, Track], noise: float) -> _Aske
     positions = np.stack([track.positions for track in own], axis=1)[:, which]
     values, sigmas, shares = np.full((3, frames), np.nan)
     reasons = {
-        int(frame): f"{name} is a gap"
+        int(frame): f"{name} has no data"
         for name, track in reversed(list(zip(names, own, strict=True)))
         for frame in np.flatnonzero(track.known == Known.GAP)
     }
@@ -214,7 +214,7 @@ def _fill_surfaces(
             surface = surface_of(timeline, timeline.visit(frame), faces)
         except InputError:  # the timeline reports it
             for each in asked:
-                each.reasons.setdefault(frame, "the frame cannot be read")
+                each.reasons.setdefault(frame, "Scan4D cannot read the frame")
             continue
         for each, values in zip_longest(asked, kept):
             checkpoint()

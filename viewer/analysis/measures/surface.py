@@ -310,7 +310,7 @@ class PoseSurface:
         ):
             line = geodesics.path(start, end)
             if line is None:
-                return Refused("no surface joins {} and {}", (number, number + 1))
+                return Refused("no surface connects {} and {}", (number, number + 1))
             lines.append(line)
         return Circuit(patch, tuple(numbers), tuple(lines), lids)
 

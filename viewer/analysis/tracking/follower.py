@@ -179,7 +179,7 @@ class Follower:
     ) -> Sighting:
         """Look for it in the next frame by the surface around it. carried: where a body has carried it."""
         if self._wide is None or self._fine is None:
-            return Sighting.gap("there is no surface where it was set")
+            return Sighting.gap("there is no surface where you placed it")
         try:
             return self._registered(surface, self._guesses(surface, before, carried), carried)
         except _Lost as lost:
@@ -206,7 +206,7 @@ class Follower:
         returned = wide.turn @ (self._back(surface, fine.place, wide.turn) - self._place)
         apart = float(np.linalg.norm(returned))
         if apart > self._bound:
-            raise _Lost(f"forward and backward are {apart:.3g} apart")
+            raise _Lost(f"tracking forward and backward gives positions that are {apart:.3g} apart")
         between = fine.place - wide.place
         covariance = (
             _NOISE * fine.covariance
@@ -217,7 +217,7 @@ class Follower:
         if hold is not None and carried is not None:
             aside = fine.place - carried.place
             if np.linalg.norm(aside) > _ASIDE * self.spacing:
-                raise _Lost("the body around it went elsewhere")
+                raise _Lost("the surface around it moved differently")
             left_out = _LEFT_OUT * fine_patch.radius * np.linalg.norm(fine.bent)
             covariance += left_out**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
             unsure = (_SLIPPED if hold.slip() > self._bound else _UNSURE) * self.spacing
@@ -225,7 +225,7 @@ class Follower:
         self._found, self._fine_found, self._is_lost = wide.at(fine.place), fine, False
         self._region = Placement(fine.place, wide.turn)
         if np.linalg.eigvalsh(covariance)[-1] > unsure**2:
-            return Sighting.gap("its place along the surface is not sure")
+            return Sighting.gap("its position along the surface is too uncertain")
         placed = wide.turn @ self._spread @ wide.turn.T
         return Sighting(fine.place + self._origin, covariance + placed)
 
@@ -242,13 +242,13 @@ class Follower:
         self, patch: SurfacePatch, surface: MomentSurface, guesses: Iterator[Placement]
     ) -> Placement:
         """The wide patch on a surface, from the first guess from which it fits. Raises _Lost."""
-        reason = "the region around it was not found"
+        reason = "tracking did not find the region around it"
         for start in guesses:
             fit = registered(patch, surface, start, _WIDE[self._is_held], self._loose)
             if fit is None or fit.kept < self._settings.least_kept:
-                reason = "too little of the surface around it was found"
+                reason = "tracking found too little of the surface around it"
             elif fit.deviation > self._limit(_OFF_WIDE):
-                reason = "the surface around it has another shape"
+                reason = "the surface around it has a different shape"
             else:
                 return fit
         raise _Lost(reason)
@@ -262,7 +262,7 @@ class Follower:
         if fine is None or fine.middle < _MIDDLE:
             raise _Lost("it is hidden, or there is a hole")
         if fine.deviation > self._limit(_OFF_FINE):
-            raise _Lost("the surface around it has another shape")
+            raise _Lost("the surface around it has a different shape")
         return fine
 
     def _back(self, surface: MomentSurface, place: Float, turn: Float) -> Float:
@@ -273,9 +273,9 @@ class Follower:
             start = Placement(self._place, turn.T)
             back = registered(patch, self._own, start, _BACK[self._is_held], self._loose)
         if back is None or back.kept < self._settings.least_kept:
-            raise _Lost("the way back was not found")
+            raise _Lost("tracking back did not find it again")
         if back.deviation > self._limit(_OFF_WIDE):
-            raise _Lost("the surface around it had another shape")
+            raise _Lost("the surface around it had a different shape")
         return back.place
 
     def _guesses(

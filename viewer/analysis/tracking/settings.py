@@ -33,7 +33,7 @@ class TrackingSettings:
             1.0 if self.bound is None else self.bound,
         )
         if not all(0 < number < float("inf") for number in numbers):
-            raise InputError("tracking's radii and bounds are numbers above 0")
+            raise InputError("the radii and limits of tracking must be above 0")
 
     def bound_at(self, spacing: float) -> float:
         """The bound of a scan with this spacing, scan units."""

@@ -208,7 +208,7 @@ class Tracker:
                     key = self._moment(part.spot.frame)
                     part.topology = key.pose.overview.topology
             except InputError as error:
-                part.seen[frame] = Sighting.gap(f"{error.where or 'a frame'} is not readable: {error.what}")
+                part.seen[frame] = Sighting.gap(f"{error.where or 'a frame'} cannot be read: {error.what}")
                 continue
             if part.is_exact_in(topology):
                 part.seen[frame] = _exact(part.spot, moment.pose)
@@ -388,7 +388,7 @@ def _exact(spot: SurfacePoint, pose: Pose) -> Sighting:
     """A spot in a pose of the same topology."""
     there = followed(spot, pose)
     if there is None:
-        return Sighting.gap("its points are missing in this frame")
+        return Sighting.gap("this frame lacks its points")
     spread = np.zeros((3, 3)) if there.spread is None else there.spread
     return Sighting(np.array(there.position), spread)
 

@@ -103,8 +103,12 @@ def write_landmarks(path: Path | str, landmarks: LandmarkSet, axes: str = "LPS")
         landmarks = landmarks.turned()
     if not _NUMBER.search(path.name):
         if len(landmarks) > 1 and getattr(module, "ONE_MOMENT", False):
-            hint = f"Name a file a frame, such as '{_series_name(path)}', or use .c3d or .csv"
-            raise InputError(f"{module.TITLE} holds one moment, but there are {len(landmarks)}", path, hint)
+            hint = f"Write one file per frame, such as '{_series_name(path)}', or use .c3d or .csv"
+            raise InputError(
+                f"{module.TITLE} files hold one frame, but the landmarks have {len(landmarks)} frames",
+                path,
+                hint,
+            )
         return _write(module, path, landmarks)
     remark = None
     for row, frame in enumerate(landmarks.frames):
@@ -126,14 +130,16 @@ def _read(path: Path, unit: str | None, axes: str, frame: int | None) -> Landmar
     with _one_message_of(path, module):
         found: LandmarkSet = module.read(path)
         if frame is not None and len(found) > 1:
-            raise InputError(f"holds {len(found)} moments, and is one of a series of files of one each")
+            raise InputError(f"holds {len(found)} frames, but each file of a series must hold one")
     if found.axes not in (None, axes):
         found = found.turned()
     found = found.in_unit(unit)
     if (np.abs(found.positions) > _FARTHEST).any():
-        raise InputError(f"has coordinates beyond {_FARTHEST:g}", path, "Check its unit")
+        raise InputError(f"has coordinates larger than {_FARTHEST:g}", path, "Check the unit of the file")
     if (np.abs(found.sigmas) > _FARTHEST).any():
-        raise InputError(f"has standard deviations beyond {_FARTHEST:g}", path, "Check its unit")
+        raise InputError(
+            f"has standard deviations larger than {_FARTHEST:g}", path, "Check the unit of the file"
+        )
     return found if frame is None else replace(found, frames=np.array([frame]), is_framed=True)
 
 
@@ -162,7 +168,7 @@ def _joined(parts: list[LandmarkSet], path: Path) -> LandmarkSet:
     column = {name: number for number, name in enumerate(names)}
     units = {part.unit for part in parts}
     if len(units) > 1:
-        raise InputError(f"its files are in several units: {', '.join(map(str, units))}", path)
+        raise InputError(f"the files of the series use several units: {', '.join(map(str, units))}", path)
     for row, part in enumerate(parts):
         columns = [column[name] for name in part.names]
         positions[row, columns], known[row, columns] = part.positions[0], part.known[0]
@@ -211,7 +217,7 @@ def _files_of(path: Path) -> list[tuple[int, Path]]:
     found = ((re.fullmatch(f"{head}([0-9]{{1,9}}){tail}", name), name) for name in names)
     files = {int(number[1]): path.with_name(name) for number, name in found if number and int(number[1])}
     if not files:
-        raise InputError("no file has such a name", path, "Frames count from 1")
+        raise InputError("no file matches this name", path, "The numbers of the files start at 1")
     return [(number - 1, files[number]) for number in sorted(files)]
 
 
@@ -247,7 +253,7 @@ def _readable_module(path: Path) -> ModuleType:
     if module is None:
         known = ", ".join(landmark_suffixes())
         raise InputError(
-            f"unknown file suffix '{shortened(path.suffix)}' of landmarks", path, f"Known: {known}"
+            f"unknown file suffix '{shortened(path.suffix)}' for landmarks", path, f"Known: {known}"
         )
     if is_empty:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")

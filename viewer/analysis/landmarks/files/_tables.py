@@ -24,7 +24,7 @@ _KNOWN = {word: known for known, word in STATES.items()}
 _NAMES = ("name", "label", "landmark", "id")
 _AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE | re.DOTALL)
 _FRAMES, _TIMES = ("frame", "frames"), ("time", "seconds", "t")
-_HINT = "Give each row as many values as there are names in the first line"
+_HINT = "Give each row one value for each column that the first line names"
 
 
 def has_columns(head: str) -> bool:
@@ -56,7 +56,9 @@ def read_table(path: Path) -> LandmarkSet:
     if columns := _wide_columns(head):
         return _wide(rows, names, columns)
     raise at_line(
-        "names neither x, y and z nor NAME_x, NAME_y and NAME_z", 1, "The first line names the columns"
+        "has neither the columns x, y and z nor NAME_x, NAME_y and NAME_z",
+        1,
+        "The first line must name the columns",
     )
 
 
@@ -88,11 +90,11 @@ class _Units:
             return 1.0
         if self.unit is None:
             if usable_unit(word) is None:
-                raise at_line(f"'{shortened(word)}' is no unit of length", line)
+                raise at_line(f"'{shortened(word)}' is not a unit of length", line)
             self.unit = word
         factor = conversion(word, self.unit)
         if factor is None:
-            raise at_line(f"lengths are in '{shortened(word)}', those above in '{self.unit}'", line)
+            raise at_line(f"lengths are in '{shortened(word)}', but in '{self.unit}' in the rows above", line)
         return factor
 
 
@@ -101,7 +103,7 @@ def _frame(word: str, line: int) -> int:
     word = word.strip()
     frame = count_of(word[:-2] if word.endswith(".0") else word, line, "the frame")
     if frame < 1:
-        raise at_line("has a frame 0, and they count from 1", line)
+        raise at_line("has the frame 0, but the first frame is 1", line)
     return frame - 1
 
 
@@ -116,7 +118,7 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
     cells, numerals = array("q"), array("d")  # frame, number, line and state; x, y, z and sigma of each row
     for line, row in rows:
         if len(row) != len(columns):
-            raise at_line(f"has {len(row)} values, and {len(columns)} columns have a name", line, _HINT)
+            raise at_line(f"has {len(row)} values for {len(columns)} columns", line, _HINT)
         if kind_at is not None and row[kind_at].strip().lower() != "landmark":
             continue
         frame = 0 if frame_at is None else _frame(row[frame_at], line)
@@ -140,7 +142,7 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
         again = np.setdiff1d(np.arange(len(at)), first)[0]
         name = list(numbers)[number_of_row[again]]
         what = f"'{shortened(name)}' appears twice in one frame"
-        raise at_line(what, int(lines[again]), "Give each its own name")
+        raise at_line(what, int(lines[again]), "Give each landmark its own name")
     values, known = np.full((len(frames) * len(numbers), 4), np.nan), np.zeros(len(frames) * len(numbers))
     values[at], known[at] = np.array(numerals).reshape(-1, 4), states
     shape = len(frames), len(numbers)
@@ -161,7 +163,7 @@ def _state(word: str | None, place: Sequence[float], line: int) -> int:
         return Known.PLACED if all(map(math.isfinite, place)) else Known.PENDING
     if (word := word.strip().lower()) not in _KNOWN:
         known = ", ".join(filter(None, _KNOWN))
-        raise at_line(f"the state is '{shortened(word)}'", line, f"Known: {known}")
+        raise at_line(f"unknown state '{shortened(word)}'", line, f"Known: {known}")
     return _KNOWN[word]
 
 
@@ -184,10 +186,14 @@ def _wide(
     positions: list[list[list[float]]] = []
     for line, row in rows:
         if len(row) != len(columns):
-            raise at_line(f"has {len(row)} values, and {len(columns)} columns have a name", line, _HINT)
+            raise at_line(f"has {len(row)} values for {len(columns)} columns", line, _HINT)
         frames.append(len(frames) if frame_at is None else _frame(row[frame_at], line))
         if len(frames) > 1 and frames[-1] <= frames[-2]:
-            raise at_line(f"its frame is {frames[-1] + 1}, after {frames[-2] + 1}", line, "Sort the frames")
+            raise at_line(
+                f"its frame is {frames[-1] + 1}, but the row above has {frames[-2] + 1}",
+                line,
+                "Sort the rows by frame",
+            )
         check_cells(len(frames), len(landmarks))
         times.append(math.nan if time_at is None else number_of(row[time_at], line))
         factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)

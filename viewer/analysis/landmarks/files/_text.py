@@ -32,7 +32,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
         held = os.fstat(stream.fileno()).st_size  # Python takes memory for all that it is asked for
         data = stream.read(min(held, most) + 1)
     if len(data) > most:
-        raise InputError(f"is longer than the {most:,} bytes that are read of landmarks")
+        raise InputError(f"is longer than the {most:,} bytes that a file of landmarks may have")
     return data
 
 
@@ -71,25 +71,25 @@ def number_of(word: str, line: int) -> float:
     if word.lower() in _ABSENT:
         return math.nan
     if _REAL.fullmatch(word) is None:
-        hint = "Decimals follow a point" if re.fullmatch(r"-?\d+,\d+", word) else None
-        raise at_line(f"'{shortened(word)}' is no number", line, hint)
+        hint = "Use a decimal point" if re.fullmatch(r"-?\d+,\d+", word) else None
+        raise at_line(f"'{shortened(word)}' is not a number", line, hint)
     value = float(word.replace("d", "e").replace("D", "e"))
     if abs(value) > _LARGEST:
-        raise at_line(f"'{shortened(word)}' is beyond {_LARGEST:g}", line)
+        raise at_line(f"'{shortened(word)}' is larger than {_LARGEST:g}", line)
     return value
 
 
 def count_of(word: str, line: int, what: str) -> int:
     """A whole number that counts something, below 10^9. Raises InputError."""
     if not re.fullmatch(r"\+?\d{1,9}", word.strip(), re.ASCII):
-        raise at_line(f"{what} is '{shortened(word.strip())}', which is no number of things", line)
+        raise at_line(f"{what} is '{shortened(word.strip())}', which is not a whole number", line)
     return int(word)
 
 
 def three_numbers(words: Sequence[str], line: int) -> list[float]:
     """The three coordinates of a line. Raises InputError where it has not so many."""
     if len(words) < 3:
-        raise at_line(f"has {len(words)} coordinates, not three: '{shortened(' '.join(words))}'", line)
+        raise at_line(f"has {len(words)} coordinates instead of three: '{shortened(' '.join(words))}'", line)
     return [number_of(word, line) for word in words[:3]]
 
 
@@ -146,5 +146,7 @@ def own_unit(values: Mapping[str, Any]) -> str | None:
 def without_states(landmarks: LandmarkSet, title: str) -> str | None:
     """The remark of a format that has no states, where the landmarks have some."""
     if (landmarks.known == Known.TRACKED).any() or np.isfinite(landmarks.sigmas).any():
-        return f"{title} has no states and no uncertainty: what was tracked reads as placed"
+        return (
+            f"{title} stores no states and no uncertainty: tracked landmarks count as placed when you read it"
+        )
     return None

@@ -34,7 +34,7 @@ def read(path: Path) -> LandmarkSet:
             if key == "coordinatesystem":
                 if value.upper() not in _AXES:
                     hint = "Known: RAS (0) and LPS (1)"
-                    raise at_line(f"the coordinate system is '{shortened(value)}'", line, hint)
+                    raise at_line(f"unknown coordinate system '{shortened(value)}'", line, hint)
                 axes = _AXES[value.upper()]
             elif key == "columns":
                 named = [name.strip() for name in value.split(",")]
@@ -52,7 +52,7 @@ def read(path: Path) -> LandmarkSet:
         state = _STATES.get(values.get("positionStatus", "").strip())
         if state is None:
             raise at_line(
-                f"the positionStatus is '{shortened(values['positionStatus'])}'", line, "Known: 0, 1, 2"
+                f"unknown positionStatus '{shortened(values['positionStatus'])}'", line, "Known: 0, 1, 2"
             )
         is_undefined = values.get("positionStatus", "").strip() == "0"
         positions.append([math.nan] * 3 if is_undefined else position)

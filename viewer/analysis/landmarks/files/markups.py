@@ -50,14 +50,14 @@ def read(path: Path) -> LandmarkSet:
         raise InputError("has no list of markups", hint="Save it as .mrk.json in 3D Slicer")
     schema = data.get("@schema", _SCHEMA)
     if not isinstance(schema, str) or not _READ.search(schema):
-        raise InputError(f"is of the schema '{shortened(schema)}', and not of markups 1.x")
+        raise InputError(f"has the schema '{shortened(schema)}', but Scan4D reads markups 1.x")
     parts = [_markup(markup, f"markup {number}") for number, markup in enumerate(data["markups"], 1)]
     parts = [part for part in parts if part["names"]]
     if not parts:
         raise InputError("holds no landmarks")
     if len({part["axes"] for part in parts}) > 1 or len({part["unit"] for part in parts}) > 1:
         raise InputError(
-            "its markups are in several coordinate systems or units", hint="Save them one by one"
+            "its markups are in several coordinate systems or units", hint="Save each markup to its own file"
         )
     own = _own(data)
     unit = _word(own["unit"]) if "unit" in own else parts[0]["unit"]
@@ -78,10 +78,10 @@ def read(path: Path) -> LandmarkSet:
 def _markup(markup: Any, where: str) -> dict[str, Any]:
     """Names, positions, states, uncertainties, descriptions, axes and unit of one markup."""
     if not isinstance(markup, dict):
-        raise InputError("is no object", where)
+        raise InputError("is not a JSON object", where)
     points = markup.get("controlPoints", [])
     if not isinstance(points, list):
-        raise InputError("its controlPoints are no list", where)
+        raise InputError("controlPoints is not a list", where)
     count = len(points)
     positions = np.full((count, 3), np.nan)
     known, sigmas = np.full(count, Known.PENDING, np.uint8), np.full(count, np.nan)
@@ -89,14 +89,14 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
     for row, point in enumerate(points):
         at = f"{where}, control point {row + 1}"
         if not isinstance(point, dict):
-            raise InputError("is no object", at)
+            raise InputError("is not a JSON object", at)
         names.append(_word(point.get("label")))
         about.append(_word(point.get("description")))
         status = _word(point.get("positionStatus", "defined"))
         status = _CODED_STATES.get(status, status).lower()
         if status not in _STATES:
             raise InputError(
-                f"its positionStatus is '{shortened(status)}'", at, "Known: " + ", ".join(_STATES)
+                f"unknown positionStatus '{shortened(status)}'", at, "Known: " + ", ".join(_STATES)
             )
         known[row] = _STATES[status]
         own = _own(point)
@@ -113,10 +113,10 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
     remarks = []
     if lost:
         remarks.append(
-            f"{len(lost)} are marked as defined without a position, such as '{shortened(lost[0])}'"
+            f"{len(lost)} points are marked as defined without a position, such as '{shortened(lost[0])}'"
         )
     if previews:
-        are = "is a preview" if len(previews) == 1 else "are previews"
+        are = "point is a preview" if len(previews) == 1 else "points are previews"
         remarks.append(
             f"{len(previews)} {are}, which nobody has confirmed, such as '{shortened(previews[0])}'"
         )
@@ -151,7 +151,7 @@ def _position(value: Any, where: str) -> list[float]:
         return [math.nan] * 3
     fits = isinstance(value, list) and len(value) == 3
     if not fits or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in value):
-        raise InputError(f"its position is {shortened(value)}, and not three numbers", where)
+        raise InputError(f"position is {shortened(value)} instead of three numbers", where)
     return [float(one) if abs(one) < 1e300 else math.nan for one in value]
 
 
@@ -159,7 +159,7 @@ def _axes(value: Any, where: str) -> str:
     """The name of the coordinate system, also of the numbers that stand for it in old files."""
     name = _CODED_AXES.get(_word(value), _word(value)).upper()
     if name not in _CODED_AXES.values():
-        raise InputError(f"its coordinateSystem is {shortened(value)}", where, "Known: LPS, RAS")
+        raise InputError(f"unknown coordinateSystem {shortened(value)}", where, "Known: LPS, RAS")
     return name
 
 
@@ -167,7 +167,7 @@ def _unit(value: Any, where: str) -> str:
     """A unit as a word, or as a code of a scheme with its meaning: ["mm", "UCUM", "millimeter"]."""
     word = value[0] if isinstance(value, list) and value else value
     if not isinstance(word, str):
-        raise InputError(f"its coordinateUnits are {shortened(value)}", where, "Known: mm, um")
+        raise InputError(f"unknown coordinateUnits {shortened(value)}", where, "Known: mm, um")
     return "µm" if word == "um" else word
 
 

@@ -60,17 +60,20 @@ def read(path: Path) -> LandmarkSet:
             current = sections[name] = []
         elif current is None:
             raise at_line(
-                f"stands before any section: '{shortened(text)}'", line, "[individuals] comes first"
+                f"is outside any section: '{shortened(text)}'", line, "Start the file with [individuals]"
             )
         else:
             current.append((line, text))
     individuals, count, dimensions = (_count(sections, name) for name in _COUNTS)
     if dimensions not in (2, 3):
-        raise InputError(f"has {dimensions} dimensions", hint="2 and 3 are read")
+        raise InputError(f"has {dimensions} dimensions", hint="Scan4D reads 2 and 3")
     raw = sections.get("rawpoints", [])
     places = [(line, text) for line, text in raw if not text.startswith("'")]
     if len(places) != individuals * count:
-        what = f"holds {len(places)} places, and promises {count} of each of {individuals} individuals"
+        what = (
+            f"holds {len(places)} positions, but [individuals] and [landmarks] announce {individuals} "
+            f"times {count}"
+        )
         raise InputError(what, "[rawpoints]")
     own: dict[str, Any] = {}
     for _, text in raw:
@@ -81,9 +84,9 @@ def read(path: Path) -> LandmarkSet:
         three_numbers([*re.split(r"[\s,;]+", text)[:dimensions], *flat], line) for line, text in places
     ]
     left_out = dict.fromkeys(_LEFT_OUT[name] for name in sections if name in _LEFT_OUT)
-    remarks = [f"Its {' and '.join(left_out)} are left out"] if left_out else []
+    remarks = [f"Scan4D leaves out its {' and '.join(left_out)}"] if left_out else []
     if flat:
-        remarks.append("Its landmarks have two coordinates: z is taken for 0")
+        remarks.append("Its landmarks have two coordinates: Scan4D sets z to 0")
     frames = _listed(own.get("frames"), individuals)
     names = own_names(own, count)
     if names is None:
@@ -100,7 +103,7 @@ def read(path: Path) -> LandmarkSet:
 
 def _count(sections: dict[str, list[tuple[int, str]]], name: str) -> int:
     if not sections.get(name):
-        raise InputError(f"has no number below [{name}]")
+        raise InputError(f"has no number in the section [{name}]")
     line, text = sections[name][0]
     return count_of(text, line, f"[{name}]")
 

@@ -45,7 +45,7 @@ def read(path: Path) -> LandmarkSet:
 
     data = read_bytes(path, _MOST_BYTES)
     if len(data) < 2 * _BLOCK or data[1] != _MAGIC:
-        raise InputError("is no C3D file, or is cut short")
+        raise InputError("is not a C3D file, or is cut short")
     with _library():
         reader = Reader(BytesIO(data))
         count, frames, first = int(reader.point_used), int(reader.frame_count), int(reader.first_frame)
@@ -55,7 +55,7 @@ def read(path: Path) -> LandmarkSet:
     if not count:
         raise InputError("holds no points")
     if frames < 1 or frames * (4 * count + analog) * words > held:
-        raise InputError(f"promises {frames:,} frames of {count:,} points, and is shorter")
+        raise InputError(f"announces {frames:,} frames of {count:,} points, but ends earlier")
     check_cells(frames, count)
     with _library():
         values = np.stack([points for _, points, _ in reader.read_frames(analog_transform=False)])
@@ -70,7 +70,7 @@ def read(path: Path) -> LandmarkSet:
         frames=numbers,
         unit=_unit(reader),
         about=_texts(reader, "DESCRIPTIONS", count),
-        remarks=[] if labels else ["Its points have no names, and got numbers"],
+        remarks=[] if labels else ["Its points have no names: Scan4D numbers them"],
     )
 
 
@@ -127,7 +127,7 @@ def write(path: Path, landmarks: LandmarkSet) -> str | None:
     landmarks = landmarks.even_rows()
     count = len(landmarks.names)
     if count > _MOST_POINTS:
-        raise InputError(f"C3D holds {_MOST_POINTS} points at most", hint="Use .csv")
+        raise InputError(f"C3D holds at most {_MOST_POINTS} points", hint="Use .csv")
     rate, is_even = _rate(landmarks)
     longest = min(_LONGEST, _TEXTS // count)
     labels = _labels(landmarks.names, longest)
@@ -137,7 +137,7 @@ def write(path: Path, landmarks: LandmarkSet) -> str | None:
     writer.point_group.add("UNITS", "Unit of lengths", -1, "", unit, len(unit))
     _add_texts(writer, "LABELS", "Names of the points", labels)
     _add_texts(
-        writer, "DESCRIPTIONS", "How they are found", [_cut(text, longest) for text in landmarks.about]
+        writer, "DESCRIPTIONS", "How to find the points", [_cut(text, longest) for text in landmarks.about]
     )
     writer.add_frames(list(_points(landmarks)))
     with open(path, "wb") as stream, warnings.catch_warnings(action="ignore"):
@@ -201,13 +201,13 @@ def _remark(landmarks: LandmarkSet, labels: Sequence[bytes], longest: int, is_ev
     """Losses of the file, in words."""
     lost = []
     if any(label.decode() != name for label, name in zip(labels, landmarks.names, strict=True)):
-        lost.append(f"names longer than {longest} bytes are cut")
+        lost.append(f"names end after {longest} bytes")
     if not is_even:
-        lost.append("times are even, from 0")
+        lost.append("frames have regular times that start at 0")
     points = landmarks.positions[landmarks.is_defined]
     if len(points):
         off = np.abs(points.astype(np.float32) - points).max()
         if off > _ROUNDED * max(float(np.ptp(points, axis=0).max()), 1e-300):
-            lost.append(f"coordinates are rounded, by up to {off:.2g}")
-    remarks = [f"In C3D {'; '.join(lost)}"] if lost else []
+            lost.append(f"coordinates are rounded by up to {off:.2g}")
+    remarks = [f"In C3D, {'; '.join(lost)}"] if lost else []
     return ". ".join(filter(None, [*remarks, without_states(landmarks, TITLE)])) or None

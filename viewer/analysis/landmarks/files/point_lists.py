@@ -70,13 +70,13 @@ def read(path: Path) -> LandmarkSet:
     if waiting is not None:
         raise at_line(f"'{shortened(waiting[1])}' has no coordinates", waiting[0])
     if promised is not None and promised[0] != len(rows):
-        raise at_line(f"promises {promised[0]} landmarks, and {len(rows)} are there", promised[1])
+        raise at_line(f"announces {promised[0]} landmarks, but {len(rows)} follow", promised[1])
     if not any(names):
         names = [str(number) for number in range(1, len(rows) + 1)]
         if _are_numbered(rows):
             names, rows = [str(int(row[0])) for row in rows], [row[1:] for row in rows]
     flat = sum(len(row) == 2 for row in rows)
-    remarks = [f"{flat} landmarks have two coordinates: z is taken for 0"] if flat else []
+    remarks = [f"{flat} landmarks have two coordinates: Scan4D sets z to 0"] if flat else []
     places = [_place(row, has_flags) for row in rows]
     return LandmarkSet.of(names, np.array([places]), remarks=remarks)
 

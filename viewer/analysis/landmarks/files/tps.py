@@ -61,7 +61,9 @@ def read(path: Path) -> LandmarkSet:
         match = _KEY.fullmatch(text)
         if match is None:
             raise at_line(
-                "is neither a place that was announced nor KEY=VALUE", line, "Count the places of LM="
+                "is neither KEY=VALUE nor one of the positions that LM= announces",
+                line,
+                "Check the number after LM= or LM3=",
             )
         key, value = match[1].upper(), match[2].strip()
         if key in ("LM", "LM3"):
@@ -75,11 +77,11 @@ def read(path: Path) -> LandmarkSet:
         elif key == "SCALE" and specimens:
             specimens[-1].scale = number_of(value, line)
             if not specimens[-1].scale > 0:
-                raise at_line(f"the scale is '{value}', and not above 0", line)
+                raise at_line(f"the scale is '{value}', but must be above 0", line)
         elif key == "COMMENT" and specimens:
             specimens[-1].own |= own_values(value)
     if not specimens:
-        raise InputError("holds no specimen", hint="One begins with LM= or LM3=")
+        raise InputError("holds no specimen", hint="A specimen begins with LM= or LM3=")
     return _frames(specimens, curves)
 
 
@@ -88,12 +90,12 @@ def _points(
 ) -> tuple[list[list[float]], int]:
     """The coordinates of a specimen, and the row after them. A place in two dimensions has z = 0."""
     if count > len(lines) - row:
-        raise at_line(f"announces {count} places, and {len(lines) - row} lines follow", line)
+        raise at_line(f"announces {count} landmarks, but {len(lines) - row} lines follow", line)
     points: list[list[float]] = []
     for number, text in lines[row : row + count]:
         words = text.split()
         if "=" in text:
-            what = f"announces {count} places, and {len(points)} are there"
+            what = f"announces {count} landmarks, but {len(points)} follow"
             raise at_line(what, line)
         points.append(three_numbers([*words[:2], "0"] if is_flat and len(words) >= 2 else words, number))
     return points, row + count
@@ -103,7 +105,7 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
     count = max(len(specimen.points) for specimen in specimens)
     for number, specimen in enumerate(specimens, 1):
         if len(specimen.points) not in (0, count):
-            what = f"specimen {number} has {len(specimen.points)} landmarks, and another one {count}"
+            what = f"specimen {number} has {len(specimen.points)} landmarks, but another specimen has {count}"
             raise at_line(what, specimen.line)
     missing = [[math.nan] * 3] * count
     positions = np.array([specimen.points or missing for specimen in specimens]).reshape(-1, count, 3)
@@ -111,9 +113,9 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
     own = specimens[0].own
     remarks = []
     if curves:
-        remarks.append(f"{curves} curves are left out")
+        remarks.append(f"Scan4D leaves out {curves} curves")
     if any(specimen.is_flat for specimen in specimens):
-        remarks.append("Its landmarks have two coordinates: z is taken for 0")
+        remarks.append("Its landmarks have two coordinates: Scan4D sets z to 0")
     names = own_names(own, count)
     if names is None:
         names = [str(number) for number in range(1, count + 1)]

@@ -62,7 +62,9 @@ def measure_kinds() -> Mapping[str, MeasureKind]:
 
     def add(_: str, module: ModuleType) -> None:
         if taken := found.keys() & {kind.name for kind in module.KINDS}:
-            raise InputError(f"there is a measure '{min(taken)}' already", hint="Rename the new one")
+            raise InputError(
+                f"a kind of measure '{min(taken)}' exists already", hint="Give the new one another name"
+            )
         found.update((kind.name, kind) for kind in module.KINDS)
 
     load_modules("measures", __name__, __path__, add)

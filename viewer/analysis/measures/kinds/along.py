@@ -58,7 +58,7 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     how = options.get("plane", PLANES[0])
     center, normal = plane_of(local, how)
     if not np.isfinite(normal).all():
-        return Refused("its landmarks lie on a line and give no plane")
+        return Refused("its landmarks lie on a line, so they define no plane")
 
     def beyond(points: Points) -> NDArray[np.float64]:
         return np.abs((points - center) @ normal) - _SLAB * surface.spacing
@@ -66,11 +66,11 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     patch = surface.patch(beyond)
     lines = _contours(patch, center, normal, local[0], options)
     if not lines:
-        return Refused("the plane of its landmarks meets no surface")
+        return Refused("the plane through its landmarks meets no surface")
     if options.get("lines") != "all" and _ends_at_opening(
         surface, lines[0], plane_section(patch, center, normal)
     ):
-        return Refused("its line ends at an opening: close it, or take all lines")
+        return Refused("its line ends at an opening in the surface: close the opening, or choose all lines")
     gradient = np.zeros_like(positions)
     step = _STEP * surface.spacing
     for number in range(len(local)):
@@ -123,11 +123,11 @@ def _ends_at_opening(surface: PoseSurface, line: Line, lines: Sequence[Line]) ->
 
 KINDS = (
     MeasureKind(
-        "path", "Path along the surface", "through landmarks in their order, the shortest between them",
+        "path", "Path along the surface", "shortest path on the surface from each landmark to the next",
         "length", 2, None, _path, True, {"closed": ("no", "yes")},
     ),
     MeasureKind(
-        "section", "Cross-section", "the length of the line in which the plane of landmarks cuts the surface",
+        "section", "Cross-section", "length of the line where the landmarks' plane cuts the surface",
         "length", 3, None, _section, True, {"lines": ("nearest", "all"), "plane": PLANES},
     ),
 )  # fmt: skip

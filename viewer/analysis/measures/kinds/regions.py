@@ -60,7 +60,7 @@ def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bo
     patch = patch_through(surface, prism)
     lines = rim_through(patch, prism) if len(patch.faces) else []
     if not lines:
-        return Refused("there is no surface before or behind its outline")
+        return Refused("there is no surface in front of or behind its outline")
     if is_rim:
         value, deviation = sum(map(length_of, lines)), off_smooth(surface, lines)
     else:
@@ -101,7 +101,7 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
     if isinstance(region, Refused):
         return region
     if region.share < WHOLE:
-        return Refused(f"only {100 * region.share:.0f} % of the area within its outline has surface")
+        return Refused(f"the surface fills only {100 * region.share:.0f} % of its outline")
     piece = region.piece
     edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]
     around = np.concatenate(edges)
@@ -170,16 +170,17 @@ def _pulled(edges: list[Line]) -> list[NDArray[np.float64]]:
 
 KINDS = (
     MeasureKind(
-        "area", "Area of a region", "within the paths along the surface from landmark to landmark",
+        "area", "Area of a region", "inside an outline that follows the surface between landmarks",
         "area", 3, None, _area, True, {"depth": DEPTHS},
     ),
     MeasureKind(
-        "perimeter", "Perimeter of a region", "the paths along the surface from landmark to landmark",
+        "perimeter", "Perimeter of a region",
+        "length of an outline that follows the surface between landmarks",
         "length", 3, None, _perimeter, True, {"depth": DEPTHS},
     ),
     MeasureKind(
         "volume", "Volume above the outline's plane",
-        "between a region and the plane of its outline; negative beneath",
+        "between a region and the plane of its outline; negative below the plane",
         "volume", 3, None, _volume, True,
     ),
 )  # fmt: skip

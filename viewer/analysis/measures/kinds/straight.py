@@ -10,7 +10,7 @@ from ..planes import PLANES, plane_of
 from . import MeasureKind, Options
 
 _BETWEEN = 32  # places on a curve from one landmark to the next
-_PLANE = "then those of the plane: three or more that it lies nearest to, or pairs that it lies between"
+_PLANE = "the other landmarks define the plane: it fits three or more, or lies halfway between pairs"
 
 Positions = NDArray[np.float64]  # (T, K, 3)
 Values = NDArray[np.float64]  # (T,)
@@ -120,11 +120,11 @@ KINDS = (
         "angle", 5, None, _plane_angle, choices={"plane": PLANES}, lines=_plane_angle_lines,
     ),
     MeasureKind(
-        "plane_distance", "Distance to a plane", f"of the first landmark, with its sign; {_PLANE}",
+        "plane_distance", "Distance to a plane", f"of the first landmark, negative on one side; {_PLANE}",
         "length", 4, None, _plane_distance, choices={"plane": PLANES}, lines=_plane_distance_lines,
     ),
     MeasureKind(
-        "curve", "Curve", "through landmarks in their order, not along the surface",
+        "curve", "Curve", "line through the landmarks in order, smooth or straight, not along the surface",
         "length", 2, None, _curve, choices={"shape": ("smooth", "straight"), "closed": ("no", "yes")},
         lines=_curve_lines,
     ),
