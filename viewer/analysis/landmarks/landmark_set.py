@@ -206,7 +206,7 @@ def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     remarks = []
     if twice:
         remarks.append(
-            f"{_counted(len(twice), 'name')} appeared more than once and got a number: '{shortened(twice[0])}'"
+            f"{_counted(len(twice), 'name')} appeared twice and got a number, such as '{shortened(twice[0])}'"
         )
     if unnamed:
         remarks.append(f"{_counted(unnamed, 'landmark')} had no name and got a number")
