@@ -70,14 +70,15 @@ def test_a_frame_and_a_scan_without_the_scalar_are_shown_and_it_comes_back(
         played = saved(app, "r").entries
         assert {(e.look.color_by == "q") == (e.pose < 2) for e in played} == {True}
         screen.do("key", "Page_Down")
-        app.told("Frame 1 has no 'q' to colour by")
+        app.see(scan=str(other))
+        assert app.settle().document["look"]["color_by"] == "auto", "another scan begins with its own colours"
         screen.do("key", "Page_Up")
         app.see(scan=str(lacking))
         screen.do("key", "ctrl+Home")
         app.settle()
         assert saved(app, "p").entries[0].look.color_by == "q"
         close(app)
-    assert sum("has no 'q'" in note for note in app.notes) == 2, "once a scan"
+    assert sum("has no 'q'" in note for note in app.notes) == 1, "once a scan"
     assert "Traceback" not in app.log()
 
 

@@ -271,7 +271,7 @@ def programs(request: pytest.FixtureRequest) -> list[list[Source]]:
     use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader
-    return [kept.extra.sources for kept in renderer.gpu._kept.values() if isinstance(kept, built)]
+    return [kept.extra.sources for kept in renderer.gpu._cached.values() if isinstance(kept, built)]
 
 
 def test_every_shader_file_is_built(programs: list[list[Source]]) -> None:

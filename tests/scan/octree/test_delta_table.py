@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from experiments.slomp_2014 import surfels as slomp
+from experiments.slomp_2014.scans import PAPER
 from numpy.typing import NDArray
 
 from viewer.scan.octree.build import Stop, build
@@ -40,12 +40,11 @@ def figure(count: int) -> NDArray[np.float64]:
     return start[bone] + share[:, None] * along[bone] + radius[bone][:, None] * outward
 
 
-@pytest.mark.parametrize("name", slomp.paper()["octrees"])
+@pytest.mark.parametrize("name", PAPER["octrees"])
 def test_depths_follow_the_papers_pattern(name: str) -> None:
-    paper = slomp.paper()
-    cloud = PointCloud.from_arrays(figure(paper["datasets"][name]["points"]))
+    cloud = PointCloud.from_arrays(figure(PAPER["datasets"][name]["points"]))
     trees = {}
-    for row in paper["octrees"][name]:
+    for row in PAPER["octrees"][name]:
         delta = row["delta_percent"] / 100
         tree = trees[delta] = build(cloud, Stop(delta=delta), attributes=False)
         assert abs(tree.depth - row["depth"]) <= 1

@@ -29,8 +29,8 @@ def draw(tool: Tool, ui: Ui) -> None:
     if not tool.made.distances:
         widgets.faint("No distances yet. Press Measure distance, then click two points on the surface.")
         return
-    for row_of in tool.rows():
-        imgui.push_id(row_of.measure.name)
+    for number, row_of in enumerate(tool.rows()):
+        imgui.push_id(number)
         if _draw_row(tool, row_of):
             tool.delete(row_of.measure.name)
         imgui.pop_id()
