@@ -104,7 +104,7 @@ def test_doctor_shows_where_each_comes_from_and_what_cannot_be_used(target: Path
         "The backend 'points' of taking-pack 3.0 is not used: Scan4D has one of this name. Rename its entry",
         "The backend 'nothing' of taking-pack 3.0 is not used: acme-good 1.2 has one of this name",
         "The reader 'other' of taking-pack 3.0 is not used: PLY already reads '.ply'. Use other suffixes",
-        "The measure 'other' of taking-pack 3.0 is not used: there is a measure 'distance' already",
+        "The measure 'other' of taking-pack 3.0 is not used: a kind of measure 'distance' exists",
     ]
     for text in expected:
         assert text in rows
@@ -132,6 +132,59 @@ def test_everything_that_works_goes_on(target: Path, tmp_path: Path) -> None:
     done = run_with(target, "-c", code)
     assert done.stdout == "True\n"
     assert done.stderr.count("\n") == 2, "a script sees the warnings, too"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "    pass",
+            "    size: float = param(1.0, 'Size', units='px')",
+            "Params.size: param has no argument units",
+        ),
+        ("    pass", "    size: float = param(1.0, 'Size', low=2)", "Params.size has a default"),
+        ("    pass", "    size: float = 1.0", "Params.size is not declared with param(...)"),
+        ("    params_class = Params\n", "", "Nothing does not define params_class"),
+        ("(frozen=True)", "", "params_class of Nothing is no frozen dataclass"),
+        ("def draw", "def paint", "Nothing does not define draw"),
+        ("'''Nothing at all.'''", "", "wrong_backend has no docstring"),
+    ],
+)
+def test_a_backend_with_faulty_declarations_is_left_out(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    imports = "import Backend\nfrom viewer.params import param"
+    module = BACKEND.replace(old, new).replace("import Backend", imports)
+    write_installed(
+        tmp_path, "acme-wrong 1.0", {"wrong_backend": module}, {"backends": {"wrong": "wrong_backend"}}
+    )
+    done = command(tmp_path, "backends")
+    assert done.returncode == 0, done.stderr
+    assert f"backend 'wrong' of acme-wrong 1.0 is not used: {message}" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "points" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("'.wrong'", "'wrong'", "the suffix 'wrong' is not lower case with a dot in front. Write '.wrong'"),
+        ("'.wrong'", "'.WRONG'", "the suffix '.WRONG' is not lower case with a dot in front. Write '.wrong'"),
+        ("def read", "def load", "it has SUFFIXES, but no read"),
+    ],
+)
+def test_a_reader_with_faulty_declarations_is_left_out(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    module = READER.format(title="Wrong", suffix=".wrong").replace(old, new)
+    write_installed(
+        tmp_path, "acme-wrong 1.0", {"wrong_reader": module}, {"readers": {"wrong": "wrong_reader"}}
+    )
+    done = command(tmp_path, "info", "demo")
+    assert done.returncode == 0, done.stderr
+    done = run_with(tmp_path, "-c", "from viewer.scan.formats import known_suffixes; print(known_suffixes())")
+    assert f"reader 'wrong' of acme-wrong 1.0 is not used: {message}" in done.stderr
+    assert ".ply" in done.stdout
 
 
 def test_nothing_is_imported_for_extensions_where_there_are_none() -> None:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, make_dataclass
+from dataclasses import dataclass, field, make_dataclass
 from itertools import groupby
 
 import numpy as np
@@ -105,6 +105,10 @@ class Grown:
         ({"size": param(1, "s", low=2)}, "Wrong.size has a default .* cannot be: size: 1 is outside"),
         ({"mode": param("one", "m", choices=("one",)), "size": param(1, "s", when={"mode": ("two",)})},
          "Wrong.size has a default .* unknown mode 'two'"),
+        ({"size": param(1, "s", units="px")}, "Wrong.size: param has no argument units"),  # type: ignore[call-arg]
+        ({"size": field(default=1)}, r"Wrong.size is not declared with param\(...\)"),
+        ({"size": param(1, "s", affects="all")}, "Wrong.size affects 'all'; it can affect draw, derive"),
+        ({"size": param((1, 2), "s")}, "Wrong.size has values of type tuple; they can be bool, int"),
     ],
 )  # fmt: skip
 def test_a_wrong_declaration_says_where(fields: dict[str, object], message: str) -> None:

@@ -130,7 +130,6 @@ def param(default: Any, help: str, **declared: Unpack[Declared]) -> Any:
     facts: dict[str, Any] = {**_DEFAULTS, "type": default.__class__, **declared}
     conditions = _conditions(facts.pop("when", None), negated=False)
     conditions += _conditions(facts.pop("unless", None), negated=True)
-    assert facts["affects"] in AFFECTS
     metadata = {"help": help, "optional": default is None, "when": tuple(conditions), **facts}
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -147,6 +146,19 @@ def describe(cls: type) -> tuple[Parameter, ...]:
 @cache
 def _described(cls: Hashable) -> tuple[Parameter, ...]:
     assert isinstance(cls, type)
+    known = {field.name for field in dataclasses.fields(Parameter)}
+    for field in dataclasses.fields(cls):
+        where = f"{cls.__qualname__}.{field.name}"
+        if "help" not in field.metadata:
+            raise TypeError(f"{where} is not declared with param(...)")
+        if (type_ := field.metadata["type"]) not in _READERS:
+            raise TypeError(
+                f"{where} has values of type {type_.__name__}; they can be bool, int, float or str"
+            )
+        if (affects := field.metadata["affects"]) not in AFFECTS:
+            raise TypeError(f"{where} affects '{affects}'; it can affect {', '.join(AFFECTS)}")
+        if unknown := sorted(field.metadata.keys() - known):
+            raise TypeError(f"{where}: param has no argument {', '.join(unknown)}")
     declared = tuple(
         Parameter(
             name=f.name, default=f.default, **{**f.metadata, "title": f.metadata["title"] or in_words(f.name)}

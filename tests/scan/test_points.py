@@ -45,6 +45,11 @@ def test_arrays_that_do_not_fit_are_explained(arrays: dict[str, np.ndarray], mes
         PointCloud.from_arrays(**arrays)
 
 
+def test_an_argument_of_another_name_is_refused() -> None:
+    with pytest.raises(TypeError, match=r"no argument intensity, time\. Attributes are normals, .*scalars="):
+        PointCloud.from_arrays(np.eye(3), time=np.arange(3), intensity=np.arange(3))  # type: ignore[call-arg]
+
+
 def test_one_far_outlier_moves_neither_origin_nor_bounds() -> None:
     body = np.random.default_rng(0).uniform(-1, 1, (5000, 3)) + 1000
     alone = PointCloud.from_arrays(body)

@@ -10,7 +10,7 @@ from whole_files import write_scans
 
 from viewer.analysis.measures.kinds import measure_kinds
 from viewer.app.tools import tool_names
-from viewer.backends import backends
+from viewer.backends import backend, backends
 from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.testing import Check, backend_checks, measure_checks, reader_checks, tool_checks
@@ -44,6 +44,25 @@ def scans(tmp_path_factory: pytest.TempPathFactory) -> Path:
 )
 def test_backends(check: Check) -> None:
     check()
+
+
+@pytest.mark.usefixtures("renderer")
+@pytest.mark.parametrize(
+    ("check", "attributes", "message"),
+    [
+        ("declarations", {"title": " "}, "title is empty"),
+        ("declarations", {"good_for": ""}, "good_for does not say"),
+        ("draw_returns_a_bool", {"draw": lambda *_: None}, "draw returns None, expected a bool"),
+    ],
+)
+def test_backends_that_say_too_little_fail(
+    check: str, attributes: dict[str, object], message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in attributes.items():
+        monkeypatch.setattr(type(backend("points")), name, value)
+    found = next(each for each in backend_checks("points") if each.name == check)
+    with pytest.raises(AssertionError, match=message):
+        found()
 
 
 @pytest.mark.parametrize("check", READERS, ids=str)

@@ -186,7 +186,7 @@ class Backend(ABC):
     @property
     def help(self) -> str:
         """One line on what it does."""
-        return self.about.splitlines()[0]
+        return self.about.strip().splitlines()[0]
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -221,7 +221,7 @@ def backends() -> dict[str, Backend]:
     found: dict[str, Backend] = {}
 
     def add(name: str, module: ModuleType) -> None:
-        found[name] = _class_of(module)(name)
+        found[name] = _checked(_class_of(module), name)
 
     load_modules("backends", __name__, __path__, add)
     return dict(sorted(found.items()))
@@ -237,6 +237,25 @@ def _class_of(module: ModuleType) -> type[Backend]:
         what = f"{module.__name__} defines {len(classes)} subclasses of Backend"
         raise InputError(what, hint="Define exactly one in this module")
     return classes[0]
+
+
+def _checked(kind: type[Backend], name: str) -> Backend:
+    """A backend of this class. Raises InputError where its declarations are not usable."""
+    missing = [each for each in ("title", "params_class") if not hasattr(kind, each)]
+    if missing := missing + sorted(kind.__abstractmethods__):
+        raise InputError(f"{kind.__qualname__} does not define {' and '.join(missing)}", hint="Define it")
+    params = kind.params_class
+    declared = getattr(params, "__dataclass_params__", None)
+    if not (isinstance(params, type) and declared is not None and declared.frozen):
+        raise InputError(f"params_class of {kind.__qualname__} is no frozen dataclass", hint="Make it one")
+    try:
+        describe(params)
+    except Exception as error:
+        raise InputError(f"{error}", hint="Correct the declaration of its parameters") from error
+    one = kind(name)
+    if not one.about.strip():
+        raise InputError(f"{kind.__module__} has no docstring", hint="Say there what it draws")
+    return one
 
 
 def backend(name: str) -> Backend:

@@ -95,8 +95,15 @@ class PointCloud:
 
         positions: (N, 3) absolute, any real type. origin: (3,); chosen by `choose_origin` if None. precise:
         whether what the coordinates have beyond float32 offsets is stored. viewpoint: (3,) absolute.
-        Raises InputError where shapes do not fit, and where the viewpoint is not finite.
+        Raises InputError where shapes do not fit, and where the viewpoint is not finite; TypeError where an
+        argument has another name.
         """
+        if unknown := sorted(attributes.keys() - CloudAttributes.__optional_keys__):
+            known = ", ".join(CloudAttributes.__annotations__)
+            raise TypeError(
+                f"PointCloud.from_arrays has no argument {', '.join(unknown)}. Attributes are {known}; pass "
+                "other numbers of points as scalars={name: values}"
+            )
         points = np.asarray(positions)
         if points.ndim != 2 or points.shape[1] != 3:
             raise InputError(f"positions have shape {points.shape}, expected (N, 3)")

@@ -13,7 +13,9 @@ from ..camera import Camera
 from ..drawing.frame import render_frame
 from ..drawing.renderer import shared_renderer
 from ..drawing.request import Request
+from ..gpu.pose import GpuPose
 from ..look import Look
+from ..picture.frame_view import FrameView
 from ..picture.sample import is_sampled
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
@@ -58,18 +60,52 @@ def backend_checks(name: str) -> list[Check]:
     if not draws_points(one):
         return []
     functions = [*_FOR_ALL, *(_FOR_POINTS if one.rows == "points" else ())]
-    return [
-        Check(function.__name__[1:], name, partial(function, variant), variant)
-        for variant in variants(one)
-        for function in functions
-    ] + [
-        Check(f"odd_size_{size[0]}x{size[1]}", name, partial(_odd_size, variant, size), variant)
-        for variant in variants(one)
-        for size in SIZES
-    ]
+    return (
+        [
+            Check("declarations", name, partial(_declarations, one)),
+            Check("draw_returns_a_bool", name, partial(_draw_returns_a_bool, one)),
+        ]
+        + [
+            Check(function.__name__[1:], name, partial(function, variant), variant)
+            for variant in variants(one)
+            for function in functions
+        ]
+        + [
+            Check(f"odd_size_{size[0]}x{size[1]}", name, partial(_odd_size, variant, size), variant)
+            for variant in variants(one)
+            for size in SIZES
+        ]
+    )
 
 
 # --- every backend ------------------------------------------------------------------------------
+
+
+def _declarations(one: Backend) -> None:
+    assert isinstance(one.title, str), "title is no text"
+    assert one.title.strip(), "title is empty"
+    assert one.help.strip(), "the docstring of its module does not say what it draws"
+    assert one.good_for.strip(), "good_for does not say when to choose it"
+    assert one.params_class.__dataclass_params__.frozen, "params_class is not frozen"
+    for parameter in one.parameters:
+        assert parameter.help.strip(), f"parameter {parameter.name} has no help"
+
+
+def _draw_returns_a_bool(one: Backend) -> None:
+    """Draw once, and look at what `draw` returns."""
+    returned: list[object] = []
+
+    def noted(pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        returned.append(type(one).draw(one, pose, frame, surface))
+        return bool(returned[-1])
+
+    vars(one)["draw"] = noted
+    try:
+        draw(sphere(500), Camera(eye=(0, 0, 4)), (33, 33), one)
+    finally:
+        del vars(one)["draw"]
+    assert returned, "it was not called"
+    assert all(isinstance(each, bool) for each in returned), f"draw returns {returned[0]!r}, expected a bool"
 
 
 def _ties_go_to_the_lowest_id(name: str) -> None:

@@ -65,6 +65,21 @@ def test_a_failed_write_leaves_what_was_there(
     assert (tmp_path / "scan.ply").read_text() == "former"
 
 
+@pytest.mark.parametrize(
+    ("error", "hint"),
+    [(ValueError("odd"), "Choose another format"), (OSError(5, "odd"), "Check free space and permissions")],
+)
+def test_a_failed_write_hints_at_the_disk_only_for_errors_of_the_system(
+    error: Exception, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(path: Path, cloud: PointCloud) -> None:
+        raise error
+
+    monkeypatch.setattr(ply, "write", fail)
+    with pytest.raises(InputError, match=f"cannot be written as PLY: odd. {hint}"):
+        formats.write(tmp_path / "scan.ply", PointCloud.from_arrays(np.eye(3)))
+
+
 def test_write_into_a_missing_folder_names_it(full_cloud: PointCloud, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="there is no folder"):
         formats.write(tmp_path / "none" / "scan.ply", full_cloud)

@@ -226,8 +226,9 @@ def _writing(path: Path, module: ModuleType) -> Iterator[Path]:
     """A temporary path that becomes `path` only if the block ends well; what goes wrong is one message."""
     if not path.parent.is_dir():
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
-    problem = f"cannot be written as {module.TITLE}", "Check free space and permissions"
-    with one_message(path, *problem), whole_file(path) as temporary:
+    failed = f"cannot be written as {module.TITLE}"
+    hints = "Choose another format", "Check free space and permissions"
+    with one_message(path, failed, *hints), whole_file(path) as temporary:
         yield temporary
 
 
@@ -244,6 +245,14 @@ def _formats() -> dict[str, ModuleType]:
             return  # for folders: see viewer/scan/range_folders
         if not isinstance(module.SUFFIXES, tuple):
             raise InputError(f"SUFFIXES is a {type(module.SUFFIXES).__name__}, expected a tuple of suffixes")
+        if missing := [name for name in ("TITLE", "read") if not hasattr(module, name)]:
+            raise InputError(
+                f"it has SUFFIXES, but no {' and no '.join(missing)}", hint="Add what is missing"
+            )
+        for suffix in module.SUFFIXES:
+            if not (isinstance(suffix, str) and suffix.startswith(".") and suffix == suffix.lower()):
+                hint = f"Write '.{suffix.lower().removeprefix('.')}'" if isinstance(suffix, str) else None
+                raise InputError(f"the suffix {suffix!r} is not lower case with a dot in front", hint=hint)
         if taken := [suffix for suffix in module.SUFFIXES if suffix in found]:
             raise InputError(f"{found[taken[0]].TITLE} already reads '{taken[0]}'", hint="Use other suffixes")
         found.update(dict.fromkeys(module.SUFFIXES, module))
@@ -274,9 +283,14 @@ def _readable(path: Path) -> ModuleType:
 
 @contextmanager
 def one_message(
-    where: object, failed: str, hint: str = "Check that it is complete, or export it again"
+    where: object,
+    failed: str,
+    hint: str = "Check that it is complete, or export it again",
+    system_hint: str | None = None,
 ) -> Iterator[None]:
     """Turn whatever goes wrong inside into an InputError that says where.
+
+    system_hint: the hint for errors of the operating system, if it differs from `hint`.
 
     Odd numbers in a file (NaN, overflow in a conversion) are data, so numpy does not complain of them.
     """
@@ -288,7 +302,7 @@ def one_message(
     except MemoryError as error:
         raise InputError(f"{failed}: not enough memory", where, "Close other programs") from error
     except OSError as refused:
-        what, advice = explained(refused, hint)
+        what, advice = explained(refused, system_hint or hint)
         raise InputError(f"{failed}: {what}", where, advice) from refused
     except Exception as error:
         raise InputError(_bounded(f"{failed}: {str(error) or type(error).__name__}"), where, hint) from error
