@@ -37,7 +37,7 @@ def whole_file(path: Path | str) -> Iterator[Path]:
         with suppress(OSError):  # not every file system can
             _store(path.parent)
     except OSError as error:
-        what, hint = explained(error)
+        what, hint = explained(error, "Check free space and permissions")
         raise InputError(f"cannot be written: {what}", path, hint) from error
 
 

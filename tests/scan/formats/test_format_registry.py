@@ -67,7 +67,7 @@ def test_a_failed_write_leaves_what_was_there(
 
 @pytest.mark.parametrize(
     ("error", "hint"),
-    [(ValueError("odd"), "Choose another format"), (OSError(5, "odd"), "Check free space and permissions")],
+    [(ValueError("odd"), "Choose another format"), (OSError("odd"), "Check free space and permissions")],
 )
 def test_a_failed_write_hints_at_the_disk_only_for_errors_of_the_system(
     error: Exception, hint: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -76,7 +76,7 @@ def test_a_failed_write_hints_at_the_disk_only_for_errors_of_the_system(
         raise error
 
     monkeypatch.setattr(ply, "write", fail)
-    with pytest.raises(InputError, match=f"cannot be written as PLY: odd. {hint}"):
+    with pytest.raises(InputError, match=rf"cannot be written.*: odd\. {hint}"):
         formats.write(tmp_path / "scan.ply", PointCloud.from_arrays(np.eye(3)))
 
 

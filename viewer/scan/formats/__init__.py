@@ -227,8 +227,7 @@ def _writing(path: Path, module: ModuleType) -> Iterator[Path]:
     if not path.parent.is_dir():
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
     failed = f"cannot be written as {module.TITLE}"
-    hints = "Choose another format", "Check free space and permissions"
-    with one_message(path, failed, *hints), whole_file(path) as temporary:
+    with one_message(path, failed, "Choose another format"), whole_file(path) as temporary:
         yield temporary
 
 
@@ -283,14 +282,9 @@ def _readable(path: Path) -> ModuleType:
 
 @contextmanager
 def one_message(
-    where: object,
-    failed: str,
-    hint: str = "Check that it is complete, or export it again",
-    system_hint: str | None = None,
+    where: object, failed: str, hint: str = "Check that it is complete, or export it again"
 ) -> Iterator[None]:
     """Turn whatever goes wrong inside into an InputError that says where.
-
-    system_hint: the hint for errors of the operating system, if it differs from `hint`.
 
     Odd numbers in a file (NaN, overflow in a conversion) are data, so numpy does not complain of them.
     """
@@ -302,7 +296,7 @@ def one_message(
     except MemoryError as error:
         raise InputError(f"{failed}: not enough memory", where, "Close other programs") from error
     except OSError as refused:
-        what, advice = explained(refused, system_hint or hint)
+        what, advice = explained(refused, hint)
         raise InputError(f"{failed}: {what}", where, advice) from refused
     except Exception as error:
         raise InputError(_bounded(f"{failed}: {str(error) or type(error).__name__}"), where, hint) from error

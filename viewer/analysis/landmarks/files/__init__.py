@@ -118,7 +118,7 @@ def write_landmarks(path: Path | str, landmarks: LandmarkSet, axes: str = "LPS")
 
 
 def _write(module: ModuleType, path: Path, landmarks: LandmarkSet) -> str | None:
-    failed = f"cannot be written as {module.TITLE}", "Check free space and permissions"
+    failed = f"cannot be written as {module.TITLE}", "Choose another format"
     with one_message(path, *failed), whole_file(path) as temporary:
         remark: str | None = module.write(temporary, landmarks)
         return remark
