@@ -14,7 +14,17 @@ import pytest
 from numpy.typing import NDArray
 from range_scenes import sphere_view
 from scenes import sphere
-from virtual_screen import PANEL, PATIENCE, ROOT, SIZE, RunningApp, running_app, virtual_screen, wait_until
+from virtual_screen import (
+    PANEL,
+    PATIENCE,
+    ROOT,
+    SIZE,
+    RunningApp,
+    Screen,
+    running_app,
+    virtual_screen,
+    wait_until,
+)
 from written import film
 
 from viewer.document.recording import Recording
@@ -209,6 +219,30 @@ def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Pa
     assert (len(images), rate, images[0].shape) == (4, 25, (64, 96, 3))
     sizes = [(image > 80).sum() for image in images]
     assert sizes == sorted(sizes), "the sphere grows"
+
+
+def test_an_anonymous_film_draws_no_names(tmp_path: Path, screen: Screen) -> None:
+    scan = tmp_path / "ball.npz"
+    ball = sphere(3000)
+    formats.write(scan, replace(ball, scalars={"janedoe": ball.positions[:, 1].copy()}))
+    with running_app(screen, tmp_path, scan) as app:
+        app.choose(PANEL, "color_by/##value", "###janedoe")
+        app.settle()
+        corners = []
+        for name in ("named", "anonymous"):
+            dialog = Dialog(app)
+            dialog.choose("what", "###turntable")
+            dialog.enter("pictures", 2)
+            dialog.choose("format", "###mp4")
+            dialog.tick("##anonymous" if name == "anonymous" else "Colour bar")
+            dialog.enter("width", 640)
+            dialog.enter("height", 480)
+            dialog.enter("name", name)
+            dialog.export()
+            app.told(rf"Saved .*{name}.mp4")
+            (image, *_), _ = film(tmp_path / f"{name}.mp4")
+            corners.append(image[240:, 480:].astype(int))
+        assert np.abs(corners[0] - corners[1]).max() > 100, "the name of the scalar"
 
 
 @pytest.mark.slow

@@ -94,6 +94,27 @@ def test_a_session_that_was_opened_is_saved_to_its_file(screen: Screen, tmp_path
         assert file.read_bytes() != before
 
 
+def test_the_dialog_opens_a_session_of_the_open_scan_and_closes(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    file = tmp_path / "mine.scan4d.json"
+    SavedSession(str(scan), None, 0, Document()).export(file)
+    with running_app(screen, tmp_path / "work", scan, home=tmp_path / "home") as app:
+        press(app, "ctrl+4")
+        changed = app.settle().document
+        press(app, "ctrl+o", "Tab")
+        assert app.state.is_browser_open
+        write(app, str(file))
+        press(app, "Return")
+        assert app.told("Opened the session (.*)")[1] == str(file)
+        state = app.see(is_browser_open=False, undoes="Open session")
+        assert state.document != changed
+        assert state.lists == 0
+        press(app, "ctrl+o")
+        assert app.see(is_browser_open=True).refusal == ""
+        assert "Traceback" not in app.log()
+
+
 def test_a_file_is_replaced_only_after_a_question(app: RunningApp, tmp_path: Path) -> None:
     file = tmp_path / "work" / "kept.scan4d.json"
     file.write_text("kept")

@@ -39,6 +39,7 @@ class Sessions(WindowPart):
     open_scan: Callable[[str, SavedSession], None]
     take_up: Callable[[SavedSession], None]
     ask_for_scan: Callable[[Path], None]
+    close_browser: Callable[[], None]
     redraw: Callable[[], None]
 
     def __post_init__(self) -> None:
@@ -92,13 +93,20 @@ class Sessions(WindowPart):
         self.ask_for_scan(path.parent)
 
     def open_with(self, session: SavedSession, scan: str) -> None:
-        """Open a scan with a session; at once where it is the open one."""
+        """Open a scan with a session; at once where it is the open one.
+
+        No scan begins then, so the dialog that opened the session closes here.
+        """
+        file = None
         if self._opened is not None and self._opened[0] is session:
-            self._files[known_as(scan)] = self._opened[1]
-        if known_as(scan) == known_as(self.session.scan):
-            self.take_up(session)
-        else:
+            file = self._files[known_as(scan)] = self._opened[1]
+        if known_as(scan) != known_as(self.session.scan):
             self.open_scan(scan, session)
+            return
+        self.take_up(session)
+        self.close_browser()
+        if file is not None:
+            self.note_of_work(f"Opened the session {file}")
 
     def dialog(self, view: ViewArea) -> None:
         """Declare the dialog that saves."""

@@ -157,10 +157,8 @@ def _edit_marks(marks: Marks, choices: Choices) -> Marks:
 def _edit_folder(choices: Choices, problems: dict[str, str]) -> tuple[Choices, bool]:
     """Declare where the files go; the choices, and whether the user wants to go through folders."""
     widgets.label("Anonymise (no names, paths)", _HELP["anonymous"])
-    imgui.begin_disabled(choices.format == MP4)
     anonymous = imgui.checkbox("##anonymous", choices.anonymous)[1]
-    widgets.tooltip("A film stores no names and paths" if choices.format == MP4 else _HELP["anonymous"])
-    imgui.end_disabled()
+    widgets.tooltip(_HELP["anonymous"])
     gap = imgui.get_style().item_inner_spacing.x
     widgets.label("Folder", _HELP["folder"], widgets.ICON_WIDTH * imgui.get_frame_height() + gap)
     folder = widgets.edit_path("##folder", choices.folder)[1]

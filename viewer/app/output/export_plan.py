@@ -51,7 +51,11 @@ class Choices:
         AS_SHOWN, "Anti-aliasing: as set in Appearance, or the mean of 1, 5 or 17 samples per pixel",
         choices=(AS_SHOWN, *SAMPLES),
     )  # fmt: skip
-    anonymous: bool = param(False, "Store no name, path or date of the scan in the pictures")
+    anonymous: bool = param(
+        False,
+        "Overlays show no notes, and landmarks and measures without names. "
+        "The files store no name, path or date of the scan",
+    )
     folder: str = param("", "Folder of the exported files")
     name: str = param("", "File name; Scan4D numbers several files")
 
