@@ -10,14 +10,17 @@ import pytest
 from hardware import at_borders, displaced, moved
 from numpy.typing import NDArray
 from scenes import BUFFERS, NOTHING, rarely, sphere
-from test_instancing import (
+from splat_scenes import (
     CAMERAS,
     CLOUD,
+    ELLIPSES,
     SIZE,
     assert_agree,
     assert_covers_the_same,
     assert_equal,
+    elliptical,
     every_camera,
+    with_axes,
 )
 
 from viewer.camera import Camera
@@ -29,27 +32,6 @@ from viewer.view import View
 pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
 WAYS = ("tiles", *FEEDS)
-
-
-def elliptical(cloud: PointCloud, stretch: float = 3.0, seed: int = 1) -> PointCloud:
-    """The same points with ellipses in their discs, narrower in one direction by up to so much."""
-    assert cloud.radii is not None
-    assert cloud.normals is not None
-    rng = np.random.default_rng(seed)
-    tangents = np.cross(cloud.normals, rng.normal(size=(len(cloud), 3)))
-    lengths = cloud.radii[:, None] * stretch ** -rng.uniform((0, 0), (1, 0), (len(cloud), 2))
-    lengths = rng.permuted(lengths, axis=1)
-    tangents *= (lengths[:, 0] / np.linalg.norm(tangents, axis=1))[:, None]
-    return with_axes(cloud, np.column_stack([tangents, lengths[:, 1]]))
-
-
-def with_axes(cloud: PointCloud, axes: NDArray[np.floating]) -> PointCloud:
-    return PointCloud.from_arrays(
-        cloud.positions, normals=cloud.normals, colors=cloud.colors, radii=cloud.radii, axes=axes
-    )
-
-
-ELLIPSES = elliptical(CLOUD)
 
 
 @pytest.fixture

@@ -8,9 +8,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hardware import at_borders, moved, stored
+from hardware import at_borders, stored
 from numpy.typing import NDArray
 from scenes import BUFFERS, NOTHING, rarely, sphere
+from splat_scenes import (
+    CAMERAS,
+    CLOUD,
+    SIZE,
+    assert_agree,
+    assert_equal,
+    every_camera,
+)
 
 from viewer.backends import backend
 from viewer.backends import surfels as surfels_backend
@@ -30,15 +38,6 @@ from viewer.view import View
 
 pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
-SIZE = (320, 240)
-CLOUD = sphere(12_000)  # several ranges of uniform blocks
-CAMERAS = {
-    "perspective": Camera.orbit(CLOUD.bounds(), 30, 20, aspect=4 / 3),
-    "orthographic": Camera.orbit(CLOUD.bounds(), 30, 20, aspect=4 / 3, projection="orthographic"),
-    "inside": Camera((0.0, 0.1, 0.2), (0.6, 0.3, 0.5), fov_y=70),
-    "near plane": Camera((0.0, 0.1, 1.05), (0.6, 0.3, 0.5), fov_y=70, near=0.08),
-}
-every_camera = pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
 
 
 @pytest.fixture
@@ -51,41 +50,11 @@ def surfels(draw: Draw) -> Draw:
     return surfels
 
 
-def assert_equal(one: Surface, other: Surface) -> None:
-    """Same points and depths, bit for bit."""
-    np.testing.assert_array_equal(one.row, other.row)
-    np.testing.assert_array_equal(one.depth, other.depth)
-
-
-def assert_covers_the_same(one: Surface, other: Surface) -> None:
-    """Something is seen at the same pixels, but at outlines where a rasteriser moved corners."""
-    differ = (one.row != NOTHING) != (other.row != NOTHING)
-    assert np.count_nonzero(differ) <= at_borders(one)
-
-
 def assert_blends_alike(one: Surface, other: Surface) -> None:
     """Colours are a level apart, but at borders of splats: of a thousandth of the pixels in software, of more
     where a rasteriser moved corners."""
     away = np.abs(one.image().astype(int) - other.image()).max(axis=-1)
     assert np.count_nonzero(away > 1) <= max(1e-3 * away.size, at_borders(one))
-
-
-def assert_agree(one: Surface, other: Surface, others: float) -> None:
-    """Same splats: they cover the same pixels, and where they show another one, the depths are the same
-    but for rounding, or the pixel lies on a splat's border. others: the share that may be another one in
-    software; on hardware any, as which of those that are as near is shown goes by last bits."""
-    covered, both = one.row != NOTHING, (one.row != NOTHING) & (other.row != NOTHING)
-    few = max(1, round(1e-4 * np.count_nonzero(covered)), at_borders(one))
-    assert np.count_nonzero(covered != (other.row != NOTHING)) <= few
-    another = both & (one.row != other.row)
-    if one.gpu.software:
-        assert np.count_nonzero(another) <= max(few, others * np.count_nonzero(covered))
-    error, rounding = np.zeros(one.depth.shape), moved(one) + moved(other)
-    error[both] = np.abs(one.depth[both] / other.depth[both] - 1)
-    assert np.count_nonzero((error > 5e-5 + rounding)[another]) <= few
-    assert (error < 2e-4 + rounding)[both & ~another].all()
-    levels = np.abs(one.color - other.color).max(axis=-1) >= 0.009  # a level of the brightest
-    assert np.count_nonzero(levels[both & ~another]) <= at_borders(one)
 
 
 @every_camera

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from scenes import looking_down_z, rarely_together
-from test_instancing import assert_agree, assert_covers_the_same
+from splat_scenes import assert_agree, assert_covers_the_same
 
 from viewer.bench.scenes import samples
 from viewer.camera import Camera

@@ -11,7 +11,7 @@ import packed
 import pytest
 from packed import Packed
 from scenes import NOTHING, looking_down_z, rarely, sphere
-from test_instancing import CAMERAS, CLOUD, assert_agree, assert_equal
+from splat_scenes import CAMERAS, CLOUD, assert_agree, assert_equal
 
 from viewer.bench.judge import Judge
 from viewer.bench.truth.shapes import AnalyticScene, Sphere

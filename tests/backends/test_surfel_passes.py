@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hardware import at_borders
 from scenes import NOTHING, looking_down_z, plane, rarely, sphere
-from test_instancing import assert_blends_alike, assert_covers_the_same
+from splat_scenes import assert_covers_the_same
+from test_instancing import assert_blends_alike
 
 from viewer.analysis.pick import pick
 from viewer.backends import backend

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, rarely_together, sphere, sphere_hits
 from scipy import ndimage
 from scipy.ndimage import distance_transform_edt
-from test_instancing import assert_agree
+from splat_scenes import assert_agree
 
 from viewer.analysis.pick import pick
 from viewer.backends import backend

@@ -10,8 +10,7 @@ import packed
 import pytest
 from packed import Packed
 from scenes import NOTHING
-from test_elliptical import ELLIPSES
-from test_instancing import CAMERAS, CLOUD, SIZE, assert_agree, assert_equal, every_camera
+from splat_scenes import CAMERAS, CLOUD, ELLIPSES, SIZE, assert_agree, assert_equal, every_camera
 
 from viewer.camera import Camera
 from viewer.look import Look

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scenes import NOTHING, looking_down_z, rarely, sphere, sphere_hits
-from test_instancing import assert_agree, assert_covers_the_same
+from splat_scenes import assert_agree, assert_covers_the_same
 
 from viewer.bench.judge import Judge, Walk
 from viewer.bench.truth.shapes import AnalyticScene, Sphere
