@@ -110,8 +110,12 @@ def test_the_dialog_opens_a_session_of_the_open_scan_and_closes(
         state = app.see(is_browser_open=False, undoes="Open session")
         assert state.document != changed
         assert state.lists == 0
-        press(app, "ctrl+o")
+        press(app, "ctrl+z", "ctrl+o")
         assert app.see(is_browser_open=True).refusal == ""
+        write(app, "mine")  # narrows the rows to the session alone
+        press(app, "Return")
+        assert app.told("Opened the session (.*)")[1] == str(file)
+        app.see(is_browser_open=False, undoes="Open session")
         assert "Traceback" not in app.log()
 
 

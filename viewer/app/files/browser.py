@@ -11,14 +11,15 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...document.recording import is_recording
-from ...document.saved_session import is_session
+from ...document.saved_session import SUFFIX, is_session
 from ...files import printable
-from ...scan.listing import list_folder
+from ...scan.listing import Listed, list_folder
 from ...scan.open import DEMO, is_demo
 from ...scan.timeline import Timeline
 from .. import widgets
 from ..commands import Command
 from ..part import ViewArea, WindowPart
+from ..path_dialog import files_of
 from ..session import Session, known_as
 from ..window import Window
 from .folder_view import FolderView, date_in_words, size_in_words
@@ -33,6 +34,13 @@ _KNOWN_SHARE, _PREVIEW_SHARE = 0.2, 0.26  # of the width
 _KNOWN_LEAST = 9.5  # the same of the known places, in heights of the font
 _LINGERS = 0.15  # seconds that a row is chosen before its scan is read
 _HINT = "You can also drop files, folders and recordings onto the window."
+
+
+def _list(folder: Path) -> list[Listed]:
+    """The scans and folders in a folder, then its session files. Raises InputError where it cannot be listed,
+    OSError where a session file cannot be read."""
+    scans = list_folder(folder)
+    return [*scans, *(file for file in files_of(folder, (SUFFIX,)) if file.kind == "file")]
 
 
 @dataclass(eq=False)
@@ -63,7 +71,9 @@ class Browser(WindowPart):
         self._asked = False  # to be opened
         self.is_open = self._is_done = False
         self._asks_for: str | None = None  # what is being opened
-        self._view = FolderView(list_folder, self._open, nothing="No scans in this folder.", filters=True)
+        self._view = FolderView(
+            _list, self._open, nothing="No scans or sessions in this folder.", filters=True
+        )
 
     @property
     def refusal(self) -> str:
@@ -107,7 +117,8 @@ class Browser(WindowPart):
         changed = self._previewer.advance()
         if self.is_open and time.monotonic() - self._view.chosen_at > _LINGERS:
             row = self._view.row
-            self._previewer.ask(row.path if row is not None and row.frames else None)
+            has_picture = row is not None and row.frames and not is_session(Path(row.path))
+            self._previewer.ask(row.path if row is not None and has_picture else None)
         return self._view.advance() or changed
 
     def dialog(self, view: ViewArea) -> None:
