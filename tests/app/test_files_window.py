@@ -87,9 +87,10 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
         close(app)
 
     settings = tmp_path / "config" / "scan4d" / FILE
-    kept = load(settings)[0]
-    assert kept.recent == tuple(str(study / name) for name in ("one", "two.npy", "three.npy"))
-    assert (kept.theme, kept.backend) == ("light", None), "no renderer was chosen for all scans"
+    remembered, _ = load(settings)
+    assert remembered["scans"]["recent"] == [str(study / name) for name in ("one", "two.npy", "three.npy")]
+    assert remembered["window_look"]["theme"] == "light"
+    assert remembered["session"]["backend"] is None, "no renderer was chosen for all scans"
     own = stored_of(tmp_path, study / "one")
     assert (own.document.backend, own.pose) == ("codeword", 1)
 
