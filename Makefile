@@ -6,6 +6,7 @@ WORKERS := auto
 MINUTES := 5
 SEED := 1
 COUNT := 40
+DRAWING := tests/gpu tests/picture tests/splatting tests/visibility tests/projection tests/backends tests/drawing tests/numerics
 COMMIT = $(shell git rev-parse HEAD)
 
 .DEFAULT_GOAL := help
@@ -36,8 +37,8 @@ test-tenth: setup ## run a tenth of the slow tests, chosen by the commit, in fiv
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -m slow --tenth $(COMMIT) --seconds 300
 
 test-drivers: setup ## run backend tests on a second driver (Zink) and on used memory; check shaders
-	$(PYTHON) tests/drivers/zink.py tests/gpu tests/backends tests/numerics -m "not slow"
-	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p poisoned tests/gpu tests/backends tests/numerics -m "not slow"
+	$(PYTHON) tests/drivers/zink.py $(DRAWING) -m "not slow"
+	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p poisoned $(DRAWING) -m "not slow"
 
 mutate: setup ## test the tests: do they find small random mistakes? make mutate COUNT=40 SEED=7
 	$(PYTHON) tools/mutate.py $(COUNT) $(SEED)

@@ -18,8 +18,10 @@ from queue import Queue
 
 ROOT = Path(__file__).resolve().parents[1]
 PARTS = ["viewer/analysis/", "viewer/scan/", "shaders/(chunks|common|compact|points|scatter|shade|surfels)/",
-         "viewer/(frame|gpu/|picture/|splatting/|backends/(points|surfels))"]  # fmt: skip
-QUICK = "tests/((analysis|scan|gpu|backends)/.*)?test_(?!mutate)"
+         "viewer/(drawing/|gpu/|picture/|splatting/|backends/(points|surfels))"]  # fmt: skip
+QUICK = (
+    "tests/((analysis|scan|gpu|picture|splatting|visibility|projection|backends|drawing)/.*)?test_(?!mutate)"
+)
 PAIRS = "< <=,> >=,== !=,&& ||,and or,min max,any all,True False,true false,floor ceil,+ -,* /,0 1,1 2"
 BECOMES = {a: b for pair in PAIRS.split(",") for a, b in (pair.split(), pair.split()[::-1])}
 FOUND = re.compile(  # texts, comments and declarations of shaders first, so that nothing in them is found

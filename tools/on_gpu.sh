@@ -136,7 +136,7 @@ print(slug(gpu))' || exit 1
 device=$(tail -n 1 "$out/device.log")
 tell "$(tail -n 4 "$out/device.log" | head -n 3 | paste -sd ' ')"
 
-tested=(tests/gpu tests/backends tests/numerics)
+tested=(tests/gpu tests/picture tests/splatting tests/visibility tests/projection tests/backends tests/drawing tests/numerics)
 if [ $quick = yes ]; then
     tested=(tests/gpu/test_bins.py tests/splatting/test_fastest.py tests/backends/test_instancing.py)
 fi

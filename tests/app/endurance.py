@@ -24,7 +24,7 @@ FRAMES, POINTS = 60, 200_000  # 144 MB: more than twice what the cache holds
 # being read, drawn and kept in hand by allocators.
 BUDGET_MB = 2 * CACHE_MB + 64
 GROWTH_MB = 32  # from one half of the time to the other: what is in hand varies by that
-_TROUBLE = re.compile(r"Traceback|Error|Warning|[Cc]annot|is left out|failed")
+_TROUBLE = re.compile(r"Traceback|Error|Warning|[Cc]annot|leaves out|failed")
 
 
 @contextmanager

@@ -431,7 +431,7 @@ def test_a_broken_frame_is_reported_and_playing_goes_on(screen: Screen, tmp_path
     (scan / "2.npy").write_bytes((scan / "2.npy").read_bytes()[:1000])
     with running_app(screen, tmp_path, scan) as app:
         screen.do("key", "e", "key", "space")
-        app.told("frame 3 is left out")
+        app.told("Scan4D leaves out frame 3")
         for frame in (3, 4, 0, 1, 3):
             app.see(frame=frame)
         assert 2 not in app.frames()

@@ -78,7 +78,7 @@ def test_no_picture_passes_for_another_scan_or_frame(screen: Screen, tmp_path: P
         app.see(scan=str(frames))
         app.settle()
         app.screen.do("key", "Right")
-        app.told("rame 2 is left out")
+        app.told("Scan4D leaves out frame 2")
         assert "rame 2" in app.settle().latest_note
         app.screen.do("key", "Next")
         app.see(scan="demo")

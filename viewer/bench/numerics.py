@@ -187,9 +187,9 @@ def _zoomed() -> Iterator[Row]:
         leaning = {"normals": np.array([[0.6, 0, 0.8]]), "radii": np.array([4.0])}
         return PointView({**line(1, (0, 0, 0)), **leaning}, Camera((0.0, 0.0, 1.0), fov_y=40))
 
-    for power in (3, 6):
+    for share, power in (("1/1000", 3), ("a millionth", 6)):
         larger = partial(PointView.filled, name="radii", value=10.0**power)
-        yield Row(f"zoomed in on 10^-{power} of a splat", splat, larger, FLOAT32)
+        yield Row(f"zoomed in to {share} of a splat's width", splat, larger, FLOAT32)
 
     def flat() -> PointView:
         return replace(_body(), camera=_body().camera.projected("orthographic"))
