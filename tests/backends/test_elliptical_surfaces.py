@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scenes import NOTHING, sphere
-from splat_scenes import rays
+from test_elliptical import rays
 
 from viewer.bench.scenes import samples
 from viewer.camera import Camera
