@@ -303,7 +303,8 @@ def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
         screen.do("key", "alt+p")
         click(app, *middle(app))
         screen.do("key", "alt+a")
-        click(app, *middle(app))
+        x, y = middle(app)
+        click(app, x + 60, y)  # elsewhere: at the same pixel it could be the second click of a double click
         app.told(r"switched off array .*: TypeError: array\.all\[0\]\.position is to be a tuple, not array")
         close(app)
     assert not [note for note in app.notes if "not kept" in note]
