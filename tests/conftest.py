@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from viewer.drawing.renderer import Renderer
     from viewer.picture.surface import Surface
 
-pytest_plugins = ["parts"]
+pytest_plugins = ["parts", "representatives"]
 
 settings.register_profile(
     "deterministic", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]

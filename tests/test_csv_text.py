@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from source_code import modules, syntax_of
 
-import viewer
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.csv_text import save_rows, text_of_cell, to_text
@@ -21,7 +21,6 @@ from viewer.scan.times import read_times_csv
 FORMULAS = ("=1+1", "+1+1", "-1-cmd", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "=cmd|' /C calc'!A0", "-", "+")
 WIDE_FORMULAS = ("\uff1d1+1", "\uff0b1", "\uff0d1", "\uff20SUM(A1)", "'\uff1d1")
 NUMBERS = ("-1", "+2.5", "-3e-7", "-.5")
-PACKAGE = Path(viewer.__file__).parent
 
 
 def cells(rows: list[list[object]], separator: str = ",") -> list[list[str]]:
@@ -88,8 +87,9 @@ def test_names_of_frames_come_back(tmp_path: Path) -> None:
 def test_one_function_writes_all_tables() -> None:
     found = [
         path.name
-        for path in PACKAGE.rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Attribute) and ast.unparse(node) in ("csv.writer", "csv.DictWriter")
+        for path in modules()
+        for node in ast.walk(syntax_of(path))
+        if isinstance(node, ast.Attribute) and node.attr in ("writer", "DictWriter")
+        if ast.unparse(node.value) == "csv"
     ]
     assert found == ["csv_text.py"]

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from command_line import Run
+from source_code import PACKAGE, modules, syntax_of
 
 from viewer.app.settings import FILE, save
 from viewer.document.document import Document
@@ -20,7 +21,6 @@ from viewer.errors import InputError
 from viewer.files import whole_file
 from viewer.folders import cache_folder, new_file, new_folder, state_folder, user_folder
 
-PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 ROOTS = [user_folder, cache_folder, state_folder]
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="modes of files are POSIX's")
@@ -182,9 +182,9 @@ def makes(node: ast.AST, files: frozenset[str], writer: bool) -> Iterator[ast.Ca
 
 def test_all_files_are_made_by_the_one_that_makes_them_safely() -> None:
     found = []
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in modules():
         name = path.relative_to(PACKAGE).as_posix()
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = syntax_of(path)
         imported = {
             alias.name
             for node in ast.walk(tree)

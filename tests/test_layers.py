@@ -7,13 +7,14 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
+
+from source_code import PACKAGE, modules, syntax_of
 
 from viewer.backends import backends
 from viewer.commands import command_names
 from viewer.testing.tools import KNOWN
-
-PACKAGE = Path(__file__).resolve().parents[1] / "viewer"
 
 # A part of the package may import its own layer and those before it.
 LAYERS = (
@@ -48,10 +49,6 @@ SLOW = WINDOW | {
 }  # fmt: skip
 
 
-def modules() -> list[Path]:
-    return sorted(PACKAGE.rglob("*.py"))
-
-
 def part_of(path: Path) -> str:
     """The part of the package that a module belongs to: `scan` for viewer/scan/points.py."""
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
@@ -83,12 +80,14 @@ def for_types(node: ast.AST) -> bool:
     return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
 
 
-def parse(path: Path) -> ast.AST:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
+@cache
 def all_imports(path: Path) -> set[str]:
-    return set(imports(ast.walk(parse(path)), path))
+    return set(imports(ast.walk(syntax_of(path)), path))
+
+
+def called(call: ast.Call) -> str:
+    """The last name of what is called."""
+    return getattr(call.func, "attr", getattr(call.func, "id", ""))
 
 
 def texts(node: ast.AST) -> Iterator[str]:
@@ -115,9 +114,9 @@ def imported_modules(path: Path) -> set[str]:
     return {name for name in found if name in NAMES and name != name_of(path)}
 
 
+@cache
 def names_at_run_time(path: Path) -> set[str]:
-    nodes = [node for node in nodes_at_run_time(parse(path))]
-    return set(imports(nodes, path))
+    return set(imports(nodes_at_run_time(syntax_of(path)), path))
 
 
 def nodes_at_run_time(node: ast.AST) -> Iterator[ast.AST]:
@@ -168,8 +167,8 @@ def test_modules_found_by_folder_are_all_that_is_imported_by_name() -> None:
     odd = [
         f"{path.relative_to(PACKAGE)}: {ast.unparse(node)}"
         for path in modules()
-        for node in ast.walk(parse(path))
-        if isinstance(node, ast.Call) and ast.unparse(node.func).endswith(("import_module", "__import__"))
+        for node in ast.walk(syntax_of(path))
+        if isinstance(node, ast.Call) and called(node).endswith(("import_module", "__import__"))
         if not FOUND.match(ast.unparse(node))
     ]
     assert odd == []
@@ -180,7 +179,7 @@ def test_no_text_hides_an_import() -> None:
     hidden = [
         f"{path.relative_to(PACKAGE)}: {text[:60]!r}"
         for path in modules()
-        for text in texts(parse(path))
+        for text in texts(syntax_of(path))
         if re.search(r"\b(from|import) viewer\b|^viewer\.[a-z]|-m viewer", text)
     ]
     assert hidden == []
@@ -256,7 +255,7 @@ def test_tools_know_their_context_and_not_the_whole_window() -> None:
         f"{path.relative_to(PACKAGE)} reads {node.value.attr}.{node.attr}"
         for path in modules()
         if name_of(path).startswith("viewer.app.tools.")
-        for node in ast.walk(parse(path))
+        for node in ast.walk(syntax_of(path))
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Attribute)
         if node.value.attr == "context" and node.attr.startswith("_")
     }
@@ -302,7 +301,7 @@ def test_slow_libraries_are_imported_where_they_are_used() -> None:
         f"{path.relative_to(PACKAGE)} imports {library}"
         for path in modules()
         if part_of(path) != "app" and not path.stem.endswith(COMPILED)
-        for library in libraries(imports(run_at_import(parse(path)), path)) & SLOW
+        for library in libraries(imports(run_at_import(syntax_of(path)), path)) & SLOW
     }
     assert early == set()
 
@@ -313,7 +312,7 @@ def test_compiled_loops_are_imported_where_they_are_used() -> None:
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in modules()
         if not path.stem.endswith(COMPILED)
-        for name in imports(run_at_import(parse(path)), path)
+        for name in imports(run_at_import(syntax_of(path)), path)
         if any(part.endswith(COMPILED) for part in name.split("."))
     }
     assert early == set()

@@ -9,13 +9,10 @@ import sys
 from collections import defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
-
-import viewer
-
-PACKAGE = Path(viewer.__file__).parent
+import source_code
+from source_code import PACKAGE, syntax_of
 
 BY_PROTOCOL = {"Params", "Tool", "Settings"}  # each backend, and each tool, declares its own
 
@@ -38,8 +35,7 @@ Documented = ast.ClassDef | ast.FunctionDef
 @pytest.fixture(scope="module")
 def modules() -> list[tuple[str, ast.Module]]:
     """The path below the package and the syntax of each module."""
-    files = sorted(PACKAGE.rglob("*.py"))
-    return [(file.relative_to(PACKAGE).as_posix(), ast.parse(file.read_text("utf-8"))) for file in files]
+    return [(file.relative_to(PACKAGE).as_posix(), syntax_of(file)) for file in source_code.modules()]
 
 
 def definitions(body: list[ast.stmt], within: str = "") -> Iterator[tuple[str, Documented]]:

@@ -74,8 +74,7 @@ RENDERERS = {
     [
         "points that touch",
         "surfels",
-        "voxels",
-        *rarely("points of a pixel", "points of three", "auto splats"),
+        *rarely("voxels", "points of a pixel", "points of three", "auto splats"),
     ],
 )
 def test_picks_are_on_the_surface_though_the_nearest_wins_a_pixel(draw: Draw, which: str) -> None:

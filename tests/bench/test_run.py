@@ -101,6 +101,7 @@ def test_two_runs_give_identical_errors(rows: list[Row], group: Group, renderer:
         assert second["scene_hash"] == first["scene_hash"]
 
 
+@pytest.mark.slow
 def test_another_seed_looks_from_elsewhere(rows: list[Row], renderer: Renderer) -> None:
     other = Bench(renderer, replace(SETTINGS, seed=1)).measure(replace(TORUS, contenders=DEFAULTS[:1]))
     assert other[0]["errors"]["hole_percent"] != rows[0]["errors"]["hole_percent"]
@@ -167,6 +168,7 @@ def test_a_backend_that_cannot_draw_a_scene_is_left_out_and_said(
     assert any("points" in note and "needs range views" in note for note in bench.notes)
 
 
+@pytest.mark.slow
 def test_a_zoom_of_range_views_stands_beside_their_mesh(renderer: Renderer) -> None:
     contenders = (*only("gl-points", "mesh", "pyramidal"), Contender("range-mesh"))
     bench = Bench(renderer, SETTINGS)
@@ -208,6 +210,7 @@ def test_what_is_not_judged_is_timed_alone(renderer: Renderer, tmp_path: Path) -
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.slow
 def test_pictures_compare_with_the_truth(renderer: Renderer, tmp_path: Path) -> None:
     from PIL import Image
 

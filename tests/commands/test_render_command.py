@@ -38,6 +38,7 @@ def test_a_picture_is_what_the_library_draws(run: Run, scans: Path, tmp_path: Pa
     assert names(tmp_path) == ["a.png"]
 
 
+@pytest.mark.slow
 def test_the_default_size(run: Run, scans: Path, tmp_path: Path) -> None:
     assert run("render", scans / "ball.npz", "-o", tmp_path / "a.png").code == 0
     assert picture(tmp_path / "a.png").shape == (1280, 1920, 4)

@@ -119,6 +119,7 @@ def test_places_are_hidden_where_no_pod_sees_them() -> None:
         assert (nearest[known.hidden[frame]] > 1.99 * known.spacing).all()
 
 
+@pytest.mark.slow
 def test_a_shuffled_mesh_has_its_vertices_in_another_order_in_each_frame() -> None:
     known = shuffled_mesh(DemoSource("demo:smile:1"), "smile", 3, seed=1)
     first, second = (known.source.load(index).world() for index in (0, 1))

@@ -78,6 +78,7 @@ def test_one_view_alone_is_drawn_as_it_is(renderer: Renderer) -> None:
         assert errors["worst"] <= 4
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_small_picture_is_a_mean(renderer: Renderer) -> None:
     (camera,) = ball().cameras(1, ball().size)
     found = splines.size_errors(renderer, ball(), camera, (LINEAR,))[LINEAR.name]

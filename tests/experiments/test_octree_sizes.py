@@ -38,6 +38,7 @@ def test_draco_keeps_exactly_the_leaves() -> None:
     assert len(cells) == octree.leaves
 
 
+@pytest.mark.slow
 def test_what_is_measured_of_the_demo(rows: list[Sizes]) -> None:
     assert {row.scene for row in rows} == {"demo"}
     assert [row.stop for row in rows] == list(octree_sizes.STOPS)

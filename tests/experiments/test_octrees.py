@@ -49,6 +49,7 @@ def test_the_papers_nodes_are_inner_nodes() -> None:
             assert abs(tree["nodes"] + tree["leaves"] - deeper["nodes"]) <= 1
 
 
+@pytest.mark.slow
 def test_trees_are_counted_as_in_the_paper(bench: Bench, rows: list[Row]) -> None:
     """Inner nodes and leaves, means over the poses, at the first level whose loss is no more than delta."""
     assert [row["delta"] for row in rows] == list(octrees.DELTAS)

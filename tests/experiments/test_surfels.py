@@ -77,6 +77,7 @@ def test_each_scan_meets_every_feed_in_two_passes() -> None:
             assert params == others
 
 
+@pytest.mark.slow
 def test_the_scans_have_exactly_as_many_points_as_the_papers(data_dir: Path) -> None:
     for group in feeds.groups()[:-1]:
         subject = BenchSettings(data=data_dir).subject(group)

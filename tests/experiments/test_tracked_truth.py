@@ -12,6 +12,7 @@ from viewer.analysis.tracking import track_landmarks
 from viewer.scan.open import find_source
 
 
+@pytest.mark.slow
 def test_a_few_frames_of_a_face_are_tracked() -> None:
     """The mouth and the nose alone, while the smile is fastest."""
     told = judge_tracking(resampled_demo("demo:smile:1", 0.1, range(22, 27), behind=60.0), track_landmarks)

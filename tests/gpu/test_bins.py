@@ -109,6 +109,7 @@ def by_number(gpu: Gpu, count: int, modulus: int) -> Visits:
     return Visits(f"{PARTS}/modulo.glsl", count, bind)
 
 
+@pytest.mark.slow
 def test_as_many_items_as_one_dimension_of_a_dispatch_does_not_take(renderer: Renderer) -> None:
     gpu, cells, count = renderer.gpu, 1 << 20, 65_537 * 256
     visits = by_number(gpu, count, cells)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scenes import rarely
+from scenes import rarely, rarely_together
 
 from viewer.backends import backend
 from viewer.bounds import Bounds
@@ -66,10 +66,9 @@ def drawn(renderer: Renderer, request: Request, share: float = 1.0) -> tuple[Any
     [
         ("points", {}),
         ("points", {"point_size": 9}),
-        ("surfels", {}),
         ("surfels", {"passes": "two", "enlarge": 2.0}),
         ("auto_splats", {}),
-        ("auto_splats", {"passes": "one", "hidden_neighbors": False}),
+        *rarely_together(("surfels", {}), ("auto_splats", {"passes": "one", "hidden_neighbors": False})),
     ],
     ids=str,
 )

@@ -209,6 +209,7 @@ def test_any_small_image(renderer: Renderer, width: int, height: int, name: str,
     gpu.discard(levels, back)
 
 
+@pytest.mark.slow
 def test_more_samples_than_one_dimension_of_a_dispatch_takes(renderer: Renderer) -> None:
     gpu, size = renderer.gpu, (4100, 4100)  # 65 665 work groups
     levels = Pyramid(gpu, size, 1, levels=2)

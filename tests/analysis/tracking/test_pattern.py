@@ -82,6 +82,7 @@ def test_noise_takes_matches_and_makes_few_wrong_ones() -> None:
     assert (np.diff(shares) <= 0).all()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("jitter", [0.0, 0.05])
 @pytest.mark.parametrize("slide", [0.0, 0.3, 1.0])
 def test_a_grid_that_slides_over_the_surface_is_not_taken_for_matter(slide: float, jitter: float) -> None:
@@ -129,6 +130,7 @@ def tracks_of_arms(noise: float, kept: float = 1.0, scale: float = 1.0) -> Mappi
         return track_landmarks(scan, landmarks)
 
 
+@pytest.mark.slow
 def test_the_unit_of_a_scan_changes_lengths_alone() -> None:
     scale = 64.0  # changes the exponents of numbers, and no digit
     tracks, scaled = tracks_of_arms(0.05), tracks_of_arms(0.05, scale=scale)

@@ -311,12 +311,15 @@ def real(data_dir: Path) -> Callable[[str], BareScene]:
     "name",
     [
         "two-bunnies",
-        pytest.param("dragon-scans", marks=pytest.mark.slow),
-        "sequences/hands_knot_5",
-        *rarely("sequences/waving_cat_16", "models/bimba_points_80002.ply"),
         "sequences/kitti_lidar_street_10",
-        "models/open3d_living_room_fragment.pcd",
-        "odd/pcd/CSite1_red2-utm.pcd",
+        *rarely(
+            "dragon-scans",
+            "sequences/hands_knot_5",
+            "sequences/waving_cat_16",
+            "models/bimba_points_80002.ply",
+            "models/open3d_living_room_fragment.pcd",
+            "odd/pcd/CSite1_red2-utm.pcd",
+        ),
     ],
 )
 def test_neighborhoods_of_real_scans_are_those_of_a_tree(name: str, real: Callable[[str], BareScene]) -> None:

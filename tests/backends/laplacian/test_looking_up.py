@@ -70,12 +70,12 @@ def drawn(
         ("fast", 0.8, 1, linear),
         ("fine", 0.6, 2, linear),
         ("fast", 1.0, 1, linear),
-        ("fine", 3.0, 1, cubic),
+        ("fast", 2.0, 1, cubic),
         *rarely_together(
+            ("fine", 3.0, 1, cubic),
             ("fine", 0.8, 1, linear),
             ("fine", 0.5, 2, linear),
             ("fast", 0.6, 1, linear),
-            ("fast", 2.0, 1, cubic),
         ),
     ],
 )

@@ -261,6 +261,7 @@ def test_the_demo_is_scanned_while_it_speaks() -> None:
     assert not np.array_equal(first.pose.views[0].depth, later.pose.views[0].depth, equal_nan=True)
 
 
+@pytest.mark.slow
 def test_the_hand_is_before_the_face_and_shows_it_between_its_fingers() -> None:
     moment = catalog.subject("hand-before-face", None).moment(0)
     ahead = Camera((-5.0, 60.0, 600.0), (-5.0, 60.0, 0.0), projection="orthographic", height=60.0)
@@ -293,9 +294,7 @@ def test_the_moments_of_a_simulated_sequence(data_dir: Path) -> None:
     assert subject.carry(3, 4, trace(first.truth, camera, (30, 20))) is not None
 
 
-@pytest.mark.parametrize(
-    "name", ["dragon-scans", "bunny-scans", pytest.param("truedepth-head", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("name", ["bunny-scans", *rarely("dragon-scans", "truedepth-head")])
 def test_real_scans_lie_on_their_truth(name: str, data_dir: Path) -> None:
     subject = catalog.subject(name, data_dir)
     for index in {0, subject.moments - 1}:
