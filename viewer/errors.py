@@ -8,6 +8,7 @@ import reprlib
 from collections.abc import Iterable
 
 _SHOWN = 80  # characters of a value that a message shows
+_LONGEST_REASON = 200  # characters of what a library says
 
 
 class Scan4DError(Exception):
@@ -96,3 +97,18 @@ def explained(error: OSError, hint: str | None = None) -> tuple[str, str | None]
     """
     number = errno.ENOSPC if _CUT_SHORT.match(str(error)) else error.errno
     return _SYSTEM.get(number or 0, (error.strerror or str(error) or type(error).__name__, hint))
+
+
+def failure_in_words(what: str, error: BaseException) -> str:
+    """One line for users, that something failed. what: was being done."""
+    if isinstance(error, Scan4DError):
+        return str(error)
+    return f"{what} failed ({reason(error)}); everything else still works."
+
+
+def reason(error: BaseException) -> str:
+    """The words of an error, and its kind unless it is meant for users."""
+    if isinstance(error, Scan4DError):
+        return str(error)
+    said = " ".join(str(error).split())[:_LONGEST_REASON]
+    return f"{type(error).__name__}{': ' if said else ''}{said}"

@@ -11,13 +11,12 @@ from operator import attrgetter
 
 from imgui_bundle import imgui
 
-from ..errors import Scan4DError
+from ..errors import failure_in_words
 from ..task import Cancelled
 from .notices import Problem
 
 log = logging.getLogger(__name__)
 _PAUSE = 10.0  # seconds without it, after which the same is told again
-_LONGEST = 200  # letters of what a library says
 _PAIRS = {  # the stacks of ImGui, outermost first -> the calls that come in pairs
     "window": "begin() or begin_child() and its end",
     "begin_popup": "begin_popup() and end_popup()",
@@ -62,21 +61,6 @@ class Failures:
         if now - before > _PAUSE:
             log.error("%s failed", what, exc_info=error)
             self._note(Problem(words or failure_in_words(what, error)))
-
-
-def failure_in_words(what: str, error: BaseException) -> str:
-    """One line for users."""
-    if isinstance(error, Scan4DError):
-        return str(error)
-    return f"{what} failed ({reason(error)}); everything else still works."
-
-
-def reason(error: BaseException) -> str:
-    """The words of an error, and its kind unless it is meant for users."""
-    if isinstance(error, Scan4DError):
-        return str(error)
-    said = " ".join(str(error).split())[:_LONGEST]
-    return f"{type(error).__name__}{': ' if said else ''}{said}"
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from ..analysis.measures.kinds import measure_kinds
 from ..backends import backends
 from ..document.part import Part
 from ..document.schema import Values, is_object, structured, unread, usable
-from ..errors import InputError
+from ..errors import InputError, reason
 from ..extensions import extension_problems, installed_extensions, package_of
 from ..output.labels import Box, LabelPlaces
 from ..output.overlays import NOTHING_DRAWN, DrawnMarks
@@ -26,10 +26,10 @@ from ..scan.layers import Layers
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..task import Cancelled, Task
-from . import failures, tools
+from . import tools
 from .clicks import Clicks
 from .commands import Command, Item, Listing, Menu
-from .failures import Failures
+from .failures import Failures, widgets_ended
 from .followed import Followed
 from .laid import MotionOf, Numbers, NumbersOf
 from .menus import Commands
@@ -178,7 +178,7 @@ class Toolbox(WindowPart):
         if slot.tool is None:
             return None
         try:
-            with failures.widgets_ended():
+            with widgets_ended():
                 return function(slot.tool)
         except (Exception, Cancelled) as error:
             if tell is not None and isinstance(error, InputError):
@@ -214,7 +214,7 @@ class Toolbox(WindowPart):
         if self.clicking == slot.context.name:
             self.clicks.owner = None
         slot.context.cancel_work()
-        words = f"Scan4D switched off {slot.title} until the next start: {failures.reason(error)}"
+        words = f"Scan4D switched off {slot.title} until the next start: {reason(error)}"
         self.failures.report(f"The tool '{slot.context.name}'", error, words)
 
     def _lay(self, name: str, numbers: NumbersOf | None = None, motion: MotionOf | None = None) -> None:

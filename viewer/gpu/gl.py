@@ -24,6 +24,7 @@ import OpenGL
 OpenGL.ERROR_CHECKING = False
 OpenGL.ERROR_LOGGING = False
 
+from OpenGL.raw.GL import _types  # noqa: E402
 from OpenGL.raw.GL.VERSION import (  # noqa: E402
     GL_1_0,
     GL_1_1,
@@ -141,6 +142,29 @@ def divided_depth(divisor: float) -> Iterator[None]:
         yield
     finally:
         GL_1_0.glDepthRange(0.0, 1.0)
+
+
+@contextmanager
+def debug_messages() -> Iterator[list[str]]:
+    """Collect what the driver reports meanwhile, after "error: " where it is an error. Empty where the driver
+    reports nothing."""
+    messages: list[str] = []
+
+    def take(_: int, kind: int, ident: int, severity: int, length: int, text: int, user: object) -> None:
+        error = "error: " if kind == GL_4_3.GL_DEBUG_TYPE_ERROR else ""
+        messages.append(error + ctypes.string_at(text, length).decode(errors="replace"))
+
+    callback = _types.GLDEBUGPROC(take)
+    for state in (GL_4_3.GL_DEBUG_OUTPUT, GL_4_3.GL_DEBUG_OUTPUT_SYNCHRONOUS):
+        GL_1_0.glEnable(state)
+    GL_4_3.glDebugMessageCallback(callback, None)
+    try:
+        yield messages
+    finally:
+        GL_1_0.glFinish()
+        for state in (GL_4_3.GL_DEBUG_OUTPUT, GL_4_3.GL_DEBUG_OUTPUT_SYNCHRONOUS):
+            GL_1_0.glDisable(state)
+        GL_4_3.glDebugMessageCallback(_types.GLDEBUGPROC(), None)
 
 
 def clear_words(buffer: moderngl.Buffer, word: int, count: int | None = None) -> None:

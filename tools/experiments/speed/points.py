@@ -11,6 +11,7 @@ from functools import partial
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.pictures import renderer
 from experiments.script import Script
@@ -37,6 +38,15 @@ PLAIN = "GL_POINTS"
 _FRESH = 1_000_000  # points up to which a new pose for each picture is measured
 
 
+def clip_of(view: View) -> NDArray[np.float64]:
+    """The matrix from positions to clip space, (4, 4), of a view in perspective; depth is reversed."""
+    clip, world = np.zeros((4, 4)), np.eye(4)
+    clip[0, 0], clip[1, 1] = 2 * view.scale / view.size[0], 2 * view.scale / view.size[1]
+    clip[2, 3], clip[3, 2] = view.near, -1
+    world[:3, :3], world[:3, 3] = view.rotation, view.translation
+    return clip @ world
+
+
 class PlainPoints:
     """What a viewer does without Scan4D: GL_POINTS from two vertex buffers."""
 
@@ -47,24 +57,31 @@ class PlainPoints:
             self.program,
             [(ctx.buffer(cloud.positions), "3f", "position"), (ctx.buffer(cloud.colors), "4f1", "color")],
         )
-        width, height = view.size
-        clip = np.zeros((4, 4))
-        clip[0, 0], clip[1, 1] = 2 * view.scale / width, 2 * view.scale / height
-        clip[2, 3], clip[3, 2] = view.near, -1
-        world = np.eye(4)
-        world[:3, :3], world[:3, 3] = view.rotation, view.translation
-        self.program["to_clip"].write(  # type: ignore[union-attr]
-            (clip @ world).T.astype(np.float32).tobytes()
-        )
+        self.aim(view)
         self.target = ctx.framebuffer([ctx.texture(view.size, 4)], ctx.depth_texture(view.size))
-        self.picture = bytearray(4 * width * height)
+        self.picture = bytearray(4 * view.size[0] * view.size[1])
+
+    def aim(self, view: View) -> None:
+        """Draw from this view from now on."""
+        self.program["to_clip"].write(  # type: ignore[union-attr]
+            clip_of(view).T.astype(np.float32).tobytes()
+        )
 
     def draw(self) -> None:
+        """Draw and read the picture."""
+        self.render()
+        self.read()
+
+    def render(self) -> None:
+        """Draw, without waiting."""
         self.target.use()
         self.ctx.enable_only(moderngl.DEPTH_TEST)
         self.ctx.depth_func = ">"
         self.target.clear(depth=0.0)
         self.vertices.render(moderngl.POINTS, vertices=self.count)
+
+    def read(self) -> None:
+        """Read the picture."""
         self.target.read_into(self.picture, components=4)
 
 

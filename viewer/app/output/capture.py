@@ -19,7 +19,7 @@ from ...document.journal import Journal, journal_folder, journals, saved, writte
 from ...document.landmarks import Landmarks
 from ...document.recording import Entry, Recorder, Recording
 from ...drawing.request import Request
-from ...errors import InputError, explained
+from ...errors import InputError, explained, failure_in_words
 from ...files import free_file, working_folder
 from ...output.export import FILM_SUFFIX, with_hidden, write_png
 from ...output.labels import LabelPlaces
@@ -29,7 +29,6 @@ from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...picture.surface import Surface
 from ...task import Task, in_background
 from ..commands import Command
-from ..failures import failure_in_words
 from ..keys import Keys
 from ..notices import Offer, Problem
 from ..part import WindowPart

@@ -15,14 +15,13 @@ from ...drawing.jobs import Stage
 from ...drawing.plan import Effort, Failed, Plan, Ready, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request, colorable, fallback
-from ...errors import Scan4DError
+from ...errors import Scan4DError, failure_in_words
 from ...look import SAMPLES
 from ...picture.present import Presenter
 from ...picture.soften import soften
 from ...picture.surface import Surface
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
-from ..failures import failure_in_words
 from .detail import Budget, Detail
 from .motion import Motion
 from .probe import Probe
