@@ -61,7 +61,9 @@ def missing_packages(*names: str) -> MissingPackageError:
 
     what = f"Scan4D needs what is not installed: {', '.join(names)}"
     packages = " ".join(PACKAGES[name] for name in names)
-    return MissingPackageError(what, hint=f"Install it: {sys.executable} -m pip install {packages}")
+    error = MissingPackageError(what, hint=f"Install it: {sys.executable} -m pip install {packages}")
+    error.name = names[0]
+    return error
 
 
 def explain_missing_packages() -> None:

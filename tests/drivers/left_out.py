@@ -14,6 +14,7 @@ LARGE = {
     "DracoPy",
     "OpenEXR",
     "av",
+    "imgui_bundle",
     "laspy",
     "lzf",
     "matplotlib",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -46,6 +47,8 @@ print((drawn((64, 48)) == before).all())
 
 def test_a_buffer_without_memory_is_an_error(renderer: Renderer) -> None:
     gpu = renderer.gpu
+    if not gpu.software:
+        pytest.skip("drivers of graphics cards may reserve memory only when a buffer is used")
     with pytest.raises(Scan4DError, match=r"not enough memory.*Make it smaller"):
         gpu.buffer(reserve=1 << 42)
     assert gpu.ctx.error == "GL_NO_ERROR"
@@ -62,5 +65,9 @@ def test_a_picture_without_memory_is_an_error_and_the_next_is_whole(backend: str
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     said, same = done.stdout.splitlines()
-    assert said == "not enough memory for this picture. Make it smaller, or close other programs"
+    assert re.fullmatch(
+        r"not enough memory( on the graphics card)? for this picture\. "
+        "Make it smaller, or close other programs",
+        said,
+    )
     assert same == "True"
