@@ -9,10 +9,12 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
-from test_layers import modules, name_of, nodes_at_run_time, parse
+from source_code import modules, syntax_of
+from test_layers import name_of, nodes_at_run_time
 
 from viewer.imports import PACKAGES, missing_packages
 
@@ -59,12 +61,13 @@ def without(
     )  # fmt: skip
 
 
+@cache
 def library_imports() -> list[tuple[str, str, str]]:
     """All imports of what is neither Python's own nor Scan4D's: (module, statement, library)."""
     return [
         (name_of(path), ast.unparse(node), library)
         for path in modules()
-        for node in nodes_at_run_time(parse(path))
+        for node in nodes_at_run_time(syntax_of(path))
         for library in _libraries(node)
         if library not in sys.stdlib_module_names and library != "viewer"
     ]
@@ -85,7 +88,9 @@ def declared() -> set[str]:
 
 def test_packages_are_those_that_are_imported_and_declared() -> None:
     experiments = sorted((ROOT / "tools" / "experiments").rglob("*.py"))
-    measured = {each for path in experiments for node in ast.walk(parse(path)) for each in _libraries(node)}
+    measured = {
+        each for path in experiments for node in ast.walk(syntax_of(path)) for each in _libraries(node)
+    }
     used = {library for _, _, library in library_imports()}
     assert used <= set(PACKAGES) <= used | measured
     assert {package.strip("'") for package in PACKAGES.values()} <= declared()

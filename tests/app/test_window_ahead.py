@@ -130,12 +130,13 @@ def test_jumping_about_drops_what_was_queued(app: RunningApp) -> None:
     assert "Traceback" not in app.log()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how",
     [
         "close",
-        pytest.param(signal.SIGTERM, marks=pytest.mark.slow),
-        pytest.param(signal.SIGKILL, marks=pytest.mark.slow),
+        signal.SIGTERM,
+        signal.SIGKILL,
     ],
 )
 def test_nothing_is_left_of_work_when_the_window_ends(app: RunningApp, how: str | int) -> None:

@@ -25,10 +25,14 @@ from virtual_screen import (
 )
 from written import picture
 
+from viewer.camera import Camera
+from viewer.document.document import Document
 from viewer.document.landmarks import Landmarks
 from viewer.document.saved_session import SavedSession
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
+
+CAMERA = Camera((0.0, -4.0, 1.0), (0.0, 0.0, 0.5), (0.0, 0.0, 1.0))
 
 
 @pytest.fixture
@@ -187,6 +191,38 @@ def saved_session(app: RunningApp, name: str) -> Path:
     return Path(app.told("Saved (.*)")[1])
 
 
+def open_and_find(app: RunningApp, session: Path, scan: Path, document: object) -> None:
+    """Drop a session whose scan is missing, and name the folder where it is now."""
+    app.drop(session)
+    app.told("its scan 'scans/wall' is missing. Choose where it is now")
+    app.settle()
+    Hands(app).press("Tab")
+    app.screen.do("type", "--delay", 15, scan)
+    app.settle()
+    app.screen.do("key", "Return")  # into the folder
+    app.settle()
+    app.screen.do("key", "Return")  # all of it
+    app.see(lambda state: state.scan == str(scan) and state.document == document, frame=1)
+    assert "Traceback" not in app.log()
+
+
+def test_a_session_whose_scan_is_missing_asks_for_it(screen: Screen, tmp_path: Path, scan: Path) -> None:
+    (tmp_path / "else").mkdir()
+    file = tmp_path / "else" / "mine.scan4d.json"
+    document = Document(backend="points", camera=CAMERA)
+    SavedSession(str(scan), None, 1, document).export(file)
+    data = json.loads(file.read_text())
+    file.write_text(json.dumps(data | {"scan": "scans/wall"}))
+    wanted = json.loads(file.read_text())["document"]
+    home = tmp_path / "another"
+    home.mkdir()
+    other = home / "other.npy"
+    np.save(other, np.random.default_rng(0).random((300, 3)))
+    with running_app(screen, home, other) as app:
+        open_and_find(app, file, scan, wanted)
+
+
+@pytest.mark.slow
 def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
@@ -212,17 +248,7 @@ def test_a_session_is_saved_moved_and_opened_and_its_scan_asked_for(
     home = tmp_path / "another"
     home.mkdir()
     with running_app(screen, home, "demo") as app:
-        app.drop(moved)
-        app.told("its scan 'scans/wall' is missing. Choose where it is now")
-        app.settle()
-        Hands(app).press("Tab")
-        screen.do("type", "--delay", 15, scan)
-        app.settle()
-        screen.do("key", "Return")  # into the folder
-        app.settle()
-        screen.do("key", "Return")  # all of it
-        app.see(lambda state: state.scan == str(scan) and state.document == done.document, frame=1)
-        assert "Traceback" not in app.log()
+        open_and_find(app, moved, scan, done.document)
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ Helper.call = call
 def running(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     scan = tmp_path_factory.mktemp("scan") / "points.npy"
     np.save(scan, np.random.default_rng(0).random((500, 3)))
-    with running_app(screen, tmp_path_factory.mktemp("app"), scan) as app:
+    with running_app(screen, tmp_path_factory.mktemp("app"), scan, before=ENDLESS) as app:
         yield app
     assert "Traceback" not in app.log()
 
@@ -153,21 +153,17 @@ def test_a_field_of_the_panel_then_the_keyboard_then_the_tool(app: RunningApp) -
     assert ended(app, stack(app)) == "clicking"
 
 
-def test_work_in_the_status_bar_goes_on(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> None:
-    scan = tmp_path_factory.mktemp("scan") / "points.npy"
-    np.save(scan, np.random.default_rng(0).random((500, 3)))
-    home = tmp_path_factory.mktemp("app")
-    with running_app(screen, home, scan, before=ENDLESS) as app:
-        app.choose(PANEL, "##backend", "###surfels")
-        app.see(lambda state: any("normals" in name for name in state.works))
-        for _ in range(4):
-            app.screen.do("key", "Escape")
-            app.take_in()
-        assert not any("Cancelled" in text for text in app.notes)
-        app.act("timeline", ("item_click", "###work"))
-        app.see(lists=1)
+def test_work_in_the_status_bar_goes_on(app: RunningApp) -> None:
+    app.choose(PANEL, "##backend", "###surfels")
+    app.see(lambda state: any("normals" in name for name in state.works))
+    for _ in range(4):
         app.screen.do("key", "Escape")
-        assert app.see(lists=0).works, "the list of work is closed, the work goes on"
-        app.act("timeline", ("item_click", "###cancel"))
-        app.told("Cancelled: Estimating normals")
-        app.see(works=[])
+        app.take_in()
+    assert not any("Cancelled" in text for text in app.notes)
+    app.act("timeline", ("item_click", "###work"))
+    app.see(lists=1)
+    app.screen.do("key", "Escape")
+    assert app.see(lists=0).works, "the list of work is closed, the work goes on"
+    app.act("timeline", ("item_click", "###cancel"))
+    app.told("Cancelled: Estimating normals")
+    app.see(works=[])

@@ -206,6 +206,7 @@ def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path)
     (folder / "again.png").unlink()
 
 
+@pytest.mark.slow
 def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
     dialog.choose("what", "###frames")
@@ -221,6 +222,7 @@ def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Pa
     assert sizes == sorted(sizes), "the sphere grows"
 
 
+@pytest.mark.slow
 def test_an_anonymous_film_draws_no_names(tmp_path: Path, screen: Screen) -> None:
     scan = tmp_path / "ball.npz"
     ball = sphere(3000)

@@ -81,6 +81,7 @@ def test_home_brings_the_opening_view_back(app: RunningApp) -> None:
     assert keys(app, "ctrl+z") != opening
 
 
+@pytest.mark.slow
 def test_levels_without_data_are_named_instead_of_f(app: RunningApp) -> None:
     app.choose(PANEL, "##backend", "###pyramidal")
     app.screen.do("key", "0", "key", "1", "key", "2", "key", "3")

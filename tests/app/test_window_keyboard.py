@@ -83,6 +83,7 @@ def test_alt_and_a_letter_open_a_menu_and_escape_gives_the_view_its_keys_back(ap
     assert app.settle().frame == 1
 
 
+@pytest.mark.slow
 def test_alt_with_something_else_opens_nothing(app: RunningApp) -> None:
     app.screen.do("keydown", "Alt_L", "key", "i", "keyup", "Alt_L")
     app.settle()
@@ -118,6 +119,7 @@ def test_a_widget_of_the_panel_is_worked_by_keys(app: RunningApp) -> None:
     press(app, "Home", "Return")
 
 
+@pytest.mark.slow
 def test_the_timeline_plays_and_pauses_by_its_button(app: RunningApp) -> None:
     press(app, "shift+F6", "Right", "Right")
     app.screen.do("key", "Return")

@@ -82,19 +82,7 @@ def test_a_file_for_the_session_is_named_like_the_scan(scan: str, name: str, tmp
     assert named_like(str(tmp_path / "set.1"), tmp_path, ".x") == tmp_path / "set.1.x"
 
 
-def test_a_session_that_was_opened_is_saved_to_its_file(screen: Screen, tmp_path: Path, scan: Path) -> None:
-    file = tmp_path / "mine.scan4d.json"
-    SavedSession(str(scan), None, 0, Document()).export(file)
-    before = file.read_bytes()
-    with running_app(screen, tmp_path / "work", scan, home=tmp_path / "home") as app:
-        app.drop(file)
-        app.see(undoes="Open session")
-        press(app, "ctrl+4", "ctrl+s")
-        assert app.told("Saved (.*)")[1] == str(file)
-        assert file.read_bytes() != before
-
-
-def test_the_dialog_opens_a_session_of_the_open_scan_and_closes(
+def test_the_dialog_opens_a_session_of_the_open_scan_and_closes_and_ctrl_s_saves_to_its_file(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
     file = tmp_path / "mine.scan4d.json"
@@ -116,6 +104,10 @@ def test_the_dialog_opens_a_session_of_the_open_scan_and_closes(
         press(app, "Return")
         assert app.told("Opened the session (.*)")[1] == str(file)
         app.see(is_browser_open=False, undoes="Open session")
+        before = file.read_bytes()
+        press(app, "ctrl+4", "ctrl+s")
+        assert app.told("Saved (.*)")[1] == str(file)
+        assert file.read_bytes() != before
         assert "Traceback" not in app.log()
 
 

@@ -51,6 +51,17 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def test_buttons_of_the_toolbar_that_share_an_id_are_found(
+    screen: Screen, tmp_path: Path, ball: Path
+) -> None:
+    with running_app(screen, tmp_path, ball, before=f"exec({TWINS!r}); ") as app:
+        report = app.walk(BARS[:1], presses=False)
+        assert report.problems == ["toolbar: twin: 2 widgets have its id"]
+        assert len(report.seen) >= 15, "the twins leave no room for undo and redo"
+        assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
 def test_no_buttons_of_the_bars_share_an_id_but_those_that_do(
     screen: Screen, tmp_path: Path, ball: Path
 ) -> None:

@@ -86,7 +86,7 @@ def test_dual_numbers_refuse_what_they_cannot_derive() -> None:
         np.cosh(Dual(np.ones(2), {0: np.ones(2)}))
 
 
-@pytest.mark.parametrize("index", [REST, MOUTH_OPEN, *rarely(EYES_SHUT, SMILE)])
+@pytest.mark.parametrize("index", [MOUTH_OPEN, *rarely(REST, EYES_SHUT, SMILE)])
 def test_points_lie_on_the_exact_surface(demo: DemoSource, index: int) -> None:
     points = demo.load(index).world().T
     skin = rest_points().skin
@@ -95,7 +95,7 @@ def test_points_lie_on_the_exact_surface(demo: DemoSource, index: int) -> None:
     assert np.abs(head.eyes(*points[:, skin:])).max() < 1e-4
 
 
-@pytest.mark.parametrize("index", [REST, *rarely(MOUTH_OPEN), EYES_SHUT, *rarely(SMILE)])
+@pytest.mark.parametrize("index", [EYES_SHUT, *rarely(REST, MOUTH_OPEN, SMILE)])
 def test_nearly_all_points_are_on_the_outside(demo: DemoSource, index: int) -> None:
     """Some of an eyeball's points are always behind the lids."""
     value = motion.surface_value(demo.load(index).world(), seconds(demo, index))
@@ -103,7 +103,7 @@ def test_nearly_all_points_are_on_the_outside(demo: DemoSource, index: int) -> N
     assert np.mean(value > -1e-4) > 0.97
 
 
-@pytest.mark.parametrize("index", TELLING)
+@pytest.mark.parametrize("index", [MOUTH_OPEN, *rarely(REST, EYES_SHUT, SMILE)])
 def test_normals_are_those_of_the_surface_and_face_outwards(demo: DemoSource, index: int) -> None:
     cloud, time = demo.load(index), seconds(demo, index)
     pick = np.random.default_rng(1).choice(rest_points().skin, 3000, replace=False)
@@ -150,7 +150,7 @@ def test_motion_can_be_undone(demo: DemoSource, index: int) -> None:
     assert growth.min() > 0
 
 
-@pytest.mark.parametrize("index", [*rarely(REST), MOUTH_OPEN, *rarely(EYES_SHUT), SMILE])
+@pytest.mark.parametrize("index", [SMILE, *rarely(REST, MOUTH_OPEN, EYES_SHUT)])
 def test_points_cover_the_surface(demo: DemoSource, index: int) -> None:
     """Random places of the surface are within the radius of a point that faces the same way."""
     cloud, time = demo.load(index), seconds(demo, index)
