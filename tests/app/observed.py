@@ -196,6 +196,7 @@ def shown(app: App) -> dict[str, Any]:
         "is_exporting": app.exporting.task is not None,
         "asks_before_closing": app.exporting.is_leaving,
         "clicking": app.tools.clicking,
+        "prompt": app.tools.prompt,
         "labels": plain(app.tools.label_places.spots),
         "is_under_way": app.tools.is_under_way,
         "landmarks": landmarks(app),

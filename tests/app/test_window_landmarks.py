@@ -128,6 +128,7 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         state = click(app, points[0][128])
         assert list(state.landmarks) == ["Landmark 1", "Landmark 2", "Landmark 3"]
 
+        assert "Arrow keys move Landmark 3." in state.prompt
         before = keys_of(state, "Landmark 3")[0]
         after = keys_of(press(app, "Right", "Right", "Up"), "Landmark 3")[0]
         pixel = (after[0] - before[0]) / 2
@@ -143,7 +144,11 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         assert keys_of(state, "Landmark 3")[0] == before, "what a held key does is one step"
 
         press(app, "period")
-        app.see(lambda state: state.landmarks["Landmark 1"][0] == "tracked")
+        state = app.see(lambda state: state.landmarks["Landmark 1"][0] == "tracked")
+        assert "Arrow keys" not in state.prompt
+        state = press(app, "Left", "Right", "Right", "Left")
+        assert (state.frame, state.prompt.count("Arrow keys")) == (1, 0), "arrows go from frame to frame"
+        assert keys_of(state, "Landmark 3") == {0: before}
         start, stop = on_screen(app, points[1][34]), on_screen(app, points[1][50])
         dragged = app.drag(start, stop)
         keys = keys_of(dragged, "Landmark 1")

@@ -75,7 +75,7 @@ def test_the_numbers_of_a_movement_are_those_of_its_formula(run: Run) -> None:
     amplitude = 10 + HEIGHT - rest
     assert float(way["rest"]) == pytest.approx(rest, rel=1e-5)
     assert float(way["amplitude"]) == pytest.approx(amplitude, rel=1e-5)
-    spread = 2 * SIGMA * math.sqrt(MIDDLE + 1 / first.sum())
+    spread = 1.96 * SIGMA * math.sqrt(MIDDLE + 1 / first.sum())
     assert float(way["amplitude ±"]) == pytest.approx(spread, rel=1e-5)
     assert float(way["peak [s]"]) == pytest.approx(0.5, abs=1e-5)
     # where 10 + HEIGHT (1 - (2 t - 1)^2) is rest + 0.1 amplitude
@@ -84,7 +84,7 @@ def test_the_numbers_of_a_movement_are_those_of_its_formula(run: Run) -> None:
     assert float(way["end [s]"]) == pytest.approx(0.5 + half, abs=1e-3)
     assert float(way["duration [s]"]) == pytest.approx(2 * half, abs=2e-3)
     onset, end, duration = (float(way[f"{name} ± [s]"]) for name in ("onset", "end", "duration"))
-    assert onset == pytest.approx(2 * SIGMA * math.sqrt(MIDDLE) / (8 * HEIGHT * half), rel=0.05)
+    assert onset == pytest.approx(1.96 * SIGMA * math.sqrt(MIDDLE) / (8 * HEIGHT * half), rel=0.05)
     assert duration == pytest.approx(math.hypot(onset, end), rel=1e-5)
     assert float(way["fastest per s"]) == pytest.approx(4 * HEIGHT, rel=1e-5)
     assert abs(float(still.pop("fastest per s"))) < 1e-9
@@ -185,7 +185,7 @@ def test_plots_are_those_of_the_window(run: Run) -> None:
     rows = table("plot.csv")
     assert list(rows[0]) == ["frame", "time [s]", "way [mm]", "way ± [mm]", "still [°]", "still ± [°]"]
     np.testing.assert_allclose([float(row["way [mm]"]) for row in rows], LENGTHS, rtol=1e-8)
-    np.testing.assert_allclose([float(row["way ± [mm]"]) for row in rows], 2 * SIGMA, rtol=1e-5)
+    np.testing.assert_allclose([float(row["way ± [mm]"]) for row in rows], 1.96 * SIGMA, rtol=1e-5)
     done = run(*WORDS, "--plot", "plot.svg", "--order", "speed", "--force")
     assert done.code == 0, done.err
     words = [part.text for part in ElementTree.parse("plot.svg").iter("{http://www.w3.org/2000/svg}text")]

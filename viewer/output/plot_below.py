@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.measures.curves import BAND_SIGMAS
-from ..analysis.words import with_uncertainty
+from ..analysis.words import SURE, with_uncertainty
 from ..look import rgba
 from .image_painter import ImagePainter
 from .labels import Box
@@ -102,7 +101,7 @@ def _draw_legend(
     for number, line in enumerate(lines):
         curve, now = line.curve, line.values[pose] if pose < len(line.values) else np.nan
         band = line.band[pose] if pose < len(line.band) else np.nan
-        words = with_uncertainty(float(now), float(band) / BAND_SIGMAS, curve.unit)
+        words = with_uncertainty(float(now), float(band) / SURE, curve.unit)
         text = fitted_text(painter, f"{curve.name}: {words}" if curve.name else words, stop - left - em)
         is_last = row == most_rows - 1 and number < len(lines) - 1
         more = f"and {len(lines) - number} more"

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.measures.curves import BAND_SIGMAS, PER_ORDER, MeasureCurve
+from ..analysis.measures.curves import PER_ORDER, MeasureCurve
 from ..analysis.trajectories import Trajectory
+from ..analysis.words import SURE
 from ..csv_text import save_rows
 from ..files import whole_file
 from ..imports import require
@@ -188,7 +189,7 @@ def color_of_path(number: int) -> int:
 
 
 def line_of_curve(curve: MeasureCurve, color: int, order: int, has_band: bool = True) -> PlotLine:
-    """The line of a measure: its values, 0, speed, 1, or acceleration, 2, with two standard deviations."""
+    """The line of a measure: its values, 0, speed, 1, or acceleration, 2, with its ±."""
     values, sigmas = curve.derivative(order)
     unit, band = curve.unit + PER_ORDER[order], _band(sigmas, has_band)
     return PlotLine(curve.name, unit, values, band, color, notes=curve.notes)
@@ -197,7 +198,7 @@ def line_of_curve(curve: MeasureCurve, color: int, order: int, has_band: bool = 
 def line_of_path(
     name: str, trajectory: Trajectory, scale: Scale, color: int, order: int, has_band: bool = True
 ) -> PlotLine:
-    """The line of a landmark's speed, 1, or acceleration, 2, with two standard deviations."""
+    """The line of a landmark's speed, 1, or acceleration, 2, with its ±."""
     values, sigmas = (scale.factor * part for part in trajectory.pace(order))
     return PlotLine(name, scale.unit + PER_ORDER[order], values, _band(sigmas, has_band), color)
 
@@ -215,7 +216,7 @@ def plot_against(x: PlotLine, frames: NDArray[np.intp], lines: Sequence[PlotLine
 
 
 def _band(sigmas: NDArray[np.float64], has_band: bool) -> NDArray[np.float64]:
-    return BAND_SIGMAS * sigmas if has_band else np.full(len(sigmas), np.nan)
+    return SURE * sigmas if has_band else np.full(len(sigmas), np.nan)
 
 
 def _rounded(values: NDArray[np.float64]) -> tuple[float | None, ...]:

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from viewer.analysis.curves import Smoothing
+from viewer.analysis.measures.curves import MeasureCurve
 from viewer.analysis.measures.distances import (
     COLUMNS,
     Ends,
@@ -21,10 +23,12 @@ from viewer.analysis.measures.series import all_series
 from viewer.analysis.pick import Neighbor
 from viewer.analysis.surface_point import SurfacePoint, followed
 from viewer.analysis.track import Known, Track
+from viewer.analysis.words import with_uncertainty
 from viewer.csv_text import save_rows, to_text
 from viewer.document.landmarks import Landmarks
 from viewer.errors import InputError
 from viewer.geometry import vector
+from viewer.output.plots import line_of_curve, plot_over_time
 from viewer.rigid import Rigid
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -140,6 +144,21 @@ def test_a_table_has_a_row_for_each_frame_in_which_a_distance_is_known(tmp_path:
         assert tuple(float(first[f"{axis}_{number}"]) for axis in "xyz") == spot.position
         assert float(first[f"uncertainty_{number}"]) == pytest.approx(spot.uncertainty)
         assert (float(first[f"spacing_{number}"]), first[f"level_{number}"]) == (0.1, "0")
+
+
+def test_a_plot_and_the_table_of_distances_state_the_same_uncertainty() -> None:
+    series = all_series(MADE.measures, {one.name: track(one.keys[0]) for one in MADE.all})
+    table = {(row[1], row[2]): row for row in rows()[1:]}
+    for measure in MADE.distances:
+        curve = MeasureCurve.of(series[measure.name], MM, Smoothing())
+        line = line_of_curve(curve, 0, 0)
+        plotted = plot_over_time(curve.times, np.arange(len(curve.times)), [line]).rows()[1:]
+        for frame in (0, 1):
+            row = table[measure.name, frame + 1]
+            value, uncertainty = row[COLUMNS.index("distance")], row[COLUMNS.index("uncertainty")]
+            assert plotted[frame][2:4] == pytest.approx([value, uncertainty], rel=1e-8)
+            shown = with_uncertainty(float(curve.values[frame]), float(curve.sigmas[frame]))
+            assert f"± {uncertainty:.1g}" in shown
 
 
 def test_a_table_tells_lengths_in_the_unit_that_it_names_and_has_the_frames_that_are_wanted() -> None:

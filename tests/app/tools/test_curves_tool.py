@@ -12,6 +12,7 @@ import pytest
 
 from viewer.analysis.measures import Quantity, Series
 from viewer.analysis.measures.curves import NUMBER_COLUMNS, number_rows, numbers_file, unit_of
+from viewer.analysis.words import SURE
 from viewer.app.tools.plotting.choices import AGAINST, REPEATS, CurveChoices, Settings
 from viewer.app.tools.plotting.lines import value_in_words
 from viewer.app.tools.plotting.shown import Shown
@@ -42,7 +43,7 @@ def test_values_are_told_in_the_unit_that_the_user_sees_and_by_quantity() -> Non
     assert shown.plot.units == ("cm", "cm²", "°")
     for line, factor in zip(shown.plot.lines, (0.1, 0.01, 1), strict=True):
         assert line.values[0] == pytest.approx(40 * factor)
-        assert line.band[0] == pytest.approx(0.2 * factor)
+        assert line.band[0] == pytest.approx(SURE * 0.1 * factor)
     assert unit_of("volume", "mm") == "mm³"
 
 

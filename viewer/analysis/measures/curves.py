@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from ...scan.units import Scale
 from ..curves import Movement, Repeats, Smoothing, correlation, movement_of, peaks_of, repeats_of, smoothed
+from ..words import SURE
 from . import Series
 
 _Array = NDArray[np.float64]
 
-BAND_SIGMAS = 2.0  # half the width of the bands of uncertain values
 PER_ORDER = ("", "/s", "/s²")  # what derivatives add to a unit, by their order
 NUMBER_COLUMNS = (
     "measure", "unit", "rest", "amplitude", "amplitude ±", "onset [s]", "onset ± [s]", "peak [s]",
@@ -90,7 +90,7 @@ def numbers_file(table: Path) -> Path:
 
 def number_rows(curves: Sequence[MeasureCurve], against: MeasureCurve | None = None) -> list[list[object]]:
     """The numbers of the movements, a row for each curve below NUMBER_COLUMNS; None for what is not known.
-    Each ± is two standard deviations. against: one of the curves, whose correlation with the others then is
+    Each ± covers 95 % (see `SURE`). against: one of the curves, whose correlation with the others then is
     one more column."""
     rows: list[list[object]] = [
         [curve.name, curve.unit, *map(_rounded, _numbers(curve)), curve.warning or None] for curve in curves
@@ -143,12 +143,12 @@ def repeat_rows(curves: Iterable[MeasureCurve], aligned: Repeats, order: int = 0
 
 
 def _numbers(curve: MeasureCurve) -> list[float]:
-    one, two = curve.movement, BAND_SIGMAS
+    one = curve.movement
     if one is None:
         return [*(math.nan,) * (len(NUMBER_COLUMNS) - 4), curve.fastest]
     return [
-        one.rest, one.amplitude, two * one.amplitude_sigma, one.onset, two * one.onset_sigma, one.peak,
-        one.end, two * one.end_sigma, one.duration, two * one.duration_sigma, curve.fastest,
+        one.rest, one.amplitude, SURE * one.amplitude_sigma, one.onset, SURE * one.onset_sigma, one.peak,
+        one.end, SURE * one.end_sigma, one.duration, SURE * one.duration_sigma, curve.fastest,
     ]  # fmt: skip
 
 

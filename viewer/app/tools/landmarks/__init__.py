@@ -65,6 +65,7 @@ class Tool:
         self.notebook = Notebook(context)
         self.exchange = Exchange(context, self.begin)
         self._pressed = ""  # the name of the one that the mouse went down on
+        self._arrows_in: int | None = None  # frame in which arrow keys move the selected one
         self._cached = Cached()
         self._on_screen = np.empty((0, 2))
         self._grab = 0.0  # pixels
@@ -176,20 +177,33 @@ class Tool:
     def abandon(self) -> None:
         """Let go of what was chosen and what is dragged."""
         self.corrects, self.dragged, self.notebook.is_pinning = False, None, False
+        self._arrows_in = None
+
+    @property
+    def takes_arrows(self) -> bool:
+        """Whether arrow keys move the selected one: after it was placed, moved or chosen in this frame, until
+        another frame is shown."""
+        number = self.shown.number(self.selected)
+        is_there = number is not None and bool(self.shown.is_there[number])
+        return self.is_active and is_there and self._arrows_in == self.frame
 
     def prompt(self) -> str:
-        """The words that say what a click does."""
+        """The words that say what a click does, and what arrow keys move."""
         if self.notebook.is_pinning:
             return "Note: click where it belongs. Esc to stop."
+        arrows = f" Arrow keys move {self.selected}." if self.takes_arrows else ""
+        return f"{self._prompt_of_click()}{arrows} Esc to stop."
+
+    def _prompt_of_click(self) -> str:
         target, names = self.target, [one.name for one in self.made.listed]
         if target is not None and target.state == "not placed":
             number = names.index(target.name) + 1
-            return f"{target.title}, {number} of {len(names)}: click it. Esc to stop."
+            return f"{target.title}, {number} of {len(names)}: click it."
         if target is not None:
-            return f"{target.title}: click it in {frame_in_words(self.frame)}. Esc to stop."
+            return f"{target.title}: click it in {frame_in_words(self.frame)}."
         if self.is_free:
-            return f"{self.made.free_name()}: click its position. Esc to stop."
-        return "All landmarks are placed: drag one to correct it, or choose one in the list. Esc to stop."
+            return f"{self.made.free_name()}: click its position."
+        return "All landmarks are placed: drag one to correct it, or choose one in the list."
 
     def on_click(self, click: Click) -> bool:
         """Set the next one at what was clicked; raises InputError where it cannot be."""
@@ -199,7 +213,7 @@ class Tool:
             return True
         target = self.target
         if target is None and self._pressed:
-            self.selected = self._pressed
+            self.selected, self._arrows_in = self._pressed, self.frame
             return True
         if target is None and not self.is_free:
             return False
@@ -214,7 +228,7 @@ class Tool:
         if click.through_gap:
             self.context.note("No data there: placed on the nearest surface in front.")
         self.corrects = self.corrects and bool(landmark.keys)
-        self.selected = landmark.name
+        self.selected, self._arrows_in = landmark.name, point.frame
         self.context.change(name, self.made.with_landmark(landmark.with_key(point)), merge=merge)
 
     def on_press(self, mouse: ImVec2) -> bool:
@@ -243,9 +257,9 @@ class Tool:
             self._set(landmark, click, "Move landmark")
 
     def on_arrow(self, right: int, up: int) -> bool:
-        """Move the selected one by a pixel, along the surface that is seen; whether one is selected."""
+        """Move the selected one by a pixel, along the surface that is seen; whether arrow keys move it."""
         number = self.shown.number(self.selected)
-        if number is None or not self.shown.is_there[number]:
+        if number is None or not self.takes_arrows:
             return False
         click = (
             self.context.seen_at(vector(self.positions[number]), (right, up)) if self.seen[number] else None
@@ -296,13 +310,14 @@ class Tool:
         landmark = self.made.named(name)
         if landmark is None:
             return
-        self.selected = name
+        self.selected, self._arrows_in = name, self.frame
         self.corrects = self.is_active and landmark.state != "not placed"
         number = self.shown.number(name)
         if number is not None and self.shown.is_there[number]:
             self._look_at(number)
         elif landmark.keys:
             nearest = min(landmark.keys, key=lambda key: abs(key.frame - self.frame))
+            self._arrows_in = nearest.frame
             self.context.seek(nearest.frame)
 
     def _look_at(self, number: int) -> None:
@@ -481,5 +496,5 @@ COMMANDS = {
 MOUSE = (
     ("Click while placing", "Place the next landmark"),
     ("Drag a landmark while placing", "Correct it in this frame"),
-    ("Arrows while placing", "Move the selected landmark by a pixel"),
+    ("Arrows after placing or choosing a landmark", "Move it by a pixel, until the frame changes"),
 )

@@ -51,7 +51,7 @@ class Settings:
     order: str = param(
         VALUE, "Values of the measures, or their rate of change", choices=ORDERS, words=ORDER_WORDS
     )
-    bands: bool = param(True, "Two standard deviations above and below a curve", title="±")
+    bands: bool = param(True, "Band around a curve that covers the true value in 95 % of cases", title="±")
     seconds: float = param(
         0.3, "Width of the smoothing window, for speeds, accelerations and the numbers under the plot",
         low=0.02, high=5.0, unit="s", title="Smoothing",

@@ -111,7 +111,7 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         widgets.tooltip("Smallest height of a peak that counts as a repeat, in percent of the curve's range")
     widgets.same_line(widgets.check_width("±"))
     bands = imgui.checkbox("±", settings.bands)[1]
-    widgets.tooltip("Band of ± two standard deviations; for repeats, ± one")
+    widgets.tooltip("Band of ±, which holds the true value in 95 % of cases. Repeats: one standard deviation")
     widgets.same_line(_SLIDER * em)
     imgui.set_next_item_width(_SLIDER * em)
     points = (
