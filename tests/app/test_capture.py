@@ -16,7 +16,7 @@ import pytest
 from scenes import sphere
 from written import picture
 
-from viewer.app.later import Later
+from viewer.app.notices import Notices
 from viewer.app.output.capture import Capture
 from viewer.app.output.export_plan import Choices
 from viewer.app.output.exporting import Exporting
@@ -188,11 +188,11 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
 
 
 def test_closing_waits_for_no_question(app: Any) -> None:
-    later, answered = Later(app.note), threading.Event()
-    later.tell(lambda: str(answered.wait()))
-    later.advance(0.0)
-    later.finish()  # or else for ever
-    assert app.told == []
+    notices, answered = Notices(), threading.Event()
+    notices.tell_later(lambda: str(answered.wait()))
+    notices.advance(0.0)
+    notices.finish()  # or else for ever
+    assert notices.all == []
     answered.set()
 
 

@@ -17,10 +17,10 @@ from viewer.app import settings
 from viewer.app.output.export_plan import Choices
 from viewer.app.output.exporting import Exporting
 from viewer.app.part import part_classes, stored_values
-from viewer.app.placement import WindowPlacement, reachable
 from viewer.app.playing.player import Pace
 from viewer.app.session import Session, SessionSettings, known_as
 from viewer.app.settings import load, save
+from viewer.app.window import WindowPlacement, reachable
 from viewer.app.window_look import stored_placement
 from viewer.backends import backend
 from viewer.camera import Camera

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from virtual_screen import RunningApp, Screen, running_app
 
-from viewer.app.path_dialog import files_of
+from viewer.app.file_dialog import files_of
 from viewer.app.session import named_like
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession

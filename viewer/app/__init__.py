@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from ..document.saved_session import SavedSession
@@ -13,29 +13,37 @@ if TYPE_CHECKING:
     from .app import App
 
 
+class Start(NamedTuple):
+    """What a window begins with, beside its scans.
+
+    unit, fps, up: that the command line states for all scans; None: it states none. device: has no effect on
+    a window, which says so. replay: a recording to show first. session: to open the first scan with. refused:
+    what was wrong with what the user named, to be reported.
+    """
+
+    unit: str | None = None
+    fps: float | None = None
+    up: str | None = None
+    device: int | None = None
+    replay: Path | None = None
+    session: SavedSession | None = None
+    refused: InputError | None = None
+
+
 def run(
     scans: Sequence[str],
+    start: Start = Start(),  # noqa: B008, it never changes
     *,
-    unit: str | None = None,
-    fps: float | None = None,
-    up: str | None = None,
     opened: Timeline | None = None,
-    device: int | None = None,
-    replay: Path | None = None,
     watch: Callable[[App], None] | None = None,
-    session: SavedSession | None = None,
-    refused: InputError | None = None,
 ) -> int:
     """Open a window on the first of the scans and return 0 when it is closed, by a signal too.
 
-    scans: as a user names them (see `named_scans`); the others can be chosen in the window, which tells
-    what is wrong with those that cannot be opened. The demo is shown where none can.
-    up: the up axis; None: as a scan was left.
-    opened: the first of the scans, where that is open already; the window closes it. device: has no effect
-    on a window, which says so. replay: a recording to show first. session: to open the first scan with.
-    watch: called at the end of each turn of the window's loop, with the app as it is then. refused: what was
-    wrong with what the user named, to be told. Raises NoOpenGLError without a window, and
-    InputError where no scan can be opened either.
+    scans: as a user names them (see `named_scans`). The others can be chosen in the window, which reports
+    those that cannot be opened. The window shows the demo if none can. opened: the first of the scans, if it
+    is open already; the window closes it. watch: called at the end of each turn of the window's loop, with
+    the app as it is then. Raises NoOpenGLError without a window, and InputError if then no scan can be opened
+    either.
     """
     from ..errors import NoOpenGLError
     from ..geometry import up_vector
@@ -43,11 +51,11 @@ def run(
     from ..scan.listing import named_scans
     from ..scan.open import DEMO, open_scan
 
-    if up is not None:
-        up_vector(up)
+    if start.up is not None:
+        up_vector(start.up)
     found, problems = named_scans(scans)
     is_lost, found = not found, found or [DEMO]
-    timeline = opened or open_scan(found[0], unit, fps)
+    timeline = opened or open_scan(found[0], start.unit, start.fps)
     from .closing import Signals
 
     with Signals() as signals:
@@ -68,18 +76,19 @@ def run(
             raise
         try:
             with uncollected():  # tools are imported
-                app = App(window, found, timeline, stored, Stated(unit, fps, up), session)
+                stated = Stated(start.unit, start.fps, start.up)
+                app = App(window, found, timeline, stored, stated, start.session)
             try:
                 for note in notes:
                     app.notices.tell(note)
-                app.scans.tell([refused, *problems] if refused else problems)
+                app.scans.tell([start.refused, *problems] if start.refused else problems)
                 app.capture.find_unfinished()
-                if device is not None:
+                if start.device is not None:
                     app.notices.tell(
                         "The display's own GPU draws the window, so a device number has no effect."
                     )
-                if replay is not None:
-                    app.replayer.replay(replay)
+                if start.replay is not None:
+                    app.replayer.replay(start.replay)
                 Loop(app, signals, watch).run()
             finally:
                 app.close()

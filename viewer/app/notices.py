@@ -7,6 +7,7 @@ import logging
 import math
 import time
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
@@ -14,6 +15,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..files import printable
+from ..task import Task, in_background
 from . import theme, widgets
 from .keyboard import Keyboard
 from .part import ViewArea, WindowPart
@@ -75,16 +77,18 @@ class Notices(WindowPart):
     """All messages, the last one at the end."""
 
     name = "notices"
+    doing = "Looking"
     layer = 20
     OFFERS = {
         "note": "tell", "note_of_scan": "tell_of_scan", "note_of_work": "tell_of_work",
-        "note_of_opening": "tell_of_opening",
+        "note_of_opening": "tell_of_opening", "tell_later": "tell_later",
     }  # fmt: skip
 
     def __init__(self) -> None:
         self.all: list[Notice] = []
         self.count = 0  # ever told
         self._foot = 0.0  # height of the problems over the picture
+        self._looking: list[Future[str]] = []
 
     def tell(self, text: str, of: str = "") -> None:
         """Show a message for as long as it takes to read, a `Problem` or an `Offer` until it is sent away,
@@ -112,6 +116,22 @@ class Notices(WindowPart):
     def tell_of_opening(self, text: str) -> None:
         """Show a message about what could not be opened, until something else is to be opened."""
         self.tell(text, "opening")
+
+    def tell_later(self, look: Callable[[], str]) -> None:
+        """Find something out beside the window, and show the words that it brings; empty: nothing."""
+        self._looking.append(in_background(Task("Looking"), look))
+
+    @property
+    def waits(self) -> bool:
+        """Whether an answer is awaited."""
+        return bool(self._looking)
+
+    def advance(self, now: float) -> None:
+        """Show the answers that are there."""
+        done = [work for work in self._looking if work.done()]
+        self._looking = [work for work in self._looking if work not in done]
+        for words in filter(None, (work.result() for work in done)):
+            self.tell_of_work(words)
 
     def leave_scan(self) -> None:
         """Messages about the scan go with it."""

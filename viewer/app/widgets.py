@@ -7,6 +7,7 @@ from bisect import bisect
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar
 
 from imgui_bundle import ImVec2, imgui
@@ -31,31 +32,32 @@ ICON_WIDTH = 1.3  # of a button with an icon, in heights of frames
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
-def edit(
-    values: T,
-    defaults: T,
-    choices: Mapping[str, Mapping[str, str]] | None = None,
-    hidden: Collection[str] = (),
-    now: Mapping[str, Any] | None = None,
-    idle: Mapping[str, str] | None = None,
-    rows: Mapping[str, Callable[[T], T]] | None = None,
-    rest: str = "More options",
-) -> T:
-    """A row for each parameter that matters beside the others: label, widget, and what resets it where it is
-    not its default; those that are not basic under a heading of their own, which is closed at first, and the
-    headings of their groups. The same object while nothing is edited.
+class EditOptions(NamedTuple):
+    """What the declaration of parameters does not say about their rows.
 
     choices: words to choose from and their titles, for parameters that declare none. hidden: names of
-    parameters that stand elsewhere. now: the values that "auto" stands for now, which parameters begin with
-    that are not automatic any more. idle: name -> why a parameter changes nothing now: its row is greyed, and
-    says so. rows: what declares the rows of parameters that have their own, by name.
-    rest: the heading of those that are not basic.
+    parameters without a row. now: the values that "auto" stands for now; a parameter that leaves "auto"
+    begins with them. idle: name -> why a parameter changes nothing now: its row is greyed, and says so. rows:
+    what declares the rows of parameters that have their own, by name. rest: the heading of those that are not
+    basic.
     """
-    more = _More(choices or {}, now or {}, idle or {}, rows or {})
-    shown = [one for one in describe(type(values)) if one.matters(values) and one.name not in hidden]
+
+    choices: Mapping[str, Mapping[str, str]] = MappingProxyType({})
+    hidden: Collection[str] = ()
+    now: Mapping[str, Any] = MappingProxyType({})
+    idle: Mapping[str, str] = MappingProxyType({})
+    rows: Mapping[str, Callable[[Any], Any]] = MappingProxyType({})
+    rest: str = "More options"
+
+
+def edit(values: T, defaults: T, options: EditOptions = EditOptions()) -> T:  # noqa: B008, it never changes
+    """A row for each parameter that matters beside the others: label, widget, and what resets it where it is
+    not its default; those that are not basic under a heading of their own, which is closed at first, and the
+    headings of their groups. The same object while nothing is edited."""
+    shown = [one for one in describe(type(values)) if one.matters(values) and one.name not in options.hidden]
     basic = [one for one in shown if one.basic]
-    values = _edit_rows(basic, values, defaults, more)
-    if len(basic) < len(shown) and imgui.tree_node_ex(rest, _NO_PUSH):
+    values = _edit_rows(basic, values, defaults, options)
+    if len(basic) < len(shown) and imgui.tree_node_ex(options.rest, _NO_PUSH):
         group = ""
         for parameter in shown:
             if parameter.basic or not parameter.matters(values):
@@ -63,25 +65,16 @@ def edit(
             if parameter.group != group:
                 group = parameter.group
                 imgui.separator_text(group)
-            values = _edit_rows([parameter], values, defaults, more)
+            values = _edit_rows([parameter], values, defaults, options)
     return values
 
 
-class _More(NamedTuple):
-    """Arguments of `edit` on what the declaration of parameters does not say."""
-
-    choices: Mapping[str, Mapping[str, str]]
-    now: Mapping[str, Any]
-    idle: Mapping[str, str]
-    rows: Mapping[str, Callable[[Any], Any]]
-
-
-def _edit_rows(parameters: Iterable[Parameter], values: T, defaults: T, more: _More) -> T:
+def _edit_rows(parameters: Iterable[Parameter], values: T, defaults: T, options: EditOptions) -> T:
     for parameter in parameters:
-        why_idle = more.idle.get(parameter.name)
+        why_idle = options.idle.get(parameter.name)
         imgui.begin_disabled(why_idle is not None)
         imgui.begin_group()
-        values = _edit_parameter(parameter, values, defaults, more)
+        values = _edit_parameter(parameter, values, defaults, options)
         imgui.end_group()
         imgui.end_disabled()
         if why_idle is not None:
@@ -89,16 +82,16 @@ def _edit_rows(parameters: Iterable[Parameter], values: T, defaults: T, more: _M
     return values
 
 
-def _edit_parameter(parameter: Parameter, values: T, defaults: T, more: _More) -> T:
+def _edit_parameter(parameter: Parameter, values: T, defaults: T, options: EditOptions) -> T:
     """Declare the row of a parameter; returns the values, edited or not."""
-    if parameter.name in more.rows:
+    if parameter.name in options.rows:
         imgui.push_id(parameter.name)
-        values = more.rows[parameter.name](values)
+        values = options.rows[parameter.name](values)
         imgui.pop_id()
         return values
     old, default = (getattr(each, parameter.name) for each in (values, defaults))
-    words = more.choices.get(parameter.name, parameter.words)
-    new = _edit_row(parameter, old, default, words, more.now.get(parameter.name))
+    words = options.choices.get(parameter.name, parameter.words)
+    new = _edit_row(parameter, old, default, words, options.now.get(parameter.name))
     return values if new == old else replace(values, **{parameter.name: new})  # type: ignore[type-var]
 
 

@@ -11,21 +11,21 @@ import os
 import sys
 import time
 from collections import deque
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import Annotated, Any
 
 import glfw
 from imgui_bundle import imgui, implot
 from moderngl_window.context.glfw.window import Window as GlfwWindow
 
+from ..document.schema import Kind
 from ..errors import NoOpenGLError
 from ..gpu import gl
 from ..gpu.context import obstacle
 from ..gpu.shader_cache import shader_cache
 from . import theme
-from .placement import WindowPlacement, reachable
 
 _GL = (4, 3)
 _SIZE = (1600, 1000)
@@ -40,6 +40,38 @@ _MODIFIERS = {
 }  # fmt: skip
 _UNUSED_KEY = imgui.Key.f24
 _ENDS_ALT = (imgui.backends.glfw_mouse_button_callback, imgui.backends.glfw_window_focus_callback)
+
+
+Area = tuple[int, int, int, int]  # left, top, width, height; screen coordinates
+
+_LEAST_SIDE = 160  # width and height that a window keeps
+_GRIP = 80  # of its upper edge that must be on a screen, so that a mouse can drag it
+_FARTHEST = 2**15  # from the origin of the screens
+Pixels = Annotated[int, Kind("a place on screens", lambda value: abs(value) < _FARTHEST)]
+
+
+@dataclass(frozen=True)
+class WindowPlacement:
+    """A window without its frame, in screen coordinates; where it goes back to while it is maximised."""
+
+    left: Pixels
+    top: Pixels
+    width: Pixels
+    height: Pixels
+    maximised: bool = False
+
+
+def reachable(placement: WindowPlacement, screens: Sequence[Area]) -> WindowPlacement | None:
+    """The place, no larger than its screen; None where no screen shows enough of its upper edge."""
+    for left, top, width, height in screens:
+        visible = min(placement.left + placement.width, left + width) - max(placement.left, left)
+        if visible >= _GRIP and top <= placement.top <= top + height - _GRIP:
+            fitted = (
+                max(_LEAST_SIDE, min(placement.width, width)),
+                max(_LEAST_SIDE, min(placement.height, height)),
+            )
+            return WindowPlacement(placement.left, placement.top, *fitted, placement.maximised)
+    return None
 
 
 class Window(GlfwWindow):

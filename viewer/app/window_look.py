@@ -13,9 +13,8 @@ from ..errors import InputError
 from . import theme
 from .commands import Command, Item, Listing
 from .part import WindowPart, remembered
-from .placement import WindowPlacement
 from .theme import Palette
-from .window import Window
+from .window import Window, WindowPlacement
 
 ThemeName = Annotated[str, Kind("a theme", theme.PALETTES.__contains__)]
 TextScale = Annotated[float, Kind("a size of text", theme.TEXT_SCALES.__contains__)]

@@ -123,10 +123,8 @@ def _open_window(args: Namespace, named: _Named, first: Timeline, refused: Input
         )
     from .. import app
 
-    return app.run(
-        named.scans, opened=first, unit=args.unit, fps=args.fps, up=args.up, device=args.device,
-        replay=named.replay, session=named.session, refused=refused,
-    )  # fmt: skip
+    start = app.Start(args.unit, args.fps, args.up, args.device, named.replay, named.session, refused)
+    return app.run(named.scans, start, opened=first)
 
 
 def _play_all(args: Namespace, timelines: Sequence[Timeline]) -> None:

@@ -16,7 +16,7 @@ from ..errors import unknown_name
 from .check import Check
 
 # The modules of the window that a tool may import.
-KNOWN = ("commands", "read_dialog", "save_dialog", "scene.canvas", "tool_context", "tools", "ui", "widgets")
+KNOWN = ("commands", "file_dialog", "scene.canvas", "tool_context", "tools", "ui", "widgets")
 # The hooks of a Tool, and how many arguments the window hands each.
 HOOKS = {
     "panel": 1, "overlay": 2, "drawn": 1, "below": 1, "is_below": 0, "is_bare": 0, "dialog": 0, "prompt": 0,

@@ -18,8 +18,8 @@ from ...scan.open import DEMO, is_demo
 from ...scan.timeline import Timeline
 from .. import widgets
 from ..commands import Command
+from ..file_dialog import files_of
 from ..part import ViewArea, WindowPart
-from ..path_dialog import files_of
 from ..session import Session, known_as
 from ..window import Window
 from .folder_view import FolderView, date_in_words, size_in_words

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import string
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
+from dataclasses import dataclass
 from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
@@ -15,7 +18,6 @@ from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed
 from ...task import Task, in_background
 from .. import widgets
-from .known_folders import KnownFolder, known_folders
 
 _ICON_ROOM, _COUNT_ROOM, _DATE_ROOM = 1.6, 5.5, 5.5  # in heights of the font
 _NAME_ROOM = 7.0  # that a name has at least, before the columns beside it
@@ -32,6 +34,48 @@ _ICONS = {
     "whole": icons.ICON_FA_FILM, "folder": icons.ICON_FA_FOLDER, "sequence": icons.ICON_FA_FILM,
     "file": icons.ICON_FA_CUBE,
 }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class KnownFolder:
+    """A folder by the name that users know it by. icon: beside its name."""
+
+    title: str
+    icon: str
+    folder: Path
+
+
+def known_folders() -> list[KnownFolder]:
+    """Home, desktop, documents and downloads where they are there, then disks. It may wait for a disk."""
+    import platformdirs
+
+    own = [
+        KnownFolder("Home", icons.ICON_FA_HOUSE, Path(os.path.expanduser("~"))),
+        KnownFolder("Desktop", icons.ICON_FA_DISPLAY, platformdirs.user_desktop_path()),
+        KnownFolder("Documents", icons.ICON_FA_FILE_LINES, platformdirs.user_documents_path()),
+        KnownFolder("Downloads", icons.ICON_FA_DOWNLOAD, platformdirs.user_downloads_path()),
+    ]
+    disks = [KnownFolder(_disk_title(disk), icons.ICON_FA_HARD_DRIVE, disk) for disk in _disks()]
+    there = [known for known in own + disks if os.path.isdir(known.folder)]
+    return list({known.folder: known for known in reversed(there)}.values())[::-1]  # the first of each folder
+
+
+def _disk_title(disk: Path) -> str:
+    return "This computer" if str(disk) == "/" else disk.name or str(disk)
+
+
+def _disks() -> Iterator[Path]:
+    """The roots of disks, and what is plugged in."""
+    if sys.platform == "win32":
+        yield from (Path(f"{letter}:\\") for letter in string.ascii_uppercase)
+        return
+    yield Path("/")
+    user = os.path.basename(os.path.expanduser("~"))
+    for mounted in (Path("/Volumes"), Path("/media") / user, Path("/run/media") / user, Path("/mnt")):
+        try:
+            yield from sorted(mounted.iterdir())
+        except OSError:
+            continue
 
 
 class FolderView:

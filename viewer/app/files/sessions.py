@@ -13,10 +13,10 @@ from ...files import printable, working_folder
 from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
 from ..commands import Command
+from ..file_dialog import SAVE, FileDialog
 from ..notices import Problem
 from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
-from ..save_dialog import SaveDialog
 from ..session import Session, known_as, named_like
 
 
@@ -44,7 +44,7 @@ class Sessions(WindowPart):
 
     def __post_init__(self) -> None:
         about = "Saves view, look, renderer, bookmarks, distances and landmarks, not the scan itself"
-        self.saving: SaveDialog = SaveDialog("Save session", about, SUFFIX, self._save, self.redraw)
+        self.saving: FileDialog = FileDialog(SAVE, "Save session", about, (SUFFIX,), self._save, self.redraw)
         self.homeless: SavedSession | None = None
         self._files: dict[str, Path] = {}  # of scans, as `known_as` has them: saved to or opened from
         self._opened: tuple[SavedSession, Path] | None = None  # last, and its file

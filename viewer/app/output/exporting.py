@@ -24,7 +24,7 @@ from ...scan.inputs import found_among, scan_inputs
 from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
 from ..commands import Command
-from ..folder_dialog import FolderDialog
+from ..file_dialog import FOLDER, FileDialog
 from ..notices import Offer, Problem
 from ..part import WindowPart, remembered
 from ..playing.playback import Playback
@@ -66,7 +66,9 @@ class Exporting(WindowPart):
     def __post_init__(self) -> None:
         self.is_open = False
         about = "Scan4D saves the exported files in this folder"
-        self.choosing: FolderDialog = FolderDialog("Choose a folder", about, self._choose_folder, self.redraw)
+        self.choosing: FileDialog = FileDialog(
+            FOLDER, "Choose a folder", about, (), self._choose_folder, self.redraw
+        )
         self.replaced: list[Path] = []
         self.own: list[Path] = []
         self.is_leaving = False

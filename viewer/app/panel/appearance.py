@@ -67,11 +67,12 @@ def _draw(
     idle = idle_parameters(look, pose, is_here, _why_unlit(look, drawn_by, params, pose))
     displayed = _in_unit(look, factor)
     shown = shown and (factor * shown[0], factor * shown[1])
-    edited = widgets.edit(
-        displayed, Look(up=look.up), {"color_by": colors}, ("up", *(["range"] if is_found else [])),
+    options = widgets.EditOptions(
+        {"color_by": colors}, ("up", *(["range"] if is_found else [])),
         dict(zip(("low", "high"), shown or (), strict=False)), idle,
         {"range": partial(_edit_range, shown), "background": _edit_background}, "More appearance options",
     )  # fmt: skip
+    edited = widgets.edit(displayed, Look(up=look.up), options)
     ends = _in_unit(edited, 1 / factor)
     low = look.low if edited.low == displayed.low else ends.low  # what is not edited stays to the last bit
     high = look.high if edited.high == displayed.high else ends.high

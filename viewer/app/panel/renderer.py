@@ -57,6 +57,10 @@ class RendererSection(WindowPart):
         name, params = self.session.document.chosen(pose)
         imgui.push_id("renderer")  # the look has parameters of the same names
         self.rendering.edit_params(
-            widgets.edit(params, self.session.document.defaults(pose)[1], rest="More renderer options")
+            widgets.edit(
+                params,
+                self.session.document.defaults(pose)[1],
+                widgets.EditOptions(rest="More renderer options"),
+            )
         )
         imgui.pop_id()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,6 @@ from ...output.overlays import (
     runs_of,
 )
 from .. import theme, widgets
-from .box import Box
 from .viewport import Viewport
 
 _CROSS = _INK = 0xFFFFFF
@@ -43,6 +43,31 @@ _RING = 0.066  # thickness of a ring of uncertainty
 _MOST_MARKS = 2000  # places that labels keep off; of more, some
 _LOUPE, _LOUPE_AWAY = 4.5, 1.2  # half its side, and how far from its middle it is; the latter in sides
 _MAGNIFIED = 6.0  # screen pixels for one of the picture, in a loupe
+
+
+Line = tuple[ImVec2, ImVec2]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A rectangle on the screen. low: its upper left corner. high: its lower right one."""
+
+    low: ImVec2
+    high: ImVec2
+
+    def clipped(self, start: ImVec2, stop: ImVec2) -> Line | None:
+        """The part of a line that is in the box, None where none is."""
+        begin, end, along = 0.0, 1.0, stop - start
+        for place, step, low, high in (
+            (start.x, along.x, self.low.x, self.high.x),
+            (start.y, along.y, self.low.y, self.high.y),
+        ):
+            if step:
+                enter, leave = sorted(((low - place) / step, (high - place) / step))
+                begin, end = max(begin, enter), min(end, leave)
+            elif not low <= place <= high:
+                return None
+        return (start + along * begin, start + along * end) if begin <= end else None
 
 
 class ViewPlace:

@@ -31,9 +31,8 @@ from .cube import OrientationCube
 from .full_view import FullView
 from .glide import Glide
 from .legend import ViewMarks
-from .naming import Naming
 from .pointed import Pointer
-from .rendering import Rendering
+from .rendering import Naming, Rendering
 from .steering import Steering
 from .viewport import Viewport
 

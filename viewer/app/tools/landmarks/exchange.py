@@ -30,8 +30,7 @@ from ....files import working_folder
 from ....scan.inputs import refuse_input
 from ....scan.timeline import Timeline
 from ....scan.times import frame_in_words
-from ...read_dialog import ReadDialog
-from ...save_dialog import SaveDialog
+from ...file_dialog import OPEN, SAVE, FileDialog
 from ...tool_context import ToolContext
 
 _USUAL = ".mrk.json"
@@ -46,19 +45,22 @@ class Exchange:
         self._context, self._begin = context, begin
         self.templates: dict[str, Template] = dict(templates())
         written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
-        about = f"The ending sets the format: {_USUAL}, {', '.join(written)}"
-        self._saving = SaveDialog("Export landmarks", about, _USUAL, self._save, context.redraw, written)
-        about = "A file of landmarks, or a template"
-        self._reading = ReadDialog(
-            "Import landmarks", about, ".json", self._read, context.redraw, landmark_suffixes()
-        )
+        redraw = context.redraw
+        self._saving = FileDialog(
+            SAVE, "Export landmarks", f"The ending sets the format: {_USUAL}, {', '.join(written)}",
+            (_USUAL, *written), self._save, redraw,
+        )  # fmt: skip
+        self._reading = FileDialog(
+            OPEN, "Import landmarks", "A file of landmarks, or a template",
+            (".json", *landmark_suffixes()), self._read, redraw,
+        )  # fmt: skip
         about = "Saves names, mirror partners and measures, for use in other scans"
-        self._template_saving = SaveDialog(
-            "Save template", about, ".json", self._save_template, context.redraw
+        self._template_saving = FileDialog(
+            SAVE, "Save template", about, (".json",), self._save_template, redraw
         )
         about = "A file that 'Save as template...' has written"
-        self._template_reading = ReadDialog(
-            "Choose template", about, ".json", self._read_template, context.redraw
+        self._template_reading = FileDialog(
+            OPEN, "Choose template", about, (".json",), self._read_template, redraw
         )
         self._doubted: Path | None = None  # file whose landmarks seem to be of another scan
 

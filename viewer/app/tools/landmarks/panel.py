@@ -64,7 +64,9 @@ def draw(tool: Tool, ui: Ui) -> None:
     ui.tooltip("Add a note to this whole frame", "note_at_frame")
     tool.notebook.draw_list()
     settings = tool.context.settings
-    tool.context.settings = widgets.edit(settings, type(settings)(), rest="More landmark options")
+    tool.context.settings = widgets.edit(
+        settings, type(settings)(), widgets.EditOptions(rest="More landmark options")
+    )
 
 
 def _draw_template(tool: Tool) -> None:

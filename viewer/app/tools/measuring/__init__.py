@@ -27,8 +27,7 @@ from ....output.overlays import LINE_COLOR
 from ....scan.inputs import refuse_input
 from ....scan.units import Scale
 from ...commands import Command, Menu
-from ...read_dialog import ReadDialog
-from ...save_dialog import SaveDialog
+from ...file_dialog import OPEN, SAVE, FileDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
@@ -65,9 +64,9 @@ class Tool:
         self.context = context
         self.filled = False
         about = "All distances, as a table of comma separated values"
-        self.saving = SaveDialog("Export distances", about, ".csv", self._save, context.redraw)
+        self.saving = FileDialog(SAVE, "Export distances", about, (".csv",), self._save, context.redraw)
         about = "A table that 'Export distances...' has written of this scan"
-        self.reading = ReadDialog("Import distances", about, ".csv", self._read, context.redraw)
+        self.reading = FileDialog(OPEN, "Import distances", about, (".csv",), self._read, context.redraw)
         self.begun: SurfacePoint | None = None
 
     @property

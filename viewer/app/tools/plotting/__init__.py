@@ -21,7 +21,7 @@ from ....output.overlays import NOTHING_DRAWN, DrawnMarks
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
 from ...commands import Command, Menu
-from ...save_dialog import SaveDialog
+from ...file_dialog import SAVE, FileDialog
 from ...scene.canvas import Canvas, ViewPlace
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
@@ -58,9 +58,9 @@ class Tool:
         self.measurer = Measurer(context)
         self.pointed: str | None = None
         self.renaming = Renaming()
-        self.saving = SaveDialog(
-            "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
-            PLOT_SUFFIXES[0], self._save, context.redraw, PLOT_SUFFIXES[1:],
+        self.saving = FileDialog(
+            SAVE, "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
+            PLOT_SUFFIXES, self._save, context.redraw,
         )  # fmt: skip
         self._words = Cached()
         self._fitted: object = None  # what the axes were fitted to last

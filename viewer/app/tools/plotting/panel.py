@@ -126,7 +126,8 @@ def _draw_paths(tool: Tool) -> None:
                     tool.choose("Choose paths", **{column: (*others, name) if is_on else others})
             imgui.pop_id()
         imgui.end_table()
-    tool.settings = widgets.edit(tool.settings, Settings(), hidden=_OF_THE_PLOT, rest="More path options")
+    options = widgets.EditOptions(hidden=_OF_THE_PLOT, rest="More path options")
+    tool.settings = widgets.edit(tool.settings, Settings(), options)
     if (tool.settings.hold or tool.settings.coordinates == ANCHORS) and tool.paths.problem:
         widgets.faint(tool.paths.problem)
     if tool.settings.by_speed and tool.settings.trajectories and tool.paths.fastest:

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("imgui_bundle")
 
-from viewer.app.save_dialog import named_file
+from viewer.app.file_dialog import named_file
 from viewer.errors import InputError
 
 
