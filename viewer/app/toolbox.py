@@ -46,14 +46,20 @@ _BUDGET_MS = 5.0  # that a tool may take in one turn of the window's loop
 
 
 class Slot:
-    """The place of one tool.
+    """One tool, guarded: it fails here and nowhere else.
 
     title: as users read it. tool: None while it is switched off. mistakes: hook that declares widgets -> the
     user's mistake that these led to when they were declared last.
     """
 
-    def __init__(self, context: ToolContext) -> None:
-        self.context = context
+    def __init__(
+        self,
+        context: ToolContext,
+        note: Callable[[str], None],
+        switched_off: Callable[[Slot, BaseException], None],
+    ) -> None:
+        """note: shows the user a message. switched_off: takes in that the tool has failed."""
+        self.context, self._note, self._switched_off = context, note, switched_off
         package = package_of(tools.tool_modules()[context.name])
         self.title = f"{context.name} of {package}" if package else context.name
         self.tool: Any = None
@@ -62,6 +68,62 @@ class Slot:
     def has(self, hook: str) -> bool:
         """Whether the tool is on and does something there."""
         return getattr(self.tool, hook, None) is not None
+
+    def ask(self, function: Callable[[Any], Any], tell: Callable[[str], object] | None = None) -> Any:
+        """The answer of a function of the tool; None where that is off or fails.
+
+        tell: tells the user of an InputError, the user's mistake; None: it is the tool's, as any other.
+        """
+        if self.tool is None:
+            return None
+        try:
+            with widgets_ended():
+                return function(self.tool)
+        except (Exception, Cancelled) as error:
+            if tell is not None and isinstance(error, InputError):
+                tell(str(error))
+            else:
+                self.switch_off(error)
+        return None
+
+    def do(self, function: Callable[[Any], Any]) -> Any:
+        """Do something of the tool that the user has asked for; the user's mistake is reported."""
+        return self.ask(function, self._note)
+
+    def call(self, hook: str, *arguments: Any) -> Any:
+        """The answer of a hook; None where the tool is off, lacks it or fails."""
+        return self.ask(lambda tool: getattr(tool, hook)(*arguments)) if self.has(hook) else None
+
+    def declare(self, hook: str, *arguments: Any) -> None:
+        """Have the tool declare its widgets; a mistake of their user's is reported once while it lasts."""
+        if self.has(hook):
+            mistakes: list[str] = []
+            self.ask(lambda tool: getattr(tool, hook)(*arguments), mistakes.append)
+            before, self.mistakes[hook] = self.mistakes.get(hook), "".join(mistakes)
+            if mistakes and mistakes[0] != before:
+                self._note(mistakes[0])
+
+    def switch_off(self, error: BaseException) -> None:
+        """Do without the tool until the next start."""
+        self.tool = None
+        self.context.cancel_work()
+        self._switched_off(self, error)
+
+    def bound(self, entry: Command | Listing) -> Command | Listing:
+        """An entry of a menu that speaks to the tool, and does nothing while that is off."""
+        if isinstance(entry, Listing):
+            return replace(entry, items=partial(self._items, entry))
+        is_on = entry.is_on
+        return replace(
+            entry,
+            act=partial(self.do, entry.act),
+            is_on=None if is_on is None else lambda: bool(self.ask(is_on)),
+            can=lambda: bool(self.ask(entry.can)),
+        )
+
+    def _items(self, listing: Listing) -> Iterator[Item]:
+        for title, act, is_on in self.ask(lambda tool: list(listing.items(tool))) or ():
+            yield title, partial(self.do, _of_any(act)), is_on
 
 
 class ToolModules:
@@ -121,13 +183,16 @@ class Toolbox(WindowPart):
         self.is_dragging = False
         self._is_declined = False  # the last click, by the tool that had it
         self._remembered = _values_by_tool(self.stored.get(self.name))
-        self._slots = {name: Slot(self._context(name)) for name in tools.tool_names()}
+        self._slots = {
+            name: Slot(self._context(name), self.note_of_scan, self._switched_off)
+            for name in tools.tool_names()
+        }
         for name, slot in self._slots.items():
-            self.commands.bind_tool(name, partial(self._bound, slot))
+            self.commands.bind_tool(name, slot.bound)
             try:
                 self._open(slot)
             except Exception as error:
-                self._switch_off(slot, error)
+                slot.switch_off(error)
         for problem in _problems_of_packages():
             self.note_of_scan(problem)
 
@@ -152,68 +217,14 @@ class Toolbox(WindowPart):
         """The name of the tool that clicks in the view go to; None where they only move the view."""
         return self.clicks.owner
 
-    def _bound(self, slot: Slot, entry: Command | Listing) -> Command | Listing:
-        """An entry of a menu that speaks to the slot's tool, and does nothing while that is off."""
-        if isinstance(entry, Listing):
-            return replace(entry, items=partial(self._items, slot, entry))
-        is_on = entry.is_on
-        return replace(
-            entry,
-            act=partial(self._ask, slot, entry.act, self.note_of_scan),
-            is_on=None if is_on is None else lambda: bool(self._ask(slot, is_on)),
-            can=lambda: bool(self._ask(slot, entry.can)),
-        )
-
-    def _items(self, slot: Slot, listing: Listing) -> Iterator[Item]:
-        for title, act, is_on in self._ask(slot, lambda tool: list(listing.items(tool))) or ():
-            yield title, partial(self._do, slot, act), is_on
-
-    def _ask(
-        self, slot: Slot, function: Callable[[Any], Any], tell: Callable[[str], object] | None = None
-    ) -> Any:
-        """The answer of a function of the slot's tool; None where that is off or fails.
-
-        tell: tells the user of an InputError, the user's mistake; None: it is the tool's, as any other.
-        """
-        if slot.tool is None:
-            return None
-        try:
-            with widgets_ended():
-                return function(slot.tool)
-        except (Exception, Cancelled) as error:
-            if tell is not None and isinstance(error, InputError):
-                tell(str(error))
-            else:
-                self._switch_off(slot, error)
-        return None
-
     def _tell_problem(self, text: str) -> None:
         """Tell what stays until the user sends it away: the dialog that asked for it is gone by then."""
         self.note_of_scan(Problem(text))
 
-    def _do(self, slot: Slot, act: Callable[[], object], tell: Callable[[str], object] | None = None) -> None:
-        """Do something of the slot's tool that the user has asked for. tell: tells of the user's mistake."""
-        self._ask(slot, lambda _: act(), tell or self.note_of_scan)
-
-    def _call(self, slot: Slot, hook: str, *arguments: Any) -> Any:
-        """The answer of a hook of the slot's tool; None where the tool is off, lacks it or fails."""
-        return self._ask(slot, lambda tool: getattr(tool, hook)(*arguments)) if slot.has(hook) else None
-
-    def _declare(self, slot: Slot, hook: str, *arguments: Any) -> None:
-        """Have a tool declare its widgets; a mistake of their user's is told once while it lasts."""
-        if slot.has(hook):
-            mistakes: list[str] = []
-            self._ask(slot, lambda tool: getattr(tool, hook)(*arguments), mistakes.append)
-            before, slot.mistakes[hook] = slot.mistakes.get(hook), "".join(mistakes)
-            if mistakes and mistakes[0] != before:
-                self.note_of_scan(mistakes[0])
-
-    def _switch_off(self, slot: Slot, error: BaseException) -> None:
-        slot.tool = None
+    def _switched_off(self, slot: Slot, error: BaseException) -> None:
         self.session.laid.take_away(slot.context.name)
         if self.clicking == slot.context.name:
             self.clicks.owner = None
-        slot.context.cancel_work()
         words = f"Scan4D switched off {slot.title} until the next start: {reason(error)}"
         self.failures.report(f"The tool '{slot.context.name}'", error, words)
 
@@ -225,10 +236,10 @@ class Toolbox(WindowPart):
             slot = self._slots[name]
 
             def numbers_of(pose: Pose) -> Numbers:
-                return self._ask(slot, lambda _: _checked(numbers(pose), pose)) or {} if numbers else {}
+                return slot.ask(lambda _: _checked(numbers(pose), pose)) or {} if numbers else {}
 
             def motion_of(index: int) -> Rigid:
-                return self._ask(slot, lambda _: _checked_motion(motion(index))) or STILL if motion else STILL
+                return slot.ask(lambda _: _checked_motion(motion(index))) or STILL if motion else STILL
 
             self.session.laid.lay(name, numbers_of, motion_of)
         self.redraw()
@@ -240,39 +251,39 @@ class Toolbox(WindowPart):
         for name, slot in self._slots.items():
             if slot.has("panel"):
                 is_revealed, slot.context.is_revealed = slot.context.is_revealed, False
-                yield f"{slot.title}###{name}", is_revealed, partial(self._declare, slot, "panel")
+                yield f"{slot.title}###{name}", is_revealed, partial(slot.declare, "panel")
 
     def drawn_below(self) -> Iterator[tuple[str, Callable[[Ui], object]]]:
         """Find what tools show under the timeline now: the tool's name, and what declares it."""
         for name, slot in self._slots.items():
-            if slot.has("below") and self._call(slot, "is_below"):
-                yield name, partial(self._declare, slot, "below")
+            if slot.has("below") and slot.call("is_below"):
+                yield name, partial(slot.declare, "below")
 
     @property
     def is_below_bare(self) -> bool:
         """Whether all that tools show under the timeline is a few words."""
-        slots = [slot for slot in self._slots.values() if slot.has("below") and self._call(slot, "is_below")]
-        return all(self._call(slot, "is_bare") for slot in slots)
+        slots = [slot for slot in self._slots.values() if slot.has("below") and slot.call("is_below")]
+        return all(slot.call("is_bare") for slot in slots)
 
     def draw_over(self, view: ViewPlace, taken: Sequence[Box]) -> None:
         """Have the tools draw over the picture. taken: boxes in the view where labels would cover
         something."""
         canvas = Canvas(view, self.viewport)
         for slot in self._slots.values():
-            self._call(slot, "overlay", canvas, view)
+            slot.call("overlay", canvas, view)
         canvas.draw_labels(self.label_places, taken)
 
     def drawn(self, frame: int) -> DrawnMarks:
         """Find what the tools draw over a frame in pictures that are saved."""
         found = NOTHING_DRAWN
         for slot in self._slots.values():
-            found = found.with_more(self._call(slot, "drawn", frame) or NOTHING_DRAWN)
+            found = found.with_more(slot.call("drawn", frame) or NOTHING_DRAWN)
         return found
 
     def dialog(self, view: ViewArea) -> None:
         """Have the tools declare windows of their own."""
         for slot in self._slots.values():
-            self._declare(slot, "dialog")
+            slot.declare("dialog")
 
     @property
     def _first(self) -> Slot | None:
@@ -282,7 +293,7 @@ class Toolbox(WindowPart):
     @property
     def prompt(self) -> str:
         """The words to show at the top of the view; empty: none."""
-        return str(self._call(self._first, "prompt") or "") if self._first else ""
+        return str(self._first.call("prompt") or "") if self._first else ""
 
     @property
     def takes_clicks(self) -> bool:
@@ -294,13 +305,11 @@ class Toolbox(WindowPart):
         self.viewport.finish()
         click = self.clicks.at(pixel)
         if self._first is not None and click is not None:
-            self._is_declined = (
-                self._ask(self._first, lambda tool: tool.on_click(click), self.note_of_scan) is False
-            )
+            self._is_declined = self._first.do(lambda tool: tool.on_click(click)) is False
 
     def press(self, mouse: ImVec2) -> None:
         """Ask the tool that has the clicks whether a drag that begins there is its own."""
-        self.is_dragging = self._first is not None and bool(self._call(self._first, "on_press", mouse))
+        self.is_dragging = self._first is not None and bool(self._first.call("on_press", mouse))
 
     def drag(self, pixel: tuple[int, int], *, ends: bool) -> None:
         """Give the tool whose drag it is what a pixel of the view shows. ends: whether the button is let go
@@ -310,32 +319,30 @@ class Toolbox(WindowPart):
             self.viewport.finish()
         click = self.clicks.at(pixel, in_full=ends)
         if slot is not None and click is not None:
-            self._ask(slot, lambda tool: tool.on_drag(click, ends), self.note_of_scan)
+            slot.do(lambda tool: tool.on_drag(click, ends))
 
     def arrow(self, right: int, up: int) -> bool:
         """Whether an arrow key was for the tool that has the clicks, which takes it."""
         slot = self._first
         if slot is None or not slot.has("on_arrow"):
             return False
-        return bool(self._ask(slot, lambda tool: tool.on_arrow(right, up), self.note_of_scan))
+        return bool(slot.do(lambda tool: tool.on_arrow(right, up)))
 
     @property
     def spans(self) -> list[FrameSpan]:
         """Marks of all tools on the timeline."""
-        return [span for slot in self._slots.values() for span in self._call(slot, "spans") or ()]
+        return [span for slot in self._slots.values() for span in slot.call("spans") or ()]
 
     def take_file(self, path: Path) -> bool:
         """Whether a file that the user opens or drops is a tool's, which takes it."""
         return any(
-            self._ask(slot, lambda tool: tool.on_file(path), self.note_of_scan)
-            for slot in self._slots.values()
-            if slot.has("on_file")
+            slot.do(lambda tool: tool.on_file(path)) for slot in self._slots.values() if slot.has("on_file")
         )
 
     @property
     def is_under_way(self) -> bool:
         """Whether something is that undo would take back first."""
-        return any([self._call(slot, "is_under_way") for slot in self._slots.values()])
+        return any([slot.call("is_under_way") for slot in self._slots.values()])
 
     def begin_scan(self, timeline: Timeline) -> None:
         """Let go of what is under way."""
@@ -344,12 +351,12 @@ class Toolbox(WindowPart):
     def abandon(self) -> None:
         """Let go of what is under way, since the document or the scan changes."""
         for slot in self._slots.values():
-            self._call(slot, "abandon")
+            slot.call("abandon")
 
     def on_escape(self) -> bool:
         """End one thing of a tool's, of the one that has the clicks first; whether there was any."""
         in_order = sorted(self._slots.values(), key=lambda slot: slot is not self._first)
-        if any(self._call(slot, "on_escape") for slot in in_order):
+        if any(slot.call("on_escape") for slot in in_order):
             return True
         had_clicks, self.clicks.owner = self.clicking is not None, None
         return had_clicks
@@ -367,8 +374,8 @@ class Toolbox(WindowPart):
         for slot in self._slots.values():
             for work in slot.context.take_done():
                 changed = True
-                self._do(slot, work.finish, self._tell_problem)
-            if self._call(slot, "advance", _BUDGET_MS):
+                slot.ask(_of_any(work.finish), self._tell_problem)
+            if slot.call("advance", _BUDGET_MS):
                 changed = True
                 slot.context.redraw()
         return changed
@@ -385,6 +392,11 @@ class Toolbox(WindowPart):
         """Cancel what runs for tools."""
         for slot in self._slots.values():
             slot.context.cancel_work()
+
+
+def _of_any(act: Callable[[], object]) -> Callable[[Any], object]:
+    """A function that is handed a tool and does not need it."""
+    return lambda _: act()
 
 
 def _values_by_tool(data: Any) -> dict[str, Any]:
