@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Start(NamedTuple):
-    """What a window begins with, beside its scans.
+    """Choices that a window begins with, beside its scans.
 
     unit, fps, up: that the command line states for all scans; None: it states none. device: has no effect on
     a window, which says so. replay: a recording to show first. session: to open the first scan with. refused:

@@ -17,6 +17,7 @@ from .part import WindowPart, remembered
 from .playing.playback import Playback
 from .playing.ranging import Ranging
 from .scene.activity import Activity
+from .scene.framing import Framing
 from .scene.glide import Glide
 from .scene.rendering import Rendering
 from .scene.steering import Steering
@@ -45,6 +46,7 @@ class Drawing(WindowPart):
     viewport: Viewport
     failures: Failures
     steering: Steering
+    framing: Framing
     glide: Glide
     activity: Activity
     rendering: Rendering
@@ -115,7 +117,7 @@ class Drawing(WindowPart):
         self.rendering.tell_missing(pose)
         request = self.ranging.ranged(session.document.request(pose, session.laid.layers(pose)))
         request = replace(request, look=theme.themed(request.look, self.window_look.palette))
-        may_glide = self.steering.rests(now) and not self.steering.follows and not self.is_replaying()
+        may_glide = self.steering.rests(now) and not self.framing.follows and not self.is_replaying()
         request = replace(request, camera=self.glide.follow(request.camera, may_glide, now))
         held = self.steering.moves or self.glide.is_on
         drew = self.viewport.draw(request, playing=self.playback.player.playing, held=held)

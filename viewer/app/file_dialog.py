@@ -56,7 +56,7 @@ def present_folder(text: str, *_: str) -> Path:
 
 
 class Purpose(NamedTuple):
-    """What a dialog is for. verb: on the button that takes the file. named: the path that a text names, by
+    """Task of a dialog. verb: on the button that takes the file. named: the path that a text names, by
     the suffixes of the dialog; raises InputError for one that cannot be used."""
 
     verb: str

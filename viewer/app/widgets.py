@@ -33,7 +33,7 @@ _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
 
 class EditOptions(NamedTuple):
-    """What the declaration of parameters does not say about their rows.
+    """Options of rows that the declaration of their parameters does not have.
 
     choices: words to choose from and their titles, for parameters that declare none. hidden: names of
     parameters without a row. now: the values that "auto" stands for now; a parameter that leaves "auto"

@@ -67,6 +67,8 @@ class Timeline:
     Every method may be called from any thread. One worker thread, started by the first `request` or
     `prefetch`, reads ahead; it knows no GL. Scripts use `pose`, which waits; a window uses `request` or
     `prefetch`, and `ready`, which do not.
+
+    The class has more than 30 methods because the cache, the worker and the reports share one lock.
     """
 
     def __init__(

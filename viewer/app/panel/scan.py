@@ -23,6 +23,7 @@ from ..keys import Keys
 from ..part import Section, WindowPart
 from ..playing.pacing import Pacing
 from ..playing.playback import Playback
+from ..scene.framing import Framing
 from ..scene.steering import Steering
 from ..session import Session
 from ..ui import Ui
@@ -42,6 +43,7 @@ class ScanSection(WindowPart):
     session: Session
     playback: Playback
     pacing: Pacing
+    framing: Framing
     steering: Steering
     keys: Keys
 
@@ -81,7 +83,7 @@ class ScanSection(WindowPart):
     def _draw_facts(self, pose: Pose) -> None:
         dropped = f" ({pose.dropped:,} dropped)" if pose.dropped else ""
         widgets.fact("Points", f"{pose.count:,}{dropped}")
-        bounds = self.steering.bounds(pose)
+        bounds = self.framing.bounds(pose)
         scale = self.playback.scale
         edges = scale.factor * (bounds.high - bounds.low)
         size = " x ".join(number(edge, edge) for edge in edges)
@@ -106,7 +108,7 @@ class ScanSection(WindowPart):
             "The length of one unit of the scan's coordinates. Scan4D remembers it for this scan.",
         )
         chosen = widgets.combo("unit", document.unit or _OWN, list(titles), titles)
-        guess = guess_unit(self.steering.bounds(pose), document.look.up)
+        guess = guess_unit(self.framing.bounds(pose), document.look.up)
         if stated == UNKNOWN_UNIT and document.unit is None and guess is not None:
             widgets.label("")
             if imgui.button(widgets.labelled(f"Set to {_PLURALS[guess[0]]}?", "accept"), ImVec2(-1, 0)):

@@ -11,21 +11,18 @@ from typing import Any
 
 import numpy as np
 from imgui_bundle import icons_fontawesome_6 as icons
-from numpy.typing import NDArray
 
-from ...bounds import Bounds
 from ...camera import Camera
-from ...geometry import AXES, UP, vector
-from ...scan.pods import first_camera, subject_of
+from ...geometry import AXES, UP
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
-from ...scan.upright import Upright, upright_camera
+from ...scan.upright import upright_camera
 from ..commands import Command, Listing
 from ..part import WindowPart, remembered
-from ..playing.playback import FRAMES, Playback
+from ..playing.playback import Playback
 from ..session import Session
 from . import navigation, orientation
-from .extent import Extent
+from .framing import Framing
 from .pointed import Pointer
 from .turntable import USUAL, Turntable, TurnTime
 from .viewport import Viewport
@@ -57,7 +54,6 @@ class Steering(WindowPart):
 
     up: the up axis of all scans that the command line states, None without one. gesture: what a drag in the
     view does, None without one. is_turned: whether the cube is dragged. turntable: turns the view by itself.
-    extent: what the view is fitted to. follows: whether it goes with the subject from frame to frame.
     """
 
     name = "steering"
@@ -66,6 +62,7 @@ class Steering(WindowPart):
     session: Session
     playback: Playback
     viewport: Viewport
+    framing: Framing
     pointer: Pointer
     up: str | None
     note_of_scan: Callable[[str], None]
@@ -75,9 +72,6 @@ class Steering(WindowPart):
         self.gesture: str | None = None
         self.is_turned = False
         self.turntable: Turntable = Turntable(self.turn_seconds)
-        self.extent: Extent = Extent()
-        self.follows: bool = False
-        self._followed: Pose | None = None  # where the camera is with the subject
         self._first: Camera | None = None  # that a scan was first shown with
         self._is_checked = False
         self._stepped = -math.inf  # by the clock, when the wheel or a key moved it last
@@ -89,10 +83,6 @@ class Steering(WindowPart):
     def next_change(self, now: float) -> float:
         """Seconds until the turntable turns on."""
         return self.turntable.next_change(now)
-
-    def close(self) -> None:
-        """Visit no more frames."""
-        self.extent.close()
 
     @property
     def moves(self) -> bool:
@@ -109,25 +99,15 @@ class Steering(WindowPart):
         camera = self.session.document.camera
         return camera is not None and camera.projection == "orthographic"
 
-    def bounds(self, pose: Pose) -> Bounds:
-        """The robust bounds of a pose, where tools move it to."""
-        return self.session.laid.layers(pose).world_from_pose.bounds(self.viewport.bounds(pose))
-
-    def whole(self, pose: Pose) -> Bounds:
-        """The bounds of all frames together, as far as they are known; of the pose alone where tools move it,
-        or the view goes with the subject."""
-        is_moved = not self.session.laid.layers(pose).world_from_pose.is_identity
-        return self.bounds(pose) if is_moved or self.follows else self.extent.around(self.bounds(pose))
-
     def fit(self) -> None:
         """Show the subject from the same side: all of the scan, or of one depth camera's what it looks at."""
         pose, camera = self.playback.pose, self.session.document.camera
         if not (pose and camera):
             return
-        framed = self._framing(camera, pose)
+        framed = self.framing.framed(camera, pose)
         place = self.session.laid.layers(pose).world_from_pose
         places = np.abs(framed.places_in_picture(place.points(pose.sample + pose.origin)))
-        if self._subject(pose) is not None and not (places <= (self.viewport.aspect / 2, 0.5)).all():
+        if self.framing.subject(pose) is not None and not (places <= (self.viewport.aspect / 2, 0.5)).all():
             self.note_of_scan(
                 "The view shows what the depth camera looks at. Zoom out to see the rest of the scan."
             )
@@ -136,37 +116,25 @@ class Steering(WindowPart):
     def open_view(self) -> None:
         """Show the frame as a scan is first shown: as its pods see it, or from the front."""
         if pose := self.playback.pose:
-            self._first = self._first_camera(pose)
+            self._first = self.framing.first_camera(pose)
             self.session.change("Opening view", camera=self._first, pivot=None)
-
-    def _framing(self, camera: Camera, pose: Pose) -> Camera:
-        """Move a camera, in the same direction, to where it shows the subject."""
-        subject = self._subject(pose)
-        if subject is None:
-            return camera.fit(self.whole(pose), self.viewport.aspect)
-        place = self.session.laid.layers(pose).world_from_pose
-        return camera.framing(place.points(subject), self.viewport.aspect)
-
-    def _subject(self, pose: Pose) -> NDArray[np.float64] | None:
-        """The points of what one depth camera looks at, as of `subject_of`."""
-        return subject_of(pose.views, pose.sample + pose.origin, self.whole(pose), self._upright(pose))
 
     def look_from(self, azimuth: float, elevation: float) -> None:
         """Show the subject from a direction in degrees, such as those of `navigation.VIEWS`."""
         pose, camera = self.playback.pose, self.session.document.camera
         if pose and camera:
-            bounds, aspect = self.whole(pose), self.viewport.aspect
+            bounds, aspect = self.framing.whole(pose), self.viewport.aspect
             azimuth += self.session.document.front
             turned = navigation.view_from(azimuth, elevation, camera, bounds, aspect, self._up)
-            self.session.change("Look from side", camera=self._framing(turned, pose), pivot=None)
+            self.session.change("Look from side", camera=self.framing.framed(turned, pose), pivot=None)
 
     def set_up(self, up: str) -> None:
         """Say what is up, as `up_vector` takes it, and show the subject upright, from the front."""
         pose, camera = self.playback.pose, self.session.document.camera
         look = replace(self.session.document.look, up=up)
         if pose and camera:
-            turned = upright_camera(camera, self.whole(pose), self.viewport.aspect, up)
-            camera = self._framing(turned, pose)
+            turned = upright_camera(camera, self.framing.whole(pose), self.viewport.aspect, up)
+            camera = self.framing.framed(turned, pose)
         self.session.change("Turn upright", look=look, camera=camera, pivot=None, front=0.0)
 
     def set_front(self) -> None:
@@ -200,10 +168,6 @@ class Steering(WindowPart):
         if picked and camera:
             self.session.change("Centre on point", camera=camera.centered(picked.place), pivot=picked.place)
 
-    def toggle_following(self) -> None:
-        """Go with the subject from now on, or stay."""
-        self.follows, self._followed = not self.follows, self.playback.pose
-
     def toggle_turntable(self) -> None:
         """Turn the view round the subject from now on, or stop."""
         if self.turntable.is_on:
@@ -217,8 +181,8 @@ class Steering(WindowPart):
         pose, document = self.playback.pose, self.session.document
         if document.camera is None:
             return False
-        if self.extent.take_visited() and pose is not None and document.camera is self._first:
-            self.session.amend(camera=self._first_camera(pose))
+        if self.framing.extent.take_visited() and pose is not None and document.camera is self._first:
+            self.session.amend(camera=self.framing.first_camera(pose))
             return True
         turned = self.turntable.turned(document.camera, document.pivot, now)
         self.session.change("Turntable", merge="turntable", camera=turned)
@@ -266,49 +230,23 @@ class Steering(WindowPart):
                 if pose.upright.up != UP:
                     guess = f"{pose.upright.up} is up: {pose.upright.why}"
                     self.note_of_scan(f"Scan4D guesses that {guess}. Change it below the cube.")
-            if camera is not None and not navigation.shows(camera, self.bounds(pose), self.viewport.aspect):
+            bounds, aspect = self.framing.bounds(pose), self.viewport.aspect
+            if camera is not None and not navigation.shows(camera, bounds, aspect):
                 camera = None
-            self.extent.visit()
+            self.framing.extent.visit()
         if camera is None:
-            self._first = self._first_camera(pose)
+            self._first = self.framing.first_camera(pose)
             self.session.amend(camera=self._first)
-        elif self.follows and self._followed is not None and pose is not self._followed:
-            self._go_with(camera, pose, self._followed)
-        self._followed = pose
-
-    def _first_camera(self, pose: Pose) -> Camera:
-        """The camera that a scan is first shown with."""
-        is_moved = not self.session.laid.layers(pose).world_from_pose.is_identity
-        views = () if is_moved else pose.views
-        return first_camera(views, self.whole(pose), self.viewport.aspect, self._upright(pose))
-
-    def _upright(self, pose: Pose) -> Upright:
-        """The up axis and the front that the user has chosen, or the scan itself tells."""
-        return replace(pose.upright, up=self._up, front=self.session.document.front)
-
-    def _go_with(self, camera: Camera, pose: Pose, before: Pose) -> None:
-        """Move the camera, and what it turns about, as far as the subject has gone since another pose."""
-        by = self._center(pose) - self._center(before)
-        pivot = self.session.document.pivot
-        self.session.amend(camera=camera.moved(by), pivot=pivot and vector(np.add(pivot, by)))
-
-    def _center(self, pose: Pose) -> NDArray[np.float64]:
-        """The middle of a subject, (3,) in the world: far outliers do not move it."""
-        middle = np.median(pose.sample, axis=0) + pose.origin
-        return self.session.laid.world_from_pose(pose.index).points(middle)
+        self.framing.follow(pose, camera)
 
     def begin_scan(self, timeline: Timeline) -> None:
         """Take in that another scan is shown from now on."""
-        self._is_checked = self.follows = False
-        self._followed = self._first = None
-        self.extent.begin(timeline)
+        self._is_checked, self._first = False, None
 
     COMMANDS = (
         Command("fit", "Fit", fit, "F", "view", short="Fit", icon=icons.ICON_FA_EXPAND),
         Command("opening_view", "Opening view", open_view, "Home", "view"),
         Command("center", "Centre on the point under the mouse", center, "Z", "view"),
-        Command("follow", "Follow the subject", toggle_following, "Shift+F", FRAMES,
-            is_on=lambda steering: steering.follows),
         *(_view(number, side) for number, side in enumerate(navigation.VIEWS, 1)),
         *(_nudge("orbit", f"Turn {side}", side, f"Ctrl+{side.capitalize()}") for side in _SIDES),
         *(_nudge("pan", f"Shift {side}", side, f"Shift+{side.capitalize()}") for side in _SIDES),

@@ -54,6 +54,8 @@ class Tool:
     selected: the name of the one that was placed or chosen last, "" for none. corrects: whether clicks set
     that one, though it is placed or skipped. dragged: where the one that is dragged would be, in the
     coordinates that the scan is shown in; None while none is. open_regions: those whose corners are listed.
+
+    The class has more than 30 methods because each hook of a tool and each of its commands is one.
     """
 
     def __init__(self, context: ToolContext) -> None:

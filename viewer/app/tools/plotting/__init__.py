@@ -46,6 +46,8 @@ class Tool:
     shown: what is plotted. paths, lines: what is drawn over the picture. lasso: draws regions. adding: the
     measure that is to be added. measurer: what finds measures over time. pointed: the curve that the mouse
     points at in the table, by name.
+
+    The class has more than 30 methods because each hook of a tool and each of its commands is one.
     """
 
     def __init__(self, context: ToolContext) -> None:
