@@ -157,7 +157,7 @@ def is_idle(app: App) -> bool:
 def shown(app: App) -> dict[str, Any]:
     """What the window shows."""
     viewport, surface, document = app.viewport, app.viewport.surface, app.session.document
-    left, bottom, width, height = viewport.place
+    left, bottom, width, height = viewport.rectangle
     state: dict[str, Any] = {
         **asdict(app.session.pace),
         "scan": app.session.scan,

@@ -288,7 +288,7 @@ def test_a_surface_that_nothing_was_drawn_into_is_not_shown(
 ) -> None:
     viewport.draw(REQUEST)
     monkeypatch.setattr(viewport_module, "draw_plan", failing)
-    viewport.place = (0, 0, 30, 20)
+    viewport.rectangle = (0, 0, 30, 20)
     viewport.draw(REQUEST)
     assert not viewport.is_visible
 

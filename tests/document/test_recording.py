@@ -378,8 +378,8 @@ def test_of_many_files_the_first_one_counts_as_a_whole_and_the_ends_of_some(
 )
 def test_a_recording_neither_searches_nor_leads_to_another_machine(scan: str, where: str) -> None:
     with pytest.raises(InputError, match=where):
-        recording.place_of(scan, Path("/recordings/a.json"))
-    assert recording.place_of("../scans/a.ply", Path("/recordings/a.json")) == "../scans/a.ply"
+        recording.scan_path(scan, Path("/recordings/a.json"))
+    assert recording.scan_path("../scans/a.ply", Path("/recordings/a.json")) == "../scans/a.ply"
 
 
 def test_without_files_there_is_no_hash(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from viewer.document import saved_session
 from viewer.document.document import Bookmark, Document
 from viewer.document.landmarks import Landmarks
 from viewer.document.part import Part
-from viewer.document.recording import place_of
+from viewer.document.recording import scan_path
 from viewer.document.saved_session import SavedSession, is_session, store, stored, stored_file
 from viewer.errors import InputError
 from viewer.look import Look
@@ -77,7 +77,7 @@ def test_a_scan_and_its_session_move_together(tmp_path: Path, monkeypatch: pytes
     path = tmp_path / "two" / "notes" / "a.scan4d.json"
     found = SavedSession.load(path)
     assert found.scan == "../scans/knot"
-    assert os.path.samefile(place_of(found.scan, path), tmp_path / "two" / "scans" / "knot")
+    assert os.path.samefile(scan_path(found.scan, path), tmp_path / "two" / "scans" / "knot")
     replace(SESSION, scan="demo").export(path)
     assert SavedSession.load(path).scan == "demo"
 

@@ -69,12 +69,12 @@ class Drawing(WindowPart):
         """Drop the picture of the scan before."""
         self.viewport.clear()
 
-    def place(self, view: tuple[int, int, int, int]) -> None:
+    def set_view(self, view: tuple[int, int, int, int]) -> None:
         """Take in where the 3D view is: left, bottom, width, height in pixels from the lower left."""
         left, bottom, width, height = view
-        place = left, bottom, max(width, 1), max(height, 1)
-        if place != self.viewport.place:
-            self.viewport.place = place
+        rectangle = left, bottom, max(width, 1), max(height, 1)
+        if rectangle != self.viewport.rectangle:
+            self.viewport.rectangle = rectangle
             top = self.window.buffer_size[1] - bottom - height
             log.debug("view at %d,%d %dx%d pixels", left, top, width, height)
 
@@ -103,7 +103,7 @@ class Drawing(WindowPart):
                     self.window.touch(frames=1)
 
     def draw(self) -> bool:
-        """Draw the picture that is asked for; whether that took place."""
+        """Draw the picture that is asked for; whether it drew one."""
         pose = self.playback.pose
         if pose is None:
             return False

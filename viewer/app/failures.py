@@ -16,7 +16,7 @@ from ..task import Cancelled
 from .notices import Problem
 
 log = logging.getLogger(__name__)
-_PAUSE = 10.0  # seconds without it, after which the same is told again
+_PAUSE = 10.0  # seconds without it, after which the same is reported again
 _PAIRS = {  # the stacks of ImGui, outermost first -> the calls that come in pairs
     "window": "begin() or begin_child() and its end",
     "begin_popup": "begin_popup() and end_popup()",

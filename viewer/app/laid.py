@@ -19,7 +19,7 @@ MotionOf = Callable[[int], Rigid]
 class Laid:
     """Layers over the open scan, of all tools together.
 
-    Of numbers that have one name those count that were laid last. A pose is moved by one tool's place after
+    Of numbers that have one name those count that were laid last. A pose is moved by one tool's motion after
     the other's, in the order in which they were laid.
 
     names: of the numbers that were found over the poses shown since something was laid last. version: another

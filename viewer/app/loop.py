@@ -58,7 +58,7 @@ class Loop:
         window = self._app.window
         if self._signals.came:
             return True
-        if window.is_closing and self._app.exporting.keeps_open():
+        if window.is_closing and self._app.exporting.asks_to_stay():
             window.is_closing = False
             window.touch()
         return window.is_closing
@@ -68,7 +68,7 @@ class Loop:
         with self._turns.part("widgets"):
             app.window.begin()
             with app.failures.reported("The window"):
-                app.drawing.place(app.window.to_pixels(*app.layout.draw()))
+                app.drawing.set_view(app.window.to_pixels(*app.layout.draw()))
         start_picture, drew = time.perf_counter(), False
         with app.failures.reported("Drawing"):
             drew = app.drawing.draw()

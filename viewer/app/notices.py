@@ -1,4 +1,4 @@
-"""What the user is told: short notes over the picture that go by themselves, problems and offers that stay
+"""Messages for the user: short notes over the picture that go by themselves, problems and offers that stay
 until they are sent away, and a log of all."""
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ class Problem(str):
 class Offer(str):
     """A text with buttons: it stays until the user presses one, or sends it away.
 
-    choices: what each does by its title. about: what it is about; another offer on that takes its place.
+    choices: what each does by its title. about: what it is about; another offer on that replaces it.
     """
 
     choices: Mapping[str, Callable[[], object]]
@@ -86,7 +86,7 @@ class Notices(WindowPart):
 
     def __init__(self) -> None:
         self.all: list[Notice] = []
-        self.count = 0  # ever told
+        self.count = 0  # ever shown
         self._foot = 0.0  # height of the problems over the picture
         self._looking: list[Future[str]] = []
 

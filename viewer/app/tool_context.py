@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class FrameSpan:
-    """Frames that are marked on the timeline. color: 0xRRGGBB. words: that are told of them there."""
+    """Frames that are marked on the timeline. color: 0xRRGGBB. words: that the timeline shows of them."""
 
     frames: range
     color: int
@@ -129,7 +129,8 @@ class ToolContext:
 
     @property
     def scale(self) -> Scale:
-        """How lengths are told: in the unit that the user wants to see, and how many of it one unit is."""
+        """The scale of displayed lengths: the unit that the user wants to see, and how many of it one unit
+        is."""
         return self.playback.scale
 
     def seek(self, index: int) -> None:
@@ -138,8 +139,8 @@ class ToolContext:
         self.redraw()
 
     def seen_at(self, position: Vector, step: tuple[int, int] = (0, 0)) -> Click | None:
-        """Find the click that one at a place would be, moved by so many pixels to the right and up;
-        None where the place is not in the view. position: scan units, where the scan is moved to."""
+        """Find the click that one at a position would be, moved by so many pixels to the right and up;
+        None where the position is not in the view. position: scan units, where the scan is moved to."""
         return self.clicks.near(position, step)
 
     def motion(self, pose: Pose) -> Rigid:
@@ -189,7 +190,7 @@ class ToolContext:
         """Do work on a thread of its own, which the user sees by this name and may cancel.
 
         Long loops in it call `task.checkpoint`. then: takes the result, on the window's thread; it is not
-        called where the work was cancelled. An InputError that the work raises is told, anything else
+        called where the work was cancelled. An InputError that the work raises is reported, anything else
         switches the tool off.
         """
         task = Task(name)

@@ -1,4 +1,4 @@
-"""The toolbox: all tools, made when the window opens; one that fails is told and switched off."""
+"""The toolbox: all tools, made when the window opens; one that fails is reported and switched off."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from .menus import Commands
 from .notices import Problem
 from .part import ViewArea, WindowPart, chosen
 from .playing.playback import Playback
-from .scene.canvas import Canvas, ViewPlace
+from .scene.canvas import Canvas, ScreenView
 from .scene.viewport import Viewport
 from .session import Session
 from .tool_context import FrameSpan, ToolContext
@@ -265,7 +265,7 @@ class Toolbox(WindowPart):
         slots = [slot for slot in self._slots.values() if slot.has("below") and slot.call("is_below")]
         return all(slot.call("is_bare") for slot in slots)
 
-    def draw_over(self, view: ViewPlace, taken: Sequence[Box]) -> None:
+    def draw_over(self, view: ScreenView, taken: Sequence[Box]) -> None:
         """Have the tools draw over the picture. taken: boxes in the view where labels would cover
         something."""
         canvas = Canvas(view, self.viewport)

@@ -271,8 +271,8 @@ def _edit_text(name: str, value: str) -> str:
 
 def edit_path(name: str, path: str, flags: int = 0) -> tuple[bool, str]:
     """A field for a path; what ImGui says of the field, and the path."""
-    told, text = imgui.input_text(name, printable(path), flags)
-    return told, edited(path, text)
+    answer, text = imgui.input_text(name, printable(path), flags)
+    return answer, edited(path, text)
 
 
 def edited(path: str, text: str) -> str:

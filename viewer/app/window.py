@@ -47,7 +47,7 @@ Area = tuple[int, int, int, int]  # left, top, width, height; screen coordinates
 _LEAST_SIDE = 160  # width and height that a window keeps
 _GRIP = 80  # of its upper edge that must be on a screen, so that a mouse can drag it
 _FARTHEST = 2**15  # from the origin of the screens
-Pixels = Annotated[int, Kind("a place on screens", lambda value: abs(value) < _FARTHEST)]
+Pixels = Annotated[int, Kind("a position on screens", lambda value: abs(value) < _FARTHEST)]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class WindowPlacement:
 
 
 def reachable(placement: WindowPlacement, screens: Sequence[Area]) -> WindowPlacement | None:
-    """The place, no larger than its screen; None where no screen shows enough of its upper edge."""
+    """The placement, no larger than its screen; None where no screen shows enough of its upper edge."""
     for left, top, width, height in screens:
         visible = min(placement.left + placement.width, left + width) - max(placement.left, left)
         if visible >= _GRIP and top <= placement.top <= top + height - _GRIP:
@@ -198,7 +198,8 @@ class Window(GlfwWindow):
 
     @property
     def placement(self) -> WindowPlacement | None:
-        """The place of the window; while it fills a screen or is an icon, that before. None: never seen."""
+        """The placement of the window; while it fills a screen or is an icon, that before. None: never
+        seen."""
         seen = self._window, glfw.ICONIFIED
         if glfw.get_window_monitor(self._window) or glfw.get_window_attrib(*seen):
             return self._last_placement
@@ -329,13 +330,13 @@ class Window(GlfwWindow):
     def _set_fullscreen(self, value: bool) -> None:
         """Fill the monitor that the window is on, or no more; moderngl-window takes the primary one."""
         if value:
-            self._place = *glfw.get_window_pos(self._window), *glfw.get_window_size(self._window)
-            monitor = _monitor_at(self._place)
+            self._rectangle = *glfw.get_window_pos(self._window), *glfw.get_window_size(self._window)
+            monitor = _monitor_at(self._rectangle)
             (width, height), _, refresh = glfw.get_video_mode(monitor)
             glfw.set_window_monitor(self._window, monitor, 0, 0, width, height, refresh)
         else:
             no_monitor: Any = None
-            glfw.set_window_monitor(self._window, no_monitor, *self._place, glfw.DONT_CARE)
+            glfw.set_window_monitor(self._window, no_monitor, *self._rectangle, glfw.DONT_CARE)
 
     def hide(self) -> None:
         """Take it off the screen before it is destroyed."""
@@ -367,14 +368,14 @@ def _address(window: Any) -> int:
     return ctypes.cast(window, ctypes.c_void_p).value or 0
 
 
-def _monitor_at(place: tuple[int, int, int, int]) -> Any:
-    """The monitor that shows most of a window. place: left, top, width, height on the screen."""
+def _monitor_at(rectangle: tuple[int, int, int, int]) -> Any:
+    """The monitor that shows most of a window. rectangle: left, top, width, height on the screen."""
 
     def shared(monitor: Any) -> int:
         left, top = glfw.get_monitor_pos(monitor)
         size = glfw.get_video_mode(monitor).size
-        across = min(place[0] + place[2], left + size.width) - max(place[0], left)
-        down = min(place[1] + place[3], top + size.height) - max(place[1], top)
+        across = min(rectangle[0] + rectangle[2], left + size.width) - max(rectangle[0], left)
+        down = min(rectangle[1] + rectangle[3], top + size.height) - max(rectangle[1], top)
         return max(across, 0) * max(down, 0)
 
     return max(glfw.get_monitors(), key=shared)

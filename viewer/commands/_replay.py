@@ -15,11 +15,11 @@ from ..document.anonymous import anonymous_pose, anonymous_request, middle_of
 from ..document.recording import (
     Entry,
     Recording,
+    checked_scan_paths,
     fingerprint,
     fingerprint_as,
     matrix_of,
     new_salt,
-    places_to_open,
 )
 from ..drawing.request import Request
 from ..errors import InputError
@@ -202,7 +202,7 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
 
     Raises InputError where it is in neither folder, or unusable.
     """
-    for folder in places_to_open(scan, path):
+    for folder in checked_scan_paths(scan, path):
         try:
             return folder, open_scan(folder)
         except InputError as error:

@@ -13,7 +13,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..document.recording import Recording, is_recording, place_of
+from ..document.recording import Recording, is_recording, scan_path
 from ..document.saved_session import SavedSession, is_session
 from ..drawing.request import Request
 from ..drawing.timing import draw
@@ -103,12 +103,12 @@ def _named(names: list[str]) -> _Named:
             raise InputError(
                 "does not name its scan", path, "Open the scan, then drop this file onto the window"
             )
-        return _Named([place_of(scan, path)], replay=path)
+        return _Named([scan_path(scan, path)], replay=path)
     return _Named(names)
 
 
 def _scan_of_session(session: SavedSession, path: Path) -> str:
-    scan = place_of(session.scan, path)
+    scan = scan_path(session.scan, path)
     if not is_there(scan):
         hint = f"Say where it is now: scan4d view SCAN {path}"
         raise InputError(f"its scan '{printable(session.scan)}' is missing", path, hint)

@@ -31,7 +31,7 @@ def anonymous_request(request: Request, start: float) -> Request:
     """Request for the same picture of a pose that stands about the origin of its coordinates.
 
     Times count from the scan's first frame, which is at `start` seconds, heights from the middle of the
-    pose, and a scalar is told by its number.
+    pose, and a scalar has its number for a name.
     """
     pose = request.pose
     middle = middle_of(pose)
@@ -72,7 +72,7 @@ def anonymous_unit(unit: str) -> str:
     return unit if is_length(unit) else UNKNOWN_UNIT
 
 
-def in_place(camera: Camera, look: Look, pose: Pose) -> tuple[Camera, Look]:
+def in_scan_coordinates(camera: Camera, look: Look, pose: Pose) -> tuple[Camera, Look]:
     """Camera and look of an anonymous picture, for the pose as the scan has it."""
     middle = middle_of(pose)
     scalar = value_source(drawable(look, pose.overview.scalars), pose.overview.scalars)

@@ -96,8 +96,11 @@ def _read_goal(data: Any) -> Goal | None:
 def _read_way(data: Any) -> DrawingWay | None:
     if data is None:
         return None
-    told = structured(Values, data)
-    name, values = structured(BackendName, told.get("backend")), structured(Values, told.get("values", {}))
+    stated = structured(Values, data)
+    name, values = (
+        structured(BackendName, stated.get("backend")),
+        structured(Values, stated.get("values", {})),
+    )
     backend(name).params(values)
     return DrawingWay(name, values)
 
@@ -116,7 +119,7 @@ class Document:
     another backend is chosen. goal: what a way of drawing is chosen for automatically, None where the user
     says which. way: that was chosen for it, None until one is; it stands in for backend and params, which
     stay. unit: what the user calls the scan's unit of length, None where the scan tells or nobody does.
-    shown_unit: that lengths are told in, None for the scan's own. front: degrees that the front of the scan
+    shown_unit: of displayed lengths, None for the scan's own. front: degrees that the front of the scan
     is turned about what is up. span: the first and the last frame that playing keeps to, None for all. fps:
     frames a second as the user says, None as the scan does. times_by_names: whether the names of the frames
     tell when they are. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a
@@ -154,13 +157,13 @@ class Document:
         if not is_object(data) or not is_object(data.get("unread", {})):
             raise InputError(f"is not values by name but {shortened(data)}", hint=DAMAGED)
         hints = get_type_hints(cls, include_extras=True)
-        told = {name: value for name, value in data.items() if name != "unread"}
+        stated = {name: value for name, value in data.items() if name != "unread"}
         left = dict(unread(data.get("unread", {})))
         values: dict[str, Any] = {}
-        for name, value in {**left, **told}.items():
+        for name, value in {**left, **stated}.items():
             try:
                 values[name] = structured(hints[name], value)
-                if name not in told:
+                if name not in stated:
                     del left[name]
             except (InputError, KeyError):
                 left[name] = unread(value)
@@ -216,7 +219,7 @@ class Document:
         return {**self.unread, f"{field}.{name}": former}
 
     def with_up(self, up: str) -> Document:
-        """The document of a scan whose up axis is told; a camera that stands upright along another goes."""
+        """The document of a scan whose up axis is stated; a camera that stands upright along another goes."""
         turned = replace(self, look=replace(self.look, up=up))
         if self.camera is None:
             return turned

@@ -22,7 +22,7 @@ class Step:
 
 
 class History:
-    """A document and the way to it. document: as it is now.
+    """A document and the changes that led to it. document: as it is now.
 
     Changes that follow one another without a pause, such as those of a drag, are one step: they have the same
     merge key, and nothing else comes between them, nor `settle`.

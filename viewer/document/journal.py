@@ -133,10 +133,10 @@ def written(recording: Recording, folder: Path) -> Path:
 
     Raises InputError where none of them takes it.
     """
-    for place in _places(folder):
-        path = free_file(place, ".json")
+    for candidate in _folders(folder):
+        path = free_file(candidate, ".json")
         try:
-            (recording if place == folder else _from_root(recording, folder)).save(path)
+            (recording if candidate == folder else _from_root(recording, folder)).save(path)
         except InputError as error:
             problem = error
         else:
@@ -144,7 +144,7 @@ def written(recording: Recording, folder: Path) -> Path:
     raise problem
 
 
-def _places(folder: Path) -> Iterator[Path]:
+def _folders(folder: Path) -> Iterator[Path]:
     """Folders where a recording may go, the best first."""
     import platformdirs
 

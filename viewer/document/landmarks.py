@@ -21,7 +21,7 @@ _DISTANCE = re.compile("Distance ([0-9]{1,6})")
 
 @dataclass(frozen=True)
 class Note:
-    """A text that is pinned to a place, to a frame, or to a place in a frame.
+    """A text that is pinned to a position, to a frame, or to a position in a frame.
 
     frame: None for all. position: scan units, None where it is of the frame.
     """
@@ -84,7 +84,7 @@ class Landmarks(Part, name="landmarks"):
         return next((landmark for landmark in self.all if landmark.name == name), None)
 
     def with_landmark(self, landmark: Landmark) -> Landmarks:
-        """The landmarks with this one in the place of the one of its name, or at the end."""
+        """The landmarks with this one instead of the one of its name, or at the end."""
         if self.named(landmark.name) is None:
             return replace(self, all=(*self.all, landmark))
         return replace(self, all=tuple(landmark if one.name == landmark.name else one for one in self.all))

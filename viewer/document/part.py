@@ -49,7 +49,7 @@ class Part:
         check_declaration(cls, name)
 
     def check_storable(self, known: Part | None = None) -> None:
-        """Check that it can be kept as it is; raises TypeError, which names the place: "notes.all[0]".
+        """Check that it can be kept as it is; raises TypeError, which names the position: "notes.all[0]".
 
         known: one that was checked, of which this one is a change; only what is new is checked.
         """

@@ -83,7 +83,7 @@ FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
 _ENDS_OF, _END_BYTES = 64, 2**16  # files, spread evenly, of which both ends are read, and bytes of an end
 _TICK = 0.001  # seconds that time stamps are rounded to
-_EXACT = 1e-6  # how far the rotation of a place may be from orthonormal
+_EXACT = 1e-6  # how far the rotation of a matrix may be from orthonormal
 
 _Row = tuple[float, float, float, float]
 
@@ -409,7 +409,7 @@ def new_salt() -> str:
 
 
 def fingerprint_as(known: str | None, files: Sequence[Path]) -> str | None:
-    """The hash of files in the way that a known one was made."""
+    """The hash of files as a known one was made."""
     salted = re.fullmatch("salted:([0-9a-f]{16}):[0-9a-f]{16}", known or "")
     return fingerprint(files, salted[1] if salted else None)
 
@@ -424,34 +424,34 @@ def is_recording(path: Path) -> bool:
         return False
 
 
-def places_of(scan: str, recording: Path) -> list[str]:
-    """Places of a scan that a recording names: beside the recording, then as it is named."""
+def scan_paths(scan: str, recording: Path) -> list[str]:
+    """Paths of a scan that a recording names: beside the recording, then as it is named."""
     return [scan] if is_demo(scan) else list(dict.fromkeys([str(recording.parent / scan), scan]))
 
 
-def places_to_open(scan: str, recording: Path) -> list[str]:
-    """Places of a scan that a recording or a session names, checked before anything there is opened.
+def checked_scan_paths(scan: str, recording: Path) -> list[str]:
+    """Paths of a scan that a recording or a session names, checked before anything there is opened.
 
     The scan may lie anywhere on this machine, since the user sees which one is opened. Raises InputError
     where opening it would search through folders, or ask another machine, for whoever wrote the recording.
     """
-    if where := far_place(scan):
+    if where := remote_location(scan):
         hint = "If it is the right one, open it first, or name it: scan4d render SCAN --replay ..."
         raise InputError(f"names its scan as '{shortened(scan)}', {where}", recording, hint)
-    return places_of(scan, recording)
+    return scan_paths(scan, recording)
 
 
-def far_place(scan: str) -> str:
+def remote_location(scan: str) -> str:
     """Words on where a scan may be that only the user may name; "" where a recording may."""
     if scan.startswith(("//", "\\\\")):
         return "on another machine"
     return "all over the folders" if searches_folders(scan) else ""
 
 
-def place_of(scan: str, recording: Path) -> str:
-    """The first of these places where something is, else the last one. Raises InputError likewise."""
-    places = places_to_open(scan, recording)
-    return next((place for place in places if os.path.exists(place)), places[-1])
+def scan_path(scan: str, recording: Path) -> str:
+    """The first of these paths where something is, else the last one. Raises InputError likewise."""
+    paths = checked_scan_paths(scan, recording)
+    return next((path for path in paths if os.path.exists(path)), paths[-1])
 
 
 # --- reading --------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ from ..helper import start_python
 from ..output.export import numbered
 from ..task import Task
 from ..unfinished import temporary_folder
-from .recording import Recording, far_place
+from .recording import Recording, remote_location
 
 _SAID = "scan4d: "  # before each line of warnings and errors
 _PROGRAM = __name__.partition(".")[0]  # which a process of its own runs, as `python -m` does
@@ -61,7 +61,7 @@ def make(
         arguments = ["render", "--replay", str(reported_once), "-o", str(made / out.name)]
         arguments += ["--fps", f"{fps:.17g}", "--progress", *(["--anonymous"] if anonymous else [])]
         scan = recording.entries[0].scan
-        if scan is not None and far_place(scan):  # which a recording may not ask for
+        if scan is not None and remote_location(scan):  # which a recording may not ask for
             arguments += ["--", scan]
         device, code, text = _run(task, arguments, folder / "said", reported_once)
         for inner in (made, folder):  # as it says them, also where they are no UTF-8
@@ -127,7 +127,7 @@ def _follow(task: Task, process: subprocess.Popen[bytes], reported_once: Path) -
         with task.stopped_by(process.kill):
             for line in process.stdout or ():
                 step = json.loads(line) if line.startswith(b"{") else {}
-                if "device" in step:  # it has read all that it was told
+                if "device" in step:  # it has read all of its input
                     reported_once.unlink()
                     device = step["device"]
                 if "drawn" in step:

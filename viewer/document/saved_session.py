@@ -177,7 +177,7 @@ def stored(scan: str) -> SavedSession | None:
     if not os.path.lexists(path):
         return None
     try:
-        digest = _digest_of_file(path)  # before it is read: what changes meanwhile is told
+        digest = _digest_of_file(path)  # before it is read: a message reports what changes meanwhile
         session = SavedSession.load(path)
         _seen[path] = digest, session.document.made
         return session
@@ -271,7 +271,7 @@ def _put_aside(path: Path) -> Path:
 
 
 def _free_aside(path: Path) -> Path:
-    """A new file beside one that is kept, empty until that or another one takes its place.
+    """A new file beside one that is kept, empty until that or another one replaces it.
 
     Raises InputError where the system refuses.
     """

@@ -23,7 +23,7 @@ class _Failure:
 class Saver(Generic[T]):
     """Saves values on a thread of its own: what has changed, now and then. Nobody waits but in `close`.
 
-    What cannot be saved is tried again after pauses that grow, and told once until it was saved.
+    What cannot be saved is tried again after pauses that grow, and reported once until it was saved.
     """
 
     def __init__(

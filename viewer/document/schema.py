@@ -2,7 +2,7 @@
 
 The declarations are the dataclasses themselves: what a file may hold is what the types of their fields say,
 and `Annotated` with a `Kind` where a type alone does not say enough. The library cattrs goes through them;
-here it is told to be strict, to read parameters and cameras as the rest of the project does, and to say what
+here it is set to be strict, to read parameters and cameras as the rest of the project does, and to say what
 is wrong as a user reads it.
 """
 
@@ -134,7 +134,7 @@ def read_json(path: Path) -> Any:
 def structured(kind: type[T], data: Any, where: object = None) -> T:
     """The value of plain JSON data, by the types of the fields of `kind`.
 
-    Raises InputError, which tells the place within the data after `where`.
+    Raises InputError, which names the position within the data after `where`.
     """
     from cattrs.errors import BaseValidationError
 
@@ -215,14 +215,14 @@ def check_storable(value: Any, name: str, known: Any = None) -> None:
     """Check that a value of a declared dataclass is read again from JSON as it is.
 
     known: one of the same kind that was checked; what its tuples have in common with the value's, as the very
-    same objects, is not checked again. Raises TypeError, which names the place within it after `name`:
+    same objects, is not checked again. Raises TypeError, which names the position within it after `name`:
     "notes.all[0].position".
     """
     if type(known) is type(value):
         try:
             return _check_storable(_new_in(value, known), name)
         except (TypeError, InputError):
-            pass  # told with its place in the whole
+            pass  # reported with its position in the whole
     _check_storable(value, name)
 
 
@@ -245,34 +245,34 @@ def _check_storable(value: Any, name: str) -> None:
         again = _converter().structure(plain(value), type(value))
     except (BaseValidationError, InputError, _Unfit) as error:
         path, cause = _first(error)
-        place = ".".join(filter(None, (name, path)))
+        where = ".".join(filter(None, (name, path)))
         if isinstance(cause, _Unfit):
             expected = cause.words.replace("a list", "a tuple")  # which JSON has as a list
-            raise TypeError(f"{place} is to be {expected}, not {_typed(cause.value)}") from None
-        raise TypeError(f"{place} cannot be kept: {cause}") from None
+            raise TypeError(f"{where} is to be {expected}, not {_typed(cause.value)}") from None
+        raise TypeError(f"{where} cannot be kept: {cause}") from None
     if again != value:
-        place, kept, read = _difference(value, again, name)
-        raise TypeError(f"{place} would be read again as {_typed(read)}, not {_typed(kept)}")
+        where, kept, read = _difference(value, again, name)
+        raise TypeError(f"{where} would be read again as {_typed(read)}, not {_typed(kept)}")
 
 
 def _typed(value: Any) -> str:
     return f"{shortened(value)} ({type(value).__name__})"
 
 
-def _difference(value: Any, other: Any, place: str) -> tuple[str, Any, Any]:
-    """The innermost place where two values differ, and what each has there."""
+def _difference(value: Any, other: Any, where: str) -> tuple[str, Any, Any]:
+    """The innermost position where two values differ, and what each has there."""
     within: list[tuple[str, Any, Any]] = []
     if type(value) is type(other) and is_dataclass(value):
         names = [field.name for field in fields(value)]
-        within = [(f"{place}.{name}", getattr(value, name), getattr(other, name)) for name in names]
+        within = [(f"{where}.{name}", getattr(value, name), getattr(other, name)) for name in names]
     elif isinstance(value, tuple) and isinstance(other, tuple):
-        within = [(f"{place}[{n}]", *pair) for n, pair in enumerate(zip(value, other, strict=True))]
+        within = [(f"{where}[{n}]", *pair) for n, pair in enumerate(zip(value, other, strict=True))]
     elif isinstance(value, Mapping) and isinstance(other, Mapping):
-        within = [(f"{place}.{name}", value[name], other[name]) for name in value]
+        within = [(f"{where}.{name}", value[name], other[name]) for name in value]
     for inner, one, another in within:
         if one != another:
             return _difference(one, another, inner)
-    return place, value, other
+    return where, value, other
 
 
 def unread(value: Any, depth: int = 0) -> Any:
@@ -310,7 +310,7 @@ def migrated(
     return current | {"format": to}
 
 
-# --- how the library is told ------------------------------------------------------------------
+# --- how the library reads ------------------------------------------------------------------
 
 
 class _Unfit(Exception):
@@ -436,22 +436,22 @@ def _in_words(error: BaseException, where: object) -> InputError:
     path, cause = _first(error)
     outer, _, name = path.rpartition(".")
 
-    def told(what: str, place: str, hint: str | None = DAMAGED) -> InputError:
-        return InputError(what, ", ".join(filter(None, (str(where or ""), place))) or None, hint)
+    def problem(what: str, within: str, hint: str | None = DAMAGED) -> InputError:
+        return InputError(what, ", ".join(filter(None, (str(where or ""), within))) or None, hint)
 
     if isinstance(cause, _Unfit):
         named = f"'{name}'" if name else "It"
-        return told(f"{named} is not {cause.words} but {shortened(cause.value)}", outer)
+        return problem(f"{named} is not {cause.words} but {shortened(cause.value)}", outer)
     if isinstance(cause, InputError):
         inner = "" if cause.where is None else f"{cause.where}: "
-        return told(inner + cause.what, path, cause.hint)
+        return problem(inner + cause.what, path, cause.hint)
     if isinstance(cause, KeyError):
-        return told(f"has no '{cause.args[0]}'", outer)
-    return told(f"cannot be used ({shortened(str(cause))})", path)
+        return problem(f"has no '{cause.args[0]}'", outer)
+    return problem(f"cannot be used ({shortened(str(cause))})", path)
 
 
 def _first(error: BaseException) -> tuple[str, BaseException]:
-    """The place of the first thing that is wrong, such as "bookmarks[2].camera", and what it is."""
+    """The position of the first thing that is wrong, such as "bookmarks[2].camera", and what it is."""
     from cattrs.errors import BaseValidationError, ForbiddenExtraKeysError
 
     path = ""

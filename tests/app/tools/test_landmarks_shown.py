@@ -20,7 +20,7 @@ from viewer.app.tool_context import ToolContext
 from viewer.app.tools.landmarks import Settings, Tool
 from viewer.app.tools.landmarks.corners import regions_of
 from viewer.app.tools.landmarks.shown import ShownLandmarks
-from viewer.app.tools.landmarks.words import corners_words, gap_spans, place_words
+from viewer.app.tools.landmarks.words import corners_words, gap_spans, position_words
 from viewer.document.landmarks import Landmarks
 from viewer.scan.units import Scale
 
@@ -67,9 +67,9 @@ def test_a_key_counts_before_what_was_tracked_until_it_is_tracked_anew() -> None
 def test_places_are_told_as_well_as_they_are_known() -> None:
     shown = ShownLandmarks.of(ALL, TRACKS, 0)
     assert shown.sure[0] == pytest.approx(1.96 * 0.2)
-    assert place_words(shown, 0, MM) == "1.00, 2.00, 3.00 ± 0.39 mm"
-    assert place_words(shown, 0, Scale.of("mm", "cm")) == "0.100, 0.200, 0.300 ± 0.039 cm"
-    assert place_words(shown, 1, MM) == "", "where it is not known"
+    assert position_words(shown, 0, MM) == "1.00, 2.00, 3.00 ± 0.39 mm"
+    assert position_words(shown, 0, Scale.of("mm", "cm")) == "0.100, 0.200, 0.300 ± 0.039 cm"
+    assert position_words(shown, 1, MM) == "", "where it is not known"
 
 
 def test_gaps_are_marked_in_runs() -> None:

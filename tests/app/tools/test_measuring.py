@@ -12,7 +12,7 @@ from imgui_bundle import ImVec2
 from viewer.analysis.surface_point import SurfacePoint
 from viewer.app.clicks import Clicks
 from viewer.app.followed import Followed
-from viewer.app.scene.canvas import ViewPlace
+from viewer.app.scene.canvas import ScreenView
 from viewer.app.session import Session
 from viewer.app.tool_context import ToolContext
 from viewer.app.tools.measuring import Tool
@@ -20,7 +20,7 @@ from viewer.app.tools.measuring.panel import snap_words
 from viewer.camera import Camera
 from viewer.document.landmarks import Landmarks
 
-PLACE = ViewPlace(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
+PLACE = ScreenView(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 
 
 def end(id: int | None) -> SurfacePoint:

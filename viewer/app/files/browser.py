@@ -31,7 +31,7 @@ from .sessions import Sessions
 _TITLE = "Open a scan"
 _SIZE = ImVec2(72.0, 36.0)  # in heights of the font
 _KNOWN_SHARE, _PREVIEW_SHARE = 0.2, 0.26  # of the width
-_KNOWN_LEAST = 9.5  # the same of the known places, in heights of the font
+_KNOWN_LEAST = 9.5  # the same of the known folders, in heights of the font
 _LINGERS = 0.15  # seconds that a row is chosen before its scan is read
 _HINT = "You can also drop files, folders and recordings onto the window."
 
@@ -208,7 +208,7 @@ class Browser(WindowPart):
             widgets.faint(", ".join(filter(None, shown)))
 
     def _draw_known(self) -> None:
-        """Declare the places to look in, and the lists of what can be opened at once, wherever it is."""
+        """Declare the folders to look in, and the lists of what can be opened at once, wherever it is."""
         self._view.draw_known_folders()
         is_open = self.session.scan == DEMO
         if imgui.selectable(f"{icons.ICON_FA_CUBE}  Demo scan###Demo scan", is_open)[0]:

@@ -1,4 +1,4 @@
-"""The folder that a dialog shows: places to go to, its path, and rows of what is in it."""
+"""The folder that a dialog shows: known folders, its path, and rows of what is in it."""
 
 from __future__ import annotations
 
@@ -94,9 +94,9 @@ class FolderView:
         nothing: str,
         filters: bool = False,
     ) -> None:
-        """take: uses a path that the user has picked or typed, and that is no folder to go into. choose: is
-        told which row the user has moved to. nothing: the words on a folder without rows. filters: whether
-        letters that are typed narrow the rows."""
+        """take: uses a path that the user has picked or typed, and that is no folder to go into. choose:
+        takes the row that the user has moved to. nothing: the words on a folder without rows. filters:
+        whether letters that are typed narrow the rows."""
         self._list_folder, self._take_path, self._on_choice = list_folder, take, choose
         self._nothing, self._filters = nothing, filters
         self.folder = working_folder()
@@ -125,7 +125,7 @@ class FolderView:
         self.go(folder, select)
 
     def advance(self) -> bool:
-        """Take in the places and the folder's list; whether that has come."""
+        """Take in the known folders and the folder's list; whether that has come."""
         if self._looking is not None and self._looking.done():
             looking, self._looking = self._looking, None
             self._known = [] if looking.exception() else looking.result()
@@ -244,8 +244,8 @@ class FolderView:
             imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(self.refusal)}")
 
     def draw_known_folders(self) -> None:
-        """Declare the places to look in."""
-        imgui.text_disabled("Places")
+        """Declare the folders to look in."""
+        imgui.text_disabled("Folders")
         for known in self._known:
             label = widgets.labelled(f"{known.icon}  {known.title}", known.title)
             if imgui.selectable(label, known.folder == self.folder)[0]:
@@ -306,7 +306,8 @@ class FolderView:
         room = width - _ICON_ROOM * em
         while columns and room - sum(wide for wide, _ in columns) < _NAME_ROOM * em:
             columns.pop()
-        imgui.text(widgets.fitted(printable(row.title), room - sum(wide for wide, _ in columns)))
+        name_room = room - sum(wide for wide, _ in columns) - imgui.get_style().item_spacing.x
+        imgui.text(widgets.fitted(printable(row.title), name_room))
         for number, (_, text) in enumerate(columns):
             imgui.same_line(left + width - sum(wide for wide, _ in columns[number:]))
             beside(text)

@@ -20,7 +20,7 @@ from ..session import Session
 from .opener import Opener
 from .scans import title
 
-_PATIENCE = 0.3  # seconds that may pass before a wait is told
+_PATIENCE = 0.3  # seconds that may pass before a wait is shown
 _WIDTH = 24.0  # in heights of the font
 _FLAGS = (
     imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings

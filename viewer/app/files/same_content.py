@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...files import printable
 from ..notices import Offer
 
-_ABOUT = "kept"  # what these offers are about: one takes the place of the other
+_ABOUT = "kept"  # what these offers are about: one replaces the other
 
 
 def offer_of_stored(scan: str, hash: Future[str | None], use: Callable[[SavedSession], object]) -> str:
@@ -43,7 +43,7 @@ def offer_of_change(saved: SavedSession, hash: Future[str | None], begin: Callab
     text = "The scan has changed since you saved this: views and distances may no longer fit."
     if not saved.document.made:
         return text
-    with suppress(InputError):  # what is kept stays as it is, and that is told when it is written
+    with suppress(InputError):  # what is kept stays as it is, and a message says so when it is written
         set_aside(saved)
     kept = _made(saved)
     choices = {f"Keep the {kept}": lambda: None, f"Begin without the {kept}": begin}

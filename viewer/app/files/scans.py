@@ -120,10 +120,10 @@ class Scans(WindowPart):
         return True
 
     def step(self, count: int) -> None:
-        """Open the scan so many places further in the list, round its end; past what cannot be opened."""
+        """Open the scan so many entries further in the list, round its end; past what cannot be opened."""
         if len(self.listed) > 1:
-            place = self._asked if self._asked in self.listed else self.listed[0]
-            self._asked = self.listed[(self.listed.index(place) + count) % len(self.listed)]
+            current = self._asked if self._asked in self.listed else self.listed[0]
+            self._asked = self.listed[(self.listed.index(current) + count) % len(self.listed)]
             self.open_scan(self._asked)
 
     def after(self, scan: str) -> str | None:

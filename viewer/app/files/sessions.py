@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...document.recording import place_of
+from ...document.recording import scan_path
 from ...document.saved_session import SUFFIX, SavedSession
 from ...errors import InputError
 from ...files import printable, working_folder
@@ -78,7 +78,7 @@ class Sessions(WindowPart):
         """Open the scan of a session file with it; where it is not there, the user is asked to find it."""
         try:
             session = SavedSession.load(path)
-            scan = place_of(session.scan, path)
+            scan = scan_path(session.scan, path)
         except InputError as error:
             self.refuse(str(error))
             return

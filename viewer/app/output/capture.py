@@ -70,7 +70,7 @@ class Capture(WindowPart):
         self.last: Path | None = None
         self._journal: Journal | None = None  # of what is recorded
         self._unsaved: list[tuple[UnsavedPicture, Callable[[Surface], None]]] = []
-        self._saving: list[Future[str]] = []  # files; each brings what is to be told
+        self._saving: list[Future[str]] = []  # files; each brings words for the user
         self._naming = Lock()  # one free name at a time
 
     def shown(self, marks: Marks | None = None) -> Entry | None:
@@ -107,8 +107,8 @@ class Capture(WindowPart):
             self.note_of_work(Problem(f"This picture cannot be replayed: {error}"))
         legend = None
         if entry is not None:
-            told = entry.legend(self.playback.timeline, request.pose)
-            legend = replace(told, range_note=self.range_note())
+            plain = entry.legend(self.playback.timeline, request.pose)
+            legend = replace(plain, range_note=self.range_note())
         save = partial(self._begin_saving, entry, legend, self.session.hash_found)
         if viewport.is_refined:
             save(viewport.surface)

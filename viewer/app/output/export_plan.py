@@ -145,13 +145,13 @@ def recording(
     marks: Marks,
     times: NDArray[np.float64],
     pivot: Vector | None,
-    place: Callable[[int], Rigid],
+    motion_of: Callable[[int], Rigid],
     drawn: Callable[[int], DrawnMarks] = lambda _: NOTHING_DRAWN,
 ) -> Recording:
     """The pictures to make. shown: what the view shows. times: (T,) of the scan's frames, seconds.
 
-    pivot: what a turntable turns about; None: the camera's target. place: that frames are moved to, by index.
-    drawn: what tools draw over a frame, likewise.
+    pivot: what a turntable turns about; None: the camera's target. motion_of: the motion of a frame, by its
+    index. drawn: what tools draw over a frame, likewise.
     """
     look = shown.look if choices.quality == AS_SHOWN else replace(shown.look, quality=choices.quality)
     base = replace(shown, size=choices.size, marks=marks, look=look)
@@ -161,7 +161,7 @@ def recording(
         entries = [first, *(replace(other, labels=()) for other in others)]  # those are of the first view
     elif choices.what == FRAMES:
         entries = [
-            replace(base, pose=i, time=float(times[i]), place=matrix_of(place(i))).with_drawn(drawn(i))
+            replace(base, pose=i, time=float(times[i]), place=matrix_of(motion_of(i))).with_drawn(drawn(i))
             for i in choices.indices(len(times))
         ]
     else:

@@ -35,7 +35,7 @@ from .export_plan import Choices, free_name
 
 log = logging.getLogger(__name__)
 _CANCELLING = 10.0  # seconds that closing waits for a cancelled process to be gone
-_MOST_WARNINGS = 3  # that are told
+_MOST_WARNINGS = 3  # that are shown
 
 
 @dataclass(eq=False)
@@ -158,9 +158,9 @@ class Exporting(WindowPart):
             self.replaced = [] if self.own else there
             return
         self.is_open, self.replaced = False, []
-        pivot, place = self.session.document.pivot, self.session.laid.world_from_pose
+        pivot, motion_of = self.session.document.pivot, self.session.laid.world_from_pose
         recording = export_plan.recording(
-            choices, shown, self.marks, timeline.times, pivot, place, self.drawn
+            choices, shown, self.marks, timeline.times, pivot, motion_of, self.drawn
         )
         rate, numbers = self.rate, choices.numbers(self.count)
         self._begin(choices.name, recording, choices.out(), rate, choices.anonymous, numbers, replaced=there)
@@ -181,7 +181,7 @@ class Exporting(WindowPart):
         log.debug("exporting %s", out)
 
     def _entry(self) -> Entry | None:
-        """The entry of what the picture shows; where that cannot be drawn again, the user is told why."""
+        """The entry of what the picture shows; where that cannot be drawn again, a message says why."""
         try:
             shown = self.shown_entry(self.marks)
             return shown and replace(shown, automatic=None)  # it was expected of this size and view
@@ -213,7 +213,7 @@ class Exporting(WindowPart):
                 f"{made.device} drew the export, not the window's GPU: small differences are possible."
             )
 
-    def keeps_open(self) -> bool:
+    def asks_to_stay(self) -> bool:
         """Whether an export runs that the user has to be asked about before the window closes."""
         self.is_leaving = self.task is not None and not self.task.cancelled
         if self.is_leaving:

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from ...document.anonymous import in_place, middle_of
-from ...document.recording import Entry, Recording, fingerprint_as, place_of, places_of
+from ...document.anonymous import in_scan_coordinates, middle_of
+from ...document.recording import Entry, Recording, fingerprint_as, scan_path, scan_paths
 from ...errors import InputError
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
@@ -149,15 +149,15 @@ class Replayer(WindowPart):
             return False
         scan = self.session.scan
         here = known_as(scan)
-        if entry.scan is not None and here not in map(known_as, places_of(entry.scan, replaying.path)):
+        if entry.scan is not None and here not in map(known_as, scan_paths(entry.scan, replaying.path)):
             try:
-                place = place_of(entry.scan, replaying.path)
+                path = scan_path(entry.scan, replaying.path)
             except InputError as error:
                 self.note(Problem(str(error)))
                 return False
-            if replaying.asked != place:  # else it could not be opened, and that was told
-                replaying.asked = place
-                self.open_scan(place)
+            if replaying.asked != path:  # else it could not be opened, and a message said so
+                replaying.asked = path
+                self.open_scan(path)
             return False
         if replaying.compared != here:
             replaying.compared = here
@@ -169,12 +169,12 @@ class Replayer(WindowPart):
 
     def _show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""
-        camera, look, place = entry.camera, entry.look, entry.motion
+        camera, look, motion = entry.camera, entry.look, entry.motion
         if entry.anonymous:
-            camera, look = in_place(camera, look, pose)
-            place = place.in_frame(-middle_of(pose))
+            camera, look = in_scan_coordinates(camera, look, pose)
+            motion = motion.in_frame(-middle_of(pose))
         self.playback.seek(entry.pose, time.monotonic())
-        self.session.laid.replay(entry.pose, place)
+        self.session.laid.replay(entry.pose, motion)
         shown = replace(self.session.document.drawn_by(entry.backend), camera=camera, pivot=None, look=look)
         shown = shown.with_params(entry.backend, entry.params)
         self.session.history.change("Replay", shown, merge="replay")

@@ -1,4 +1,4 @@
-"""A picture on its way to a file: drawn in slices, so that the window goes on meanwhile."""
+"""A picture that goes to a file: drawn in slices, so that the window goes on meanwhile."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ _PLOT = (
 
 
 def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scale) -> None:
-    """Declare the rows. scale: how lengths are told."""
+    """Declare the rows. scale: of displayed lengths."""
     goal = session.document.goal
     imgui.begin_disabled(goal is None and bool(choosing.why_not))  # as of another device it can be ended
     imgui.begin_group()
@@ -60,7 +60,7 @@ def draw(session: Session, rendering: Rendering, choosing: Choosing, scale: Scal
 
 
 def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
-    """Declare what edits a goal. unit: that lengths are told in. footprint: the edge of a pixel where the
+    """Declare what edits a goal. unit: of displayed lengths. footprint: the edge of a pixel where the
     scan is, in it; None while that is not known."""
     lengths = sorted({unit, goal.unit} - {PIXELS, "ms"})
     words = {"ms": "Time", PIXELS: "Error in pixels"} | {each: f"Error in {each}" for each in lengths}

@@ -97,7 +97,7 @@ class ScanSection(WindowPart):
             )
 
     def _draw_unit(self, pose: Pose) -> None:
-        """Declare what chooses the unit of length, a guess where nobody has told it, and what lengths are
+        """Declare what chooses the unit of length, a guess where nobody has stated it, and what lengths are
         shown in."""
         stated, document = self.playback.timeline.unit, self.session.document
         own = "not set" if stated == UNKNOWN_UNIT else f"{stated} (from file)"

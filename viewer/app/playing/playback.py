@@ -96,7 +96,7 @@ class Playback(WindowPart):
 
     @property
     def scale(self) -> Scale:
-        """How lengths are told."""
+        """The scale of displayed lengths."""
         return Scale.of(self.unit, self.session.document.shown_unit)
 
     @property
@@ -125,7 +125,7 @@ class Playback(WindowPart):
         self._read_ahead()
 
     def _in_span(self, index: int) -> int:
-        """The place of a frame among those that are played, of the one that comes first where it is none."""
+        """The number of a frame among those that are played, of the one that comes first where it is none."""
         if index in self.span:
             return index - self.span.start
         return len(self.span) - 1 if self.session.pace.reverse else 0
@@ -239,8 +239,8 @@ class Playback(WindowPart):
         in_time = self.player.playing and not pace.every_frame
         late = self.steps_to(wanted, shown.index) if in_time else 1
         for steps in range(max(late, 1)):
-            place = self._in_span(wanted) - steps * pace.direction
-            pose = self.timeline.ready(self.span[place % len(self.span)] if steps else wanted)
+            number = self._in_span(wanted) - steps * pace.direction
+            pose = self.timeline.ready(self.span[number % len(self.span)] if steps else wanted)
             if pose is not None and (pose is shown or self.is_prepared(pose)):
                 return pose
         return None

@@ -39,7 +39,7 @@ class _Work(NamedTuple):
 @dataclass(eq=False)
 class Thumbnails(WindowPart):
     """Pictures of the frames of one scan by one camera. One is drawn at a time, so that one frame at most is
-    read for this; a frame that is not in memory takes no place there."""
+    read for this; a frame that is not in memory takes no room there."""
 
     name = "thumbnails"
     doing = "Picturing frames"
@@ -62,7 +62,7 @@ class Thumbnails(WindowPart):
         return self._work is not None or self._wanted is not None
 
     def draw(self, timeline: Timeline, frame: int, camera: Camera, aspect: float) -> None:
-        """Declare the picture of a frame, or its place until it is there. aspect: of the view."""
+        """Declare the picture of a frame, or its room until it is there. aspect: of the view."""
         width = round(_HEIGHT * min(max(aspect, _NARROWEST), _WIDEST))
         if self._of != (timeline, camera, width):
             self.clear()

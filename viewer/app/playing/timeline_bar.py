@@ -40,7 +40,7 @@ _FIRST, _LAST = 1, 2
 _TICK_TEXT = 0.75  # heights of the font
 _TICK_ROOM = 7.0  # from one to the next at least, in heights of their text
 _WORK_SHARE = 0.4  # of the status bar's width, for work that goes on
-_GAP = "    "  # between what is said of the place under the mouse
+_GAP = "    "  # between what is said of the point under the mouse
 
 
 @dataclass(eq=False)
@@ -232,11 +232,11 @@ class _Track:
         self.draw_list = imgui.get_window_draw_list()
 
     def x(self, time: float) -> float:
-        """The place of a time."""
+        """The position of a time, pixels."""
         return self.corner.x + time / float(self.edges[-1]) * self.size.x
 
     def time(self, x: float) -> float:
-        """The time at a place."""
+        """The time at a position."""
         return (x - self.corner.x) / self.size.x * float(self.edges[-1])
 
     def bar(self, start: int, stop: int, color: int, shares: tuple[float, float] = _BAR) -> None:

@@ -28,7 +28,7 @@ from .viewport import Viewport
 
 _REST = 0.2  # seconds after the last picture
 _LAST = 5  # pictures of one way whose times are kept
-_OVER = 1.5  # times the limit: what pictures take from then on is told
+_OVER = 1.5  # times the limit: what pictures take from then on is reported
 _SCALES = (1.0,)  # pictures at rest have all their pixels, and in motion those that there is time for
 
 

@@ -70,7 +70,7 @@ class Extent:
         self._visiting = task, in_background(task, work)
 
     def take_visited(self) -> bool:
-        """Whether the frames that were to be visited have been, told once."""
+        """Whether the frames that were to be visited have been, reported once."""
         if self._visiting is None or not self._visiting[1].done():
             return False
         task, done = self._visiting

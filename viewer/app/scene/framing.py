@@ -64,8 +64,8 @@ class Framing(WindowPart):
         subject = self.subject(pose)
         if subject is None:
             return camera.fit(self.whole(pose), self.viewport.aspect)
-        place = self.session.laid.layers(pose).world_from_pose
-        return camera.framing(place.points(subject), self.viewport.aspect)
+        motion = self.session.laid.layers(pose).world_from_pose
+        return camera.framing(motion.points(subject), self.viewport.aspect)
 
     def subject(self, pose: Pose) -> NDArray[np.float64] | None:
         """The points of what one depth camera looks at, as of `subject_of`."""

@@ -88,8 +88,8 @@ def _differ(one: Camera, other: Camera) -> bool:
 
 
 def between(start: Camera, end: Camera, share: float) -> Camera:
-    """A camera on the way from one to another of the same projection: it turns about what it looks at, the
-    shortest way, at a distance that changes evenly. share: of the way."""
+    """A camera between one and another of the same projection: it turns about what it looks at, the
+    shortest way, at a distance that changes evenly. share: of the path."""
     first = start.rotation()
     rotation = _part_of(end.rotation() @ first.T, share) @ first
     target = (1 - share) * np.array(start.target) + share * np.array(end.target)

@@ -61,7 +61,7 @@ def drag(
 
 
 def orbit(camera: Camera, right: float, up: float, pivot: Vector | None = None) -> Camera:
-    """The subject turns with the mouse, about the pivot, which keeps its place; None: the target."""
+    """The subject turns with the mouse, about the pivot, which stays where it is; None: the target."""
     return camera.orbited(-right * _DEGREES_PER_HEIGHT, -up * _DEGREES_PER_HEIGHT, pivot)
 
 

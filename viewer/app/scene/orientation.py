@@ -45,7 +45,7 @@ def azimuth_of(camera: Camera, up: str) -> float:
 
 
 def part_at(turned: NDArray[np.float64], right: float, up: float) -> Direction | None:
-    """The part of the cube that is seen at a place of its picture, None beside it.
+    """The part of the cube that is seen at a position of its picture, None beside it.
 
     right, up: from the picture's centre, in half edges of the cube.
     """

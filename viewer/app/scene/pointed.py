@@ -1,4 +1,4 @@
-"""What the mouse points at, and how that is told."""
+"""What the mouse points at, and the words on it."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Pointer(WindowPart):
         log.debug("under the mouse: %s", "; ".join(self.words))
 
     def in_full(self) -> Picked | None:
-        """The place under the mouse in the picture in full."""
+        """The position under the mouse in the picture in full."""
         return self.viewport.probe.pick_in_full() or self.picked
 
     COMMANDS = (
@@ -77,8 +77,8 @@ def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown
     """
     decimals = min(max(_DIGITS - math.floor(math.log10(scale.factor * radius or 1.0)), 0), 9)
     sure = "" if picked.uncertainty is None else f" ± {scale.factor * picked.uncertainty:.2g}"
-    place = ", ".join(f"{scale.factor * v:.{decimals}f}" for v in picked.position)
-    words = [f"{place}{sure} {scale.unit}", frame]
+    position = ", ".join(f"{scale.factor * v:.{decimals}f}" for v in picked.position)
+    words = [f"{position}{sure} {scale.unit}", frame]
     if shown in picked.scalars:
         words.append(f"{shown} {_number(picked.scalars[shown])}")
     if not picked.measured:
@@ -89,7 +89,7 @@ def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown
 
 
 def point_details(picked: Picked, shown: str = "") -> list[str]:
-    """The index of the point, and its attributes but the one that `describe_pick` has told."""
+    """The index of the point, and its attributes but the one that `describe_pick` has shown."""
     words = [] if picked.id is None else [f"point {picked.id}"]
     words += [f"{name} {_number(value)}" for name, value in picked.scalars.items() if name != shown]
     if picked.color is not None:

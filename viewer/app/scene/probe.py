@@ -41,9 +41,9 @@ class Probe:
         self._picked = None
 
     def pick(self, pixel: tuple[int, int]) -> Picked | None:
-        """The place that a pixel shows, without its spacing, never through a gap (`before_gap`).
+        """The position that a pixel shows, without its spacing, never through a gap (`before_gap`).
 
-        Read from the GPU once for each place and picture.
+        Read from the GPU once for each position and picture.
         """
         if self._viewport.surface is None or not self._viewport.is_there:
             return None

@@ -76,10 +76,10 @@ class Rendering(WindowPart):
     note_of_scan: Callable[[str], None]
 
     def __post_init__(self) -> None:
-        self._missed: set[tuple[str, str]] = set()  # scan, and scalar or backend, which were told
+        self._missed: set[tuple[str, str]] = set()  # scan, and scalar or backend, which were reported
 
     def tell_missing(self, pose: Pose) -> None:
-        """Tell, once a scan, that the chosen backend is not there or cannot draw it, and that neither frame
+        """Report, once a scan, that the chosen backend is not there or cannot draw it, and that neither frame
         nor backend has the number that the user chose to colour by."""
         look, chosen_backend = self.session.document.look, self.session.document.backend
         absent = self.session.scan, f"backend {chosen_backend}"

@@ -105,9 +105,9 @@ class Steering(WindowPart):
         if not (pose and camera):
             return
         framed = self.framing.framed(camera, pose)
-        place = self.session.laid.layers(pose).world_from_pose
-        places = np.abs(framed.places_in_picture(place.points(pose.sample + pose.origin)))
-        if self.framing.subject(pose) is not None and not (places <= (self.viewport.aspect / 2, 0.5)).all():
+        motion = self.session.laid.layers(pose).world_from_pose
+        shown = np.abs(framed.places_in_picture(motion.points(pose.sample + pose.origin)))
+        if self.framing.subject(pose) is not None and not (shown <= (self.viewport.aspect / 2, 0.5)).all():
             self.note_of_scan(
                 "The view shows what the depth camera looks at. Zoom out to see the rest of the scan."
             )
@@ -219,7 +219,8 @@ class Steering(WindowPart):
         where its pods look from, or from the front.
 
         The latter is looked at once a scan: its file may have changed since it was left. Where there is none
-        at first, what is up is guessed of the pose, unless the user told, and told where it is not the usual.
+        at first, what is up is guessed of the pose, unless the user has stated it; a message says so where it
+        is not +y.
         """
         camera = self.session.document.camera
         if not self._is_checked:

@@ -1,5 +1,5 @@
 """The button below the orientation cube that turns a scan upright: it names what is up, and drops the other
-ways while the mouse is on it."""
+axes while the mouse is on it."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from ..session import Session
 from ..toolbox import Toolbox
 from ..window import Window
 from . import navigation, up_menu
-from .canvas import ViewPlace
+from .canvas import ScreenView
 from .counting import Counting
 from .cube import OrientationCube
 from .full_view import FullView
@@ -154,8 +154,8 @@ class SceneView(WindowPart):
             if is_released and is_first and widgets.is_click() and not imgui.get_io().key_shift:
                 self.tools.click(self._pixel())
         if camera := self.session.document.camera:
-            place = ViewPlace(self.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered)
-            self.tools.draw_over(place, self.marks.boxes)
+            on_screen = ScreenView(self.glide.seen(camera), imgui.get_item_rect_min(), size, is_hovered)
+            self.tools.draw_over(on_screen, self.marks.boxes)
 
     def _take_wheel(self, size: ImVec2, radius: float) -> None:
         camera = self.session.document.camera
@@ -201,10 +201,10 @@ class SceneView(WindowPart):
 
 def _draw_pivot(camera: Camera, pivot: Vector, size: ImVec2) -> None:
     """A ring round the point that the view turns about."""
-    place = camera.place_in_picture(pivot)
-    if place is None:
+    middle = camera.place_in_picture(pivot)
+    if middle is None:
         return
-    center = imgui.get_item_rect_min() + size * 0.5 + ImVec2(place[0] * size.y, -place[1] * size.y)
+    center = imgui.get_item_rect_min() + size * 0.5 + ImVec2(middle[0] * size.y, -middle[1] * size.y)
     radius = 0.4 * imgui.get_font_size()
     draw_list = imgui.get_window_draw_list()
     # Light on dark, so that it is seen on any surface.

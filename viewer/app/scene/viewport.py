@@ -39,7 +39,7 @@ class Viewport:
     Several share a renderer, so that what they show of one pose is uploaded once; surfaces, motion and what
     is drawn meanwhile are each one's own.
 
-    place: the rectangle: left, bottom, width, height, pixels from the window's lower left; the next picture
+    rectangle: left, bottom, width, height, pixels from the window's lower left; the next picture
     is as large. request: what was drawn last, None before: pose, camera and how it is shown. problem: why it
     could not be drawn, None where it could; the image before stays then. size: of the picture, pixels. While
     it moves, a picture may be a preview, of fewer points and pixels and softened, which is drawn in full at
@@ -48,11 +48,11 @@ class Viewport:
     shown_at: by the clock, when the last one was there.
     """
 
-    def __init__(self, renderer: Renderer, place: tuple[int, int, int, int] = (0, 0, 1, 1)) -> None:
+    def __init__(self, renderer: Renderer, rectangle: tuple[int, int, int, int] = (0, 0, 1, 1)) -> None:
         self.renderer = renderer
-        self.place = place
+        self.rectangle = rectangle
         self._presenter = Presenter(renderer.gpu)
-        self.size = place[2:]
+        self.size = rectangle[2:]
         self.number = 0
         self.shown_at = -math.inf
         self.surface: Surface | None = None
@@ -74,7 +74,7 @@ class Viewport:
     @property
     def aspect(self) -> float:
         """The rectangle's width / height."""
-        return self.place[2] / self.place[3]
+        return self.rectangle[2] / self.rectangle[3]
 
     def draw(self, request: Request, *, playing: bool = False, held: bool = False) -> bool:
         """Draw a request, unless the picture already shows it; whether it did.
@@ -84,7 +84,7 @@ class Viewport:
 
         playing: other poses will follow in time. held: the camera is dragged or turns.
         """
-        size = self.place[2:]
+        size = self.rectangle[2:]
         wanted = (
             request.pose, request.camera, request.backend, request.params, request.look, request.layers, size,
             self.renderer.gpu.timers.enabled,
@@ -280,10 +280,10 @@ class Viewport:
         return self.request is None
 
     def present(self, dimmed: bool = False) -> None:
-        """Copy it to its place in the window. dimmed: as what is not what was asked for."""
+        """Copy it to its rectangle of the window. dimmed: as what is not what was asked for."""
         if self.surface is not None:
             light = _DIMMED if dimmed else 1.0
-            self._presenter.present(self.surface, *self.place[:2], self.size, light)
+            self._presenter.present(self.surface, *self.rectangle[:2], self.size, light)
 
     @property
     def image(self) -> int | None:

@@ -27,11 +27,11 @@ The Tool has any of
     dialog()                declares windows of its own, over everything
     prompt()                what to say at the top of the view while it has the clicks
     on_click(click)         a click in the view while it has the clicks (`context.take_clicks`); False: the
-                            tool does not take it, and a double click turns the view about that place
-    on_press(mouse)         the left button goes down in the view while it has the clicks, at a place on the
-                            screen; True: a drag from there is its own, and does not move the view
+                            tool does not take it, and a double click turns the view about that position
+    on_press(mouse)         the left button goes down in the view while it has the clicks, at a position on
+                            the screen; True: a drag from there is its own, and does not move the view
     on_drag(click, ends)    a drag of its own has come to what `click` tells, without its spacing; ends: the
-                            button is let go of there, and it is told in full. Without a move it is a click
+                            button is let go of there, and the click has all. Without a move it is a click
     on_arrow(right, up)     an arrow key was pressed while it has the clicks, each -1, 0 or 1; True: it is
                             taken, and goes to no other frame
     spans()                 the `FrameSpan`s to mark on the timeline
@@ -43,10 +43,10 @@ The Tool has any of
                             drawn, and called again at once
 
 What a user would be sorry to lose is in the document (`context.document`, `context.change`), what is under
-way in the Tool. A tool that raises, or leaves widgets begun, is told and switched off until the next start,
-all else goes on; only an InputError in a command, a click, a widget of `panel` or `dialog` or in what was run
-beside the window is the user's mistake, and told alone. Names that begin with an underscore are no tools. No
-other list of tools exists.
+way in the Tool. A tool that raises, or leaves widgets begun, is reported and switched off until the next
+start, all else goes on; only an InputError in a command, a click, a widget of `panel` or `dialog` or in what
+was run beside the window is the user's mistake, and reported alone. Names that begin with an underscore are
+no tools. No other list of tools exists.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ from ....output.overlays import DrawnMarks
 from ....params import param
 from ....scan.times import frame_in_words
 from ...commands import Command, Menu
-from ...scene.canvas import Canvas, ViewPlace
+from ...scene.canvas import Canvas, ScreenView
 from ...tool_context import Click, FrameSpan, ToolContext
 from ...ui import Ui
 from .._cached import Cached
@@ -36,7 +36,10 @@ from .words import gap_spans
 
 TITLE = "Landmarks"
 _GRAB = 0.7  # how near the mouse has to be to take hold of one, in heights of the font
-_OFF = 3.0, 0.03  # deviations, and shares of the scan's radius, that the surface may be off a mirrored place
+_OFF = (
+    3.0,
+    0.03,
+)  # deviations, and shares of the scan's radius, that the surface may be off a mirrored position
 
 
 @dataclass(frozen=True)
@@ -135,8 +138,8 @@ class Tool:
 
     @property
     def proposal(self) -> Proposal | None:
-        """Place of the one that a click sets, as the mirror image of its partner, in scan coordinates;
-        None where that is not known, or it has a place in the frame."""
+        """Position of the one that a click sets, as the mirror image of its partner, in scan coordinates;
+        None where that is not known, or it has a position in the frame."""
         target, shown = self.target, self.shown
 
         def find() -> Proposal | None:
@@ -239,7 +242,7 @@ class Tool:
         return bool(self._pressed)
 
     def under(self, mouse: ImVec2) -> str:
-        """The name of the seen landmark that a place on the screen is on; "" where it is on none."""
+        """The name of the seen landmark that a position on the screen is on; "" where it is on none."""
         if len(self._on_screen) != len(self.shown.landmarks) or not len(self._on_screen):
             return ""
         away = np.hypot(*(self._on_screen - (mouse.x, mouse.y)).T)
@@ -280,11 +283,11 @@ class Tool:
         target, proposal, pose = self.target, self.proposal, self.context.pose
         if target is None or proposal is None or pose is None:
             raise InputError("No mirror position yet: place its mirror partner and a few other pairs first.")
-        place = self.context.motion(pose).points(proposal.position)
-        click = self.context.seen_at(vector(place))
+        position = self.context.motion(pose).points(proposal.position)
+        click = self.context.seen_at(vector(position))
         deviations, share = _OFF
         most = deviations * np.nan_to_num(proposal.sigma) + share * self.context.viewport.bounds(pose).radius
-        if click is None or click.picked is None or np.linalg.norm(click.picked.position - place) > most:
+        if click is None or click.picked is None or np.linalg.norm(click.picked.position - position) > most:
             raise InputError(
                 f"The mirror position of {target.name} is hidden in this view. Turn the view until you "
                 "see it."
@@ -324,9 +327,9 @@ class Tool:
 
     def _look_at(self, number: int) -> None:
         """Bring one into the middle of the view, where it is not seen."""
-        camera, place = self.context.document.camera, vector(self.positions[number])
+        camera, position = self.context.document.camera, vector(self.positions[number])
         if camera is not None and not self.seen[number]:
-            self.context.change("Look at landmark", camera=camera.centered(place), pivot=place)
+            self.context.change("Look at landmark", camera=camera.centered(position), pivot=position)
 
     def begin(self, template: Template | None) -> None:
         """Have the landmarks of a template placed, or such of new names; and take up the tool."""
@@ -400,7 +403,7 @@ class Tool:
         """Declare the dialogs that name a file, while one is open."""
         self.exchange.draw()
 
-    def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
+    def overlay(self, canvas: Canvas, view: ScreenView) -> None:
         """Draw landmarks and notes over the picture."""
         self._grab = _GRAB * canvas.em
         self._on_screen = view.all_on_screen(self.positions)
@@ -432,8 +435,8 @@ class Tool:
 
 
 def _mirrored(target: Landmark, shown: ShownLandmarks, listed: Collection[str]) -> Proposal | None:
-    """The mirrored place of one that has none in the frame. listed: by the template, so that those without a
-    partner are of the midline; of others nobody knows."""
+    """The mirrored position of one that has none in the frame. listed: by the template, so that those without
+    a partner are of the midline; of others nobody knows."""
     number = shown.number(target.name)
     if not target.partner or (number is not None and shown.is_there[number]):
         return None

@@ -1,4 +1,4 @@
-"""Notes that are pinned to places and frames: over the view, and as a list."""
+"""Notes that are pinned to positions and frames: over the view, and as a list."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ....errors import InputError
 from ....geometry import vector
 from ....scan.times import frame_in_words
 from ... import widgets
-from ...scene.canvas import Canvas, Label, ViewPlace
+from ...scene.canvas import Canvas, Label, ScreenView
 from ...tool_context import Click, ToolContext
 
 _COLOR = 0xF2E36B
@@ -41,8 +41,8 @@ class Notebook:
         if click.picked is None:
             raise InputError("No surface here: click on the scan.")
         self.is_pinning = False
-        place = vector(click.motion.inverse.points(np.array(click.picked.place)))
-        self._add(Note("", click.pose.index, place))
+        position = vector(click.motion.inverse.points(np.array(click.picked.place)))
+        self._add(Note("", click.pose.index, position))
 
     def add_to_frame(self, frame: int) -> None:
         """Add a note on a frame."""
@@ -53,8 +53,8 @@ class Notebook:
         self._takes_keyboard = True
         self._context.reveal()
 
-    def draw_over(self, frame: int, canvas: Canvas, view: ViewPlace) -> None:
-        """Draw the notes of a frame over the picture: at their places, those on the frame in a corner."""
+    def draw_over(self, frame: int, canvas: Canvas, view: ScreenView) -> None:
+        """Draw the notes of a frame over the picture: at their positions, those on the frame in a corner."""
         pose, labels, below = self._context.pose, [], view.corner + _CORNER * canvas.em
         for note in self._notes:
             if note.frame not in (None, frame) or pose is None:
@@ -63,10 +63,10 @@ class Notebook:
                 plate = Label([note.text or "..."], np.array([(below.x, below.y)]), _COLOR)
                 below = plate.draw_at(below)
                 continue
-            place = view.on_screen(vector(self._context.motion(pose).points(np.array(note.position))))
-            if place is not None and view.box.clipped(place, place) is not None:
-                canvas.point(place, _COLOR)
-                labels.append(Label([note.text or "..."], np.array([(place.x, place.y)]), _COLOR))
+            position = view.on_screen(vector(self._context.motion(pose).points(np.array(note.position))))
+            if position is not None and view.box.clipped(position, position) is not None:
+                canvas.point(position, _COLOR)
+                labels.append(Label([note.text or "..."], np.array([(position.x, position.y)]), _COLOR))
         canvas.labels(labels)
 
     def draw_list(self) -> None:
@@ -102,5 +102,5 @@ class Notebook:
         if note.frame is not None:
             self._context.seek(note.frame)
         if note.position is not None and camera is not None and pose is not None:
-            place = vector(self._context.motion(pose).points(np.array(note.position)))
-            self._context.change("Look at note", camera=camera.centered(place), pivot=place)
+            position = vector(self._context.motion(pose).points(np.array(note.position)))
+            self._context.change("Look at note", camera=camera.centered(position), pivot=position)

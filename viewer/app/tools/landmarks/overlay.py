@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ....analysis.track import Known
 from ....geometry import vector
 from ....output.overlays import DIM_LANDMARK, MOST_NAMED, STATE_MARKS
-from ...scene.canvas import Canvas, Label, ViewPlace
+from ...scene.canvas import Canvas, Label, ScreenView
 from .shown import names_over
 
 if TYPE_CHECKING:
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
 _CHOSEN, _GHOST = 0xFFFFFF, 0xC9B8FF
 
 
-def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlace) -> None:
-    """Draw the landmarks at their places on the screen, (N, 2), and what a click or a drag would do."""
+def draw(tool: Tool, positions: NDArray[np.float64], canvas: Canvas, view: ScreenView) -> None:
+    """Draw the landmarks at their positions on the screen, (N, 2), and what a click or a drag would do."""
     shown = tool.shown
     low, high = view.box.low, view.box.high
     with np.errstate(invalid="ignore"):  # NaN is not in the view
-        inside = ((places >= (low.x, low.y)) & (places <= (high.x, high.y))).all(axis=1)
+        inside = ((positions >= (low.x, low.y)) & (positions <= (high.x, high.y))).all(axis=1)
     drawn = np.flatnonzero(shown.is_there & inside)
     alphas = np.where(tool.seen, 1.0, DIM_LANDMARK)
     reaches = shown.sure * view.lengths_on_screen(tool.positions)
@@ -35,12 +35,12 @@ def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlac
     for known, is_corner in product((Known.PLACED, Known.TRACKED), (False, True)):
         at = drawn[(shown.known[drawn] == known) & (are_corners[drawn] == is_corner)]
         rings = np.nan_to_num(reaches[at]) if known is Known.TRACKED else np.zeros(len(at))
-        canvas.marks(places[at], STATE_MARKS[known], alphas[at], rings, are_corners=is_corner)
+        canvas.marks(positions[at], STATE_MARKS[known], alphas[at], rings, are_corners=is_corner)
     selected = shown.number(tool.selected)
     if selected is not None and selected in drawn:
-        canvas.ring(ImVec2(*places[selected].tolist()), _CHOSEN, float(alphas[selected]))
+        canvas.ring(ImVec2(*positions[selected].tolist()), _CHOSEN, float(alphas[selected]))
     if tool.context.settings.names and len(drawn):
-        _draw_names(tool, drawn, places, alphas, canvas, view)
+        _draw_names(tool, drawn, positions, alphas, canvas, view)
     if tool.is_active:
         _draw_under_way(tool, canvas, view)
 
@@ -48,10 +48,10 @@ def draw(tool: Tool, places: NDArray[np.float64], canvas: Canvas, view: ViewPlac
 def _draw_names(
     tool: Tool,
     drawn: NDArray[np.intp],
-    places: NDArray[np.float64],
+    positions: NDArray[np.float64],
     alphas: NDArray[np.float64],
     canvas: Canvas,
-    view: ViewPlace,
+    view: ScreenView,
 ) -> None:
     """Names beside the subject, of many landmarks beside their marks; that of a corner of a region while it
     is selected or under the mouse."""
@@ -62,30 +62,30 @@ def _draw_names(
     beside = [number for number in drawn.tolist() if number in pointed]
     texts = [shown.landmarks[number].name for number in beside]
     if len(named) <= MOST_NAMED:
-        canvas.labels([_label(tool, number, names[number], places, alphas) for number in named])
+        canvas.labels([_label(tool, number, names[number], positions, alphas) for number in named])
     else:
         selected = shown.number(tool.selected)
         beside += sorted(named, key=lambda number: number != selected)  # the selected one's before all others
         texts += [names[number] for number in beside[len(texts) :]]
-    canvas.names(texts, places[beside], alphas[beside])
+    canvas.names(texts, positions[beside], alphas[beside])
 
 
 def _label(
-    tool: Tool, number: int, name: str, places: NDArray[np.float64], alphas: NDArray[np.float64]
+    tool: Tool, number: int, name: str, positions: NDArray[np.float64], alphas: NDArray[np.float64]
 ) -> Label:
     color = STATE_MARKS[Known(int(tool.shown.known[number]))].color
-    return Label([name], places[[number]], color, faint=alphas[number] < 1)
+    return Label([name], positions[[number]], color, faint=alphas[number] < 1)
 
 
-def _draw_under_way(tool: Tool, canvas: Canvas, view: ViewPlace) -> None:
-    """The mirrored place of the next one, the one that is dragged, and the loupe."""
+def _draw_under_way(tool: Tool, canvas: Canvas, view: ScreenView) -> None:
+    """The mirrored position of the next one, the one that is dragged, and the loupe."""
     pose, proposal = tool.context.pose, tool.proposal
     if proposal is not None and pose is not None:
         there = view.on_screen(vector(tool.context.motion(pose).points(proposal.position)))
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
             label = Label(
-                ["mirror position: A places it"], np.array([(there.x, there.y)]), _GHOST, faint=True
+                ["mirror position: A positions it"], np.array([(there.x, there.y)]), _GHOST, faint=True
             )
             canvas.labels([label])
     if tool.dragged is not None and (there := view.on_screen(tool.dragged)) is not None:

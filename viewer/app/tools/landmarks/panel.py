@@ -13,7 +13,7 @@ from ....files import printable
 from ....output.overlays import STATE_MARKS
 from ... import widgets
 from ...ui import Ui
-from .words import corners_words, place_words
+from .words import corners_words, position_words
 
 if TYPE_CHECKING:
     from . import Tool
@@ -29,7 +29,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     row = ui.row(widgets.labelled(words, "place"), "Skip", "Not visible here")
     if row.button():
         tool.toggle()
-    ui.tooltip("Click the place of each landmark in the view, one after the other", "landmarks")
+    ui.tooltip("Click the position of each landmark in the view, one after the other", "landmarks")
     imgui.begin_disabled(not tool.is_active)
     if row.button():
         tool.skip()
@@ -88,8 +88,8 @@ def _draw_template(tool: Tool) -> None:
 
 
 def _draw_list(tool: Tool) -> None:
-    """Declare a row of two lines for each: name and state, place and uncertainty; the corners of a region are
-    below a row of it that opens. Only rows in sight are gone through."""
+    """Declare a row of two lines for each: name and state, position and uncertainty; the corners of a region
+    are below a row of it that opens. Only rows in sight are gone through."""
     rows, height = tool.rows(), 2 * imgui.get_text_line_height_with_spacing()
     size = ImVec2(0, min(len(rows), _ROWS) * height + 2 * imgui.get_style().window_padding.y)
     flags = imgui.ChildFlags_.borders | imgui.ChildFlags_.nav_flattened
@@ -148,7 +148,7 @@ def _draw_row(tool: Tool, number: int, height: float) -> None:
     name = widgets.fitted(printable(landmark.title), right - left - gap.x)
     draw_list.add_text(ImVec2(left, corner.y), imgui.get_color_u32(imgui.Col_.text), name)
     draw_list.add_text(ImVec2(right, corner.y), faint, state)
-    words = widgets.fitted(place_words(shown, number, tool.context.scale), room)
+    words = widgets.fitted(position_words(shown, number, tool.context.scale), room)
     below = corner.y + imgui.get_text_line_height_with_spacing()
     draw_list.add_text(ImVec2(left, below), faint, words)
 

@@ -25,9 +25,9 @@ class ShownLandmarks:
     """The landmarks of a document in one frame.
 
     positions: (N, 3) scan coordinates, NaN where they are not known. known: (N,) uint8 of `Known`; GAP also
-    where the user says that it is not there. sure: (N,) how far off a place is at most with 95 %, along the
-    line on which that is worst, scan units; NaN where not known. spacings: (N,) at their keys, 0 where not
-    known.
+    where the user says that it is not there. sure: (N,) how far off a position is at most with 95 %, along
+    the line on which that is worst, scan units; NaN where not known. spacings: (N,) at their keys, 0 where
+    not known.
     """
 
     frame: int
@@ -72,7 +72,7 @@ class ShownLandmarks:
 
     @property
     def is_there(self) -> NDArray[np.bool_]:
-        """(N,): which have a place in the frame."""
+        """(N,): which have a position in the frame."""
         return self.known >= Known.TRACKED
 
     def number(self, name: str) -> int | None:

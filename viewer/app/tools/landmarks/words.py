@@ -20,14 +20,14 @@ _DECIMALS = 6  # at most
 _MOST_NAMED = 4  # of the landmarks that are gaps in a frame
 
 
-def place_words(shown: ShownLandmarks, number: int, scale: Scale) -> str:
+def position_words(shown: ShownLandmarks, number: int, scale: Scale) -> str:
     """The position of one and its uncertainty with 95 %; "" where it is not known."""
     if not shown.is_there[number]:
         return ""
     sure, factor = float(shown.sure[number]), scale.factor
     decimals = min(max(1 - math.floor(math.log10(factor * sure)), 0), _DECIMALS) if sure > 0 else _DECIMALS
-    place = ", ".join(f"{factor * v:.{decimals}f}" for v in shown.positions[number])
-    return f"{place} ± {factor * sure:.2g} {scale.unit}" if sure > 0 else f"{place} {scale.unit}"
+    position = ", ".join(f"{factor * v:.{decimals}f}" for v in shown.positions[number])
+    return f"{position} ± {factor * sure:.2g} {scale.unit}" if sure > 0 else f"{position} {scale.unit}"
 
 
 def corners_words(states: Sequence[str]) -> str:

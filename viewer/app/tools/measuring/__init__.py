@@ -1,4 +1,4 @@
-"""Distances between two clicked places: two landmarks each, which are tracked, and a measure of them."""
+"""Distances between two clicked points: two landmarks each, which are tracked, and a measure of them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from ....scan.inputs import refuse_input
 from ....scan.units import Scale
 from ...commands import Command, Menu
 from ...file_dialog import OPEN, SAVE, FileDialog
-from ...scene.canvas import Canvas, ViewPlace
+from ...scene.canvas import Canvas, ScreenView
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
 from . import panel
@@ -131,8 +131,8 @@ class Tool:
     def set_end(self, end: SurfacePoint) -> None:
         """Begin a distance, or complete the one that was begun.
 
-        An end at the very place and frame of the first, as a second click of a double click sets it, changes
-        nothing.
+        An end at the very position and frame of the first, as a second click of a double click sets it,
+        changes nothing.
         """
         first, self.begun = self.begun, None
         if first is None or (first.frame, first.position) == (end.frame, end.position):
@@ -170,7 +170,7 @@ class Tool:
         self.saving.draw()
         self.reading.draw()
 
-    def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
+    def overlay(self, canvas: Canvas, view: ScreenView) -> None:
         """Draw the distance that was begun; others are drawn as all measures are."""
         pose = self.context.pose
         if self.begun is None or pose is None:
@@ -237,8 +237,8 @@ class Tool:
 
     def _add(self, read: Mapping[str, Ends]) -> None:
         made = self.made
-        known = {_places([end.keys for end in made.owned_by(measure)]) for measure in made.distances}
-        new = {name: ends for name, ends in read.items() if _places(ends) not in known}
+        known = {_positions([end.keys for end in made.owned_by(measure)]) for measure in made.distances}
+        new = {name: ends for name, ends in read.items() if _positions(ends) not in known}
         for name, ends in new.items():
             made = made.with_distance(*ends, name)
         if new:
@@ -248,8 +248,8 @@ class Tool:
         self.context.note(f"Imported {len(new)} distances{there}.")
 
 
-def _places(ends: Sequence[Sequence[SurfacePoint]]) -> tuple[object, ...]:
-    """The frames and places of the ends, to a millionth of their distance: what tells it from others."""
+def _positions(ends: Sequence[Sequence[SurfacePoint]]) -> tuple[object, ...]:
+    """The frames and positions of the ends, to a millionth of their distance: what tells it from others."""
     digits = 6 - math.floor(math.log10(math.dist(ends[0][0].position, ends[1][0].position) or 1))
     return tuple(
         (number, end.frame, *(round(x, digits) for x in end.position))

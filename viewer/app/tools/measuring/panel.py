@@ -75,9 +75,9 @@ def snap_words(ends: Sequence[SurfacePoint]) -> str:
 def _end_words(end: SurfacePoint, scale: Scale) -> str:
     """The key of an end, in full."""
     what = "surface" if end.id is None else f"at point {end.id}"
-    place = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
+    position = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
     spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"
     seen = f", filled from level {end.level}" if end.level else ""
     seen += ", at an outline: it may lie on the surface in front or behind" if end.at_outline else ""
     sure = "" if end.uncertainty is None else f" ± {scale.factor * end.uncertainty:.2g}"
-    return f"{what}, {frame_in_words(end.frame)}: {place}{sure} {scale.unit}, spacing {spacing}{seen}"
+    return f"{what}, {frame_in_words(end.frame)}: {position}{sure} {scale.unit}, spacing {spacing}{seen}"

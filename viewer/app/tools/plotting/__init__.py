@@ -22,7 +22,7 @@ from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
 from ...commands import Command, Menu
 from ...file_dialog import SAVE, FileDialog
-from ...scene.canvas import Canvas, ViewPlace
+from ...scene.canvas import Canvas, ScreenView
 from ...tool_context import Click, ToolContext
 from ...ui import Ui
 from .._cached import Cached
@@ -232,7 +232,7 @@ class Tool:
         """Declare the section of the panel."""
         panel.draw(self, ui)
 
-    def overlay(self, canvas: Canvas, view: ViewPlace) -> None:
+    def overlay(self, canvas: Canvas, view: ScreenView) -> None:
         """Draw the paths of landmarks, what is measured in the frame, and the region that is being drawn."""
         self.paths.draw(self.settings, self.choices, canvas, view)
         self.lines.draw(self.landmarks, self.unseen, self.pointed, canvas, view)

@@ -13,7 +13,7 @@ from ....analysis.surface_point import SurfacePoint
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
-from ...scene.canvas import Canvas, ViewPlace
+from ...scene.canvas import Canvas, ScreenView
 from ...tool_context import Click, ToolContext
 
 FEWEST, MOST = 6, 16  # corners of a region
@@ -28,7 +28,7 @@ class Lasso:
     def __init__(self, context: ToolContext) -> None:
         self.through = False
         self._context = context
-        self._places: list[Vector] = []  # that were drawn over, where the scan is shown
+        self._positions: list[Vector] = []  # that were drawn over, where the scan is shown
 
     @property
     def is_drawn(self) -> bool:
@@ -38,7 +38,7 @@ class Lasso:
     @property
     def is_under_way(self) -> bool:
         """Whether one is being drawn."""
-        return bool(self._places)
+        return bool(self._positions)
 
     def toggle(self) -> None:
         """Have the next drag draw one, or not."""
@@ -48,29 +48,30 @@ class Lasso:
     def put_away(self) -> bool:
         """Let drags be as without it; whether they were not."""
         was_drawn = self.is_drawn
-        self._places.clear()
+        self._positions.clear()
         self._context.leave_clicks()
         return was_drawn
 
     def abandon(self) -> None:
         """Let go of the outline that is being drawn."""
-        self._places.clear()
+        self._positions.clear()
 
     def take(self, click: Click, ends: bool) -> None:
-        """The drag has come to a place. Raises InputError where it ends and has gone round nothing."""
+        """The drag has come to a position. Raises InputError where it ends and has gone round nothing."""
         if click.picked is not None:
-            self._places.append(click.picked.place)
+            self._positions.append(click.picked.place)
         self._context.redraw()
         if ends:
-            places = without_overlap(np.array(self._places).reshape(-1, 3))
-            self._places.clear()
-            self._add(places)
+            positions = without_overlap(np.array(self._positions).reshape(-1, 3))
+            self._positions.clear()
+            self._add(positions)
 
-    def _add(self, places: NDArray[np.float64]) -> None:
+    def _add(self, positions: NDArray[np.float64]) -> None:
         """Add a region: landmarks at its corners, its area and its outline."""
         made = self._context.document.part(Landmarks)
         points = [
-            self._surface_point(place) for place in (places[corners_of(places)] if len(places) > 2 else ())
+            self._surface_point(position)
+            for position in (positions[corners_of(positions)] if len(positions) > 2 else ())
         ]
         found = [point for point in points if point is not None]
         if len(found) < 3:
@@ -87,52 +88,52 @@ class Lasso:
         self._context.change("Add region", made)
         self.put_away()
 
-    def _surface_point(self, place: NDArray[np.float64]) -> SurfacePoint | None:
-        """The point at a place that was drawn over; None where nothing was measured there."""
-        click = self._context.seen_at(vector(place))
+    def _surface_point(self, position: NDArray[np.float64]) -> SurfacePoint | None:
+        """The point at a position that was drawn over; None where nothing was measured there."""
+        click = self._context.seen_at(vector(position))
         if click is None or click.picked is None or not click.picked.measured:
             return None
         return SurfacePoint.of(click.picked, click.pose, place=click.motion)
 
-    def draw(self, canvas: Canvas, view: ViewPlace) -> None:
+    def draw(self, canvas: Canvas, view: ScreenView) -> None:
         """Draw the outline as far as it goes."""
-        if len(self._places) > 1:
-            places = view.all_on_screen(np.array([*self._places, self._places[0]]))
-            alphas = np.ones(len(places))
+        if len(self._positions) > 1:
+            positions = view.all_on_screen(np.array([*self._positions, self._positions[0]]))
+            alphas = np.ones(len(positions))
             alphas[-2] = 0.4  # what will close it
-            canvas.path(places, [_COLOR] * len(places), alphas, dots=False)
+            canvas.path(positions, [_COLOR] * len(positions), alphas, dots=False)
 
     def prompt(self) -> str:
         """The words that say what a drag does."""
         return "Press on the surface, draw round the region, let go. Esc to stop."
 
 
-def without_overlap(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def without_overlap(positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """An outline, (M, 3), without its end as far as that has come back to its beginning: to less than 3 % of
     its width."""
-    if not len(places):
-        return places
-    away = np.linalg.norm(places - places[0], axis=1)
+    if not len(positions):
+        return positions
+    away = np.linalg.norm(positions - positions[0], axis=1)
     is_away = np.flatnonzero(away > _OFF * away.max())
-    return places[: is_away[-1] + 1] if len(is_away) else places[:1]
+    return positions[: is_away[-1] + 1] if len(is_away) else positions[:1]
 
 
-def corners_of(places: NDArray[np.float64]) -> NDArray[np.intp]:
-    """The places of a closed outline, (M, 3), that tell its form, in their order, (K,): two that lie far
+def corners_of(positions: NDArray[np.float64]) -> NDArray[np.intp]:
+    """The positions of a closed outline, (M, 3), that tell its form, in their order, (K,): two that lie far
     apart, then again and again the one that lies farthest off the line between those beside it.
 
-    K is 6 to 16, as few as keep the outline within 3 % of its width, and M where that is less.
+    K is 6 to 16, as few as leave the outline within 3 % of its width, and M where that is less.
     """
-    count = len(places)
-    first = int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmax())
-    away = np.linalg.norm(places - places[first], axis=1)
+    count = len(positions)
+    first = int(np.linalg.norm(positions - positions.mean(axis=0), axis=1).argmax())
+    away = np.linalg.norm(positions - positions[first], axis=1)
     corners, width = sorted({first, int(away.argmax())}), float(away.max())
     while len(corners) < min(MOST, count):
         off = np.zeros(count)
         for start, end in zip(corners, [*corners[1:], corners[0] + count], strict=True):
             between = np.arange(start + 1, end) % count
-            side = places[end % count] - places[start]
-            offsets = places[between] - places[start]
+            side = positions[end % count] - positions[start]
+            offsets = positions[between] - positions[start]
             share = np.clip(offsets @ side / max(side @ side, np.finfo(float).tiny), 0, 1)
             off[between] = np.linalg.norm(offsets - share[:, None] * side, axis=1)
         off[corners] = -1

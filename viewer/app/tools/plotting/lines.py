@@ -19,7 +19,7 @@ from ....mesh.geodesic import length_of, steps_along
 from ....output.overlays import DIM_LINE, LINE_COLOR, LINE_SLACK, DrawnPath, rounded
 from ....output.plots import color_of_curve
 from ....scan.units import Scale
-from ...scene.canvas import Canvas, Label, ViewPlace
+from ...scene.canvas import Canvas, Label, ScreenView
 from ...tool_context import ToolContext
 from .._cached import Cached
 from .._seen import seen_in_view
@@ -122,7 +122,7 @@ class MeasureLines:
         hidden: tuple[str, ...],
         pointed: str | None,
         canvas: Canvas,
-        view: ViewPlace,
+        view: ScreenView,
     ) -> None:
         """Draw the lines and their labels. pointed: the measure that the mouse points at, by name."""
         pose, labels, shown = self._context.pose, [], self.shown(made, hidden)

@@ -16,7 +16,7 @@ from ....look import color_table
 from ....output.overlays import DIM_LINE, NOTHING_DRAWN, DrawnMarks, DrawnPath, rounded, runs_of
 from ....output.plots import color_of_path
 from ....rigid import STILL, Rigid
-from ...scene.canvas import Canvas, ViewPlace
+from ...scene.canvas import Canvas, ScreenView
 from ...tool_context import ToolContext
 from .._cached import Cached
 from .._seen import seen_in_view
@@ -88,7 +88,7 @@ class Paths:
             self.fastest = float(max(speeds, default=0.0))
         return found
 
-    def draw(self, settings: Settings, choices: CurveChoices, canvas: Canvas, view: ViewPlace) -> None:
+    def draw(self, settings: Settings, choices: CurveChoices, canvas: Canvas, view: ScreenView) -> None:
         """Draw them, as they lie about the pose that is shown."""
         pose, context = self._context.pose, self._context
         if not settings.trajectories or pose is None:
