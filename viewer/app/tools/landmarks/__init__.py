@@ -190,7 +190,7 @@ class Tool:
         another frame is shown."""
         number = self.shown.number(self.selected)
         is_there = number is not None and bool(self.shown.is_there[number])
-        return self.is_active and is_there and self._arrows_in == self.frame
+        return self.is_active and is_there and self._arrows_in == self.frame == self.context.index
 
     def prompt(self) -> str:
         """The words that say what a click does, and what arrow keys move."""
@@ -431,6 +431,8 @@ class Tool:
 
     def advance(self, budget: float) -> bool:
         """Have landmarks followed; whether something new was found."""
+        if self._arrows_in != self.context.index:
+            self._arrows_in = None
         return self.follower.advance(self.context.settings.follow)
 
 
