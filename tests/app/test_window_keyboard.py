@@ -17,7 +17,7 @@ from viewer.camera import Camera
 def running(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningApp]:
     scan = tmp_path_factory.mktemp("scan")
     for number in range(5):
-        points = np.random.default_rng(number).uniform((-1, -2, -3), (1, 2, 3), (4000, 3))
+        points = np.random.default_rng(number).uniform((-1, -2, -3), (1, 2, 3), (400, 3))
         np.save(scan / f"{number}.npy", points)
     with running_app(screen, tmp_path_factory.mktemp("app"), scan) as app:
         yield app

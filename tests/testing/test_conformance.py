@@ -22,11 +22,13 @@ TOOLS = [check for name in tool_names() for check in tool_checks(name)]
 MEASURES = [check for kind in measure_kinds() for check in measure_checks(kind)]
 SUFFIXES = sorted({*formats.known_suffixes()} - {".laz"})
 _RARE = tuple(f"odd_size_{width}x{height}" for width, height in SIZES[2:])  # which repeat what others show
+_OTHER_FEEDS = ("=gs", "=ubo")  # which bring the points that another feed brings
 
 
 def parameters(check: Check) -> object:
     """A check of a backend as a parameter of a test."""
-    marks = [pytest.mark.backend(check.subject), *([pytest.mark.slow] if check.name in _RARE else [])]
+    is_slow = check.name in _RARE or str(check).endswith(_OTHER_FEEDS)
+    marks = [pytest.mark.backend(check.subject), *([pytest.mark.slow] if is_slow else [])]
     return pytest.param(check, id=str(check), marks=marks)
 
 
