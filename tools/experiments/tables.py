@@ -148,7 +148,7 @@ class Machines:
 
 def _machine(run: StoredRun, backend: str) -> str:
     """Where, when and how a run was measured."""
-    sentences = [f"**{run['device']}** with {run['processors']} processors and the driver {run['driver']}"]
+    sentences = [f"**{run['device']}** ran with {run['processors']} processors and the driver {run['driver']}"]
     views = sorted({len(row["gpu_ms"]) for row in run.get("rows", ()) if "gpu_ms" in row})
     if views:  # fewer of a scan where it was stopped
         count = f"{' or '.join(map(str, views))} view{'' if views == [1] else 's'}"
@@ -156,7 +156,7 @@ def _machine(run: StoredRun, backend: str) -> str:
         sentences.append(f"Pictures have {'x'.join(map(str, run['size']))} pixels, and each scan has {count}")
     params = (f"{name}={str(value).lower()}" for name, value in run["params"].items())
     used = f", with `{backend}` and the parameters `{' '.join(params)}`" if backend else ""
-    sentences.append(f"Version {run['version']} of Scan4D was measured on {run['date']}{used}")
+    sentences.append(f"We measured version {run['version']} of Scan4D on {run['date']}{used}")
     return " ".join(f"{sentence.rstrip('.')}." for sentence in [*sentences, *filter(None, [run["note"]])])
 
 
