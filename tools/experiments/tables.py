@@ -148,7 +148,9 @@ class Machines:
 
 def _machine(run: StoredRun, backend: str) -> str:
     """Where, when and how a run was measured."""
-    sentences = [f"**{run['device']}** ran with {run['processors']} processors and the driver {run['driver']}"]
+    sentences = [
+        f"**{run['device']}** ran with {run['processors']} processors and the driver {run['driver']}"
+    ]
     views = sorted({len(row["gpu_ms"]) for row in run.get("rows", ()) if "gpu_ms" in row})
     if views:  # fewer of a scan where it was stopped
         count = f"{' or '.join(map(str, views))} view{'' if views == [1] else 's'}"
