@@ -42,7 +42,7 @@ def test_a_full_disk_is_one_message(
         with small_disk(tmp_path / f"disk{number}", max(4, int(share * size / 4096) * 4)) as disk:
             done = run(*WRITERS[name], disk / name)
             assert (done.code, done.out) == (2, "")
-            full = f"{disk / name}: cannot be written: the disk is full. Make room, or use another disk"
+            full = f"{disk / name}: cannot be written: the disk is full. Free some space, or use another disk"
             assert done.err.splitlines()[-1] == f"scan4d: {full}"
             assert list(disk.iterdir()) == []
 

@@ -61,7 +61,7 @@ def test_converts_to_itself_and_points_do_not(
         name = f"f{index}.exr"
         assert (tmp_path / name).read_bytes() == (scan / name).read_bytes()
     assert cli.main(["convert", "demo", "--pose", "1", str(tmp_path / "demo.exr")]) == 2
-    assert "EXR holds range views, and this scan has none" in capsys.readouterr().err
+    assert "EXR stores range views, but this scan has none" in capsys.readouterr().err
     assert not (tmp_path / "demo.exr").exists()
 
 
@@ -137,7 +137,7 @@ def test_more_points_than_the_driver_takes_are_not_even_merged(
     with open_scan(scan) as timeline:
         pose = timeline.pose(2)
     monkeypatch.setattr(renderer.gpu, "max_points", 100)
-    with pytest.raises(InputError, match="points in one pose; this driver takes 100"):
+    with pytest.raises(InputError, match="points in one pose, but this driver can handle only 100"):
         render_frame(
             renderer, Request(pose, Camera.orbit(pose.bounds), "points"), Surface(renderer.gpu, (64, 48))
         )

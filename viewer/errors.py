@@ -69,7 +69,7 @@ def shortened(value: object) -> str:
 
 
 _PERMISSION = "permission denied", "Check the permissions of the file and of its folder"
-_FULL = "the disk is full", "Make room, or use another disk"
+_FULL = "the disk is full", "Free some space, or use another disk"
 _SYSTEM = {
     errno.EACCES: _PERMISSION,
     errno.EPERM: _PERMISSION,
@@ -77,11 +77,11 @@ _SYSTEM = {
     getattr(errno, "EDQUOT", errno.ENOSPC): _FULL,  # a share of it
     errno.EFBIG: ("the file would be larger than this disk allows", "Use another disk"),
     errno.EROFS: ("its file system is read-only", "Use another folder"),
-    errno.ENAMETOOLONG: ("its name is too long", "Use a shorter one"),
+    errno.ENAMETOOLONG: ("its name is too long", "Use a shorter name"),
     errno.ENOENT: ("no such file or folder", "Check its name"),
     errno.EISDIR: ("is a folder", "Name a file in it"),
     errno.ENOTDIR: ("a part of its path is not a folder", "Check its name"),
-    errno.ELOOP: ("its links form a loop", "Name the file itself"),
+    errno.ELOOP: ("its links form a loop", "Name the file itself, not a link"),
     errno.EMFILE: ("too many files are open", "Close other programs, or raise 'ulimit -n'"),
     errno.ENFILE: ("too many files are open", "Close other programs"),
     errno.ENOMEM: ("not enough memory", "Close other programs"),

@@ -83,7 +83,7 @@ def extensions_of(kind: str, own: Iterable[str]) -> list[Extension]:
             holders[extension.name] = extension.package
             found.append(extension)
         elif extension not in _problems:
-            _report(extension, f"is not used: {holder} has one of this name", "Rename its entry point")
+            _report(extension, f"is not used: {holder} already has this name", "Rename its entry point")
     return found
 
 

@@ -47,7 +47,7 @@ def output_folder(path: Path) -> None:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         what, hint = explained(error)
-        raise InputError(f"cannot be made: {what}", path, hint) from error
+        raise InputError(f"cannot be created: {what}", path, hint) from error
 
 
 def _store(path: Path) -> None:

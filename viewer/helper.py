@@ -187,7 +187,7 @@ def _start() -> subprocess.Popen[bytes]:
     try:
         return start_python(f"from {__name__} import serve; serve()", nice=_NICE, stdin=subprocess.PIPE)
     except OSError as error:
-        raise Scan4DError(f"no process can be started ({error.strerror})") from error
+        raise Scan4DError(f"Scan4D cannot start a process ({error.strerror})") from error
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

@@ -59,7 +59,7 @@ def missing_packages(*names: str) -> MissingPackageError:
     """The error for libraries that are not installed, by the names that `PACKAGES` lists."""
     from .errors import MissingPackageError
 
-    what = f"Scan4D needs what is not installed: {', '.join(names)}"
+    what = f"Scan4D needs packages that are not installed: {', '.join(names)}"
     packages = " ".join(PACKAGES[name] for name in names)
     error = MissingPackageError(what, hint=f"Install it: {sys.executable} -m pip install {packages}")
     error.name = names[0]

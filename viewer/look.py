@@ -132,12 +132,14 @@ class Look:
     )  # fmt: skip
     ambient: float = param(0.25, "Ambient light", low=0, high=1, group="Light", unless=_FLAT)
     diffuse: float = param(
-        0.75, "Diffuse share of Phong lighting", low=0, high=1, group="Light", unless=_FLAT
+        0.75, "Strength of the diffuse light (Phong)", low=0, high=1, group="Light", unless=_FLAT
     )
     specular: float = param(
-        0.12, "Specular share of Phong lighting", low=0, high=1, group="Light", unless=_FLAT
+        0.12, "Strength of the highlights (Phong, specular)", low=0, high=1, group="Light", unless=_FLAT
     )
-    shininess: float = param(24.0, "Exponent of Phong lighting", low=1, high=200, group="Light", unless=_FLAT)
+    shininess: float = param(
+        24.0, "Sharpness of the highlights (Phong exponent)", low=1, high=200, group="Light", unless=_FLAT
+    )
     eye_dome: bool | None = param(
         None, "Darken the edges at depth steps; auto: if the picture has no other light",
         type=bool, title="Edge shading (eye-dome)", group="Light", basic=True,

@@ -76,7 +76,8 @@ class Parameter:
             return None
         result = _READERS[self.type](value)
         if result is None:
-            raise InputError(f"'{shortened(value)}' is no {self.type.__name__}", self.name, self.help)
+            what = f"'{shortened(value)}' is not {_KINDS[self.type]}"
+            raise InputError(what, self.name, self.help)
         if self.choices and result not in self.choices:
             raise unknown_name(self.name, result, self.choices)
         if (self.low is not None and result < self.low) or (self.high is not None and result > self.high):
@@ -125,7 +126,7 @@ _DEFAULTS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def param(default: Any, help: str, **declared: Unpack[Declared]) -> Any:
+def param(default: Any, help: str = "", **declared: Unpack[Declared]) -> Any:
     """A dataclass field that is a parameter, as `Parameter` says."""
     facts: dict[str, Any] = {**_DEFAULTS, "type": default.__class__, **declared}
     conditions = _conditions(facts.pop("when", None), negated=False)
@@ -151,12 +152,12 @@ def _described(cls: Hashable) -> tuple[Parameter, ...]:
         where = f"{cls.__qualname__}.{field.name}"
         if "help" not in field.metadata:
             raise TypeError(f"{where} is not declared with param(...)")
+        if not field.metadata["help"]:
+            raise TypeError(f"{where} has no help: declare it with param(default, 'what it does')")
         if (type_ := field.metadata["type"]) not in _READERS:
-            raise TypeError(
-                f"{where} has values of type {type_.__name__}; they can be bool, int, float or str"
-            )
+            raise TypeError(f"{where} has the type {type_.__name__}, but must be a bool, int, float or str")
         if (affects := field.metadata["affects"]) not in AFFECTS:
-            raise TypeError(f"{where} affects '{affects}'; it can affect {', '.join(AFFECTS)}")
+            raise TypeError(f"{where} affects '{affects}', but can affect only {', '.join(AFFECTS)}")
         if unknown := sorted(field.metadata.keys() - known):
             raise TypeError(f"{where}: param has no argument {', '.join(unknown)}")
     declared = tuple(
@@ -176,16 +177,16 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
     """The mistake in a declaration, empty where there is none. by_name: all of the dataclass."""
     others = {name: other for name, other in by_name.items() if name != parameter.name}
     if parameter.key and parameter.type is not bool:
-        return "has a key, which switches a bool alone"
+        return "has a key, but only a bool can have one"
     if parameter.key and parameter.key in (other.key for other in others.values()):
-        return f"has the key '{parameter.key}' of another"
+        return f"has the key '{parameter.key}', which another parameter also has"
     for old in parameter.deprecated:
         if old in by_name or any(old in other.deprecated for other in others.values()):
-            return f"was called '{old}', as another is or was"
+            return f"has the former name '{old}', which another parameter has or had"
     for condition in parameter.when:
         if condition.parameter not in others:
             known = ", ".join(others)
-            return f"goes by '{condition.parameter}', which is no other parameter; there are {known}"
+            return f"depends on '{condition.parameter}', which is not another parameter. Known: {known}"
     try:
         parameter.parse(parameter.default)
         for word in parameter.words:
@@ -194,7 +195,7 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
             for value in condition.values:
                 others[condition.parameter].parse(value)
     except InputError as error:
-        return f"has a default or a condition that cannot be: {error}"
+        return f"has an invalid default or condition: {error}"
     return ""
 
 
@@ -258,3 +259,4 @@ def _str(value: object) -> str | None:
 
 
 _READERS: dict[type, Callable[[object], Any]] = {bool: _bool, int: _int, float: _float, str: _str}
+_KINDS = {bool: "true or false", int: "a whole number", float: "a usable number", str: "a text"}

@@ -28,7 +28,7 @@ class Rigid:
     def __post_init__(self) -> None:
         matrix = np.array(self.matrix, np.float64)
         if matrix.shape != (4, 4) or not is_rigid(matrix, _EXACT):
-            raise InputError("a transform is not a rotation and a translation", hint="Give a 4 x 4 matrix")
+            raise InputError("a transform must be a rotation and a translation", hint="Give a 4 x 4 matrix")
         matrix.setflags(write=False)
         object.__setattr__(self, "matrix", matrix)
         object.__setattr__(self, "is_identity", bool((matrix == np.eye(4)).all()))

@@ -108,7 +108,7 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
         close(app)
     settings.write_text("{")
     with running_app(screen, tmp_path, study / "one") as app:
-        app.told(r"settings\.json: is damaged\. It is kept as settings\.old\.json")
+        app.told(r"settings\.json: is damaged\. Scan4D renamed it to settings\.old\.json")
         assert described(app)["pose"] == 1, "its document is a file of its own"
         close(app)
     assert settings.with_name("settings.old.json").read_text() == "{"
@@ -132,7 +132,7 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
         screen.do("key", "Next")
         app.see(scan=str(study / "three.npy"))
         app.drop(study / "wrong.json")
-        app.told("wrong.json: is no recording")
+        app.told("wrong.json: is not a recording")
         app.drop(study / "worse 1%.ply")
         app.told("Cannot open: .*worse 1%.ply")
         app.drop(study / "one", study / "wrong.json")
@@ -193,7 +193,7 @@ def test_the_dialog_says_at_the_field_what_cannot_be_opened(
         for path, why in (
             (study / "missing.ply", r"missing\.ply: no such file"),
             (damaged / "1.npy", r"1\.npy"),
-            (damaged / "%d.npy", "none of its 3 frames can be read"),
+            (damaged / "%d.npy", "Scan4D cannot read any of its 3 frames"),
         ):
             app.do(("key", "Tab"), ("key", "ctrl+a", "type", "--delay", 15, path))
             app.settle()
@@ -226,7 +226,7 @@ def test_a_folder_that_cannot_be_read_leaves_the_open_scan(
         app.see(frame=1)
         before = app.settle()
         app.drop(damaged)
-        app.told("Cannot open: damaged: none of its 3 frames can be read")
+        app.told("Cannot open: damaged: Scan4D cannot read any of its 3 frames")
         after = app.settle()
         assert (after.scan, after.frame) == (str(study / "one"), 1)
         assert (after.camera, after.document) == (before.camera, before.document)

@@ -43,7 +43,7 @@ def test_what_is_kept_is_found_by_the_content_of_a_renamed_folder(tmp_path: Path
     assert isinstance(offer, Offer)
     assert f"{old} (bookmarks), which is no longer there" in offer
     ((title, use),) = offer.choices.items()
-    assert title == "Use kept bookmarks of doe"
+    assert title == "Use bookmarks of doe"
     use()
     assert [(each.scan, each.pose, each.document) for each in used] == [(str(old), 2, MARKED)]
     assert stored(str(new)) is None, "nothing is used before the user says so"
@@ -69,7 +69,7 @@ def test_copies_are_offered_by_what_was_made_last() -> None:
     assert [each.scan for each in stored_elsewhere("/new", HASH)] == ["/scans/b", "/scans/copy"]
     offer = offer_of_stored("/new", found(HASH), list)
     assert isinstance(offer, Offer)
-    assert list(offer.choices) == ["Use kept bookmarks of b", "Use kept bookmarks of copy"]
+    assert list(offer.choices) == ["Use bookmarks of b", "Use bookmarks of copy"]
 
 
 def test_other_files_under_the_same_name_are_told_and_what_was_made_is_put_aside() -> None:

@@ -177,7 +177,7 @@ def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> No
         rendering = Rendering(session, Playback(timeline, session), told.append)
         for _ in range(2):
             rendering.tell_missing(BARE)
-    assert told == ["This Scan4D has no renderer 'gone'. Points draws it instead."]
+    assert told == ["This version of Scan4D has no renderer 'gone'. Points draws it instead."]
     assert session.document == document, "it comes back where the renderer is there"
 
 

@@ -225,7 +225,7 @@ def test_set_c_distances_to_a_table_a_film_colours_and_back(tmp_path: Path) -> N
         person.press("m")
         for corner in corners:
             person.click(corner)
-        person.push(PANEL, "Export CSV...")
+        person.push(PANEL, "Export distances...")
         person.press("Return")
         file = app.told(r"Saved (.*\.csv), in all 64 frames")[1]
         assert Path(file).name == "demo_distances.csv"

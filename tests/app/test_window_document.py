@@ -267,8 +267,8 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         path.write_text(json.dumps(data))
         hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
-        app.told("these cannot be read: parts.landmarks")
-        app.told("This Scan4D has no renderer 'cubist': .* draws it instead")
+        app.told("cannot read some of the saved changes: parts.landmarks")
+        app.told("This version of Scan4D has no renderer 'cubist': .* draws it instead")
         state = app.see(frame=1)
         assert state.document["backend"] == "cubist"
         assert state.document["camera"] == data["document"]["camera"]
@@ -318,6 +318,6 @@ def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
     )
     data: dict[str, Any] = json.loads(path.read_text())
     path.write_text(json.dumps(data | {"document": 3}))
-    assert f"{path}, document: is not values by name but 3" in refused(path)
+    assert f"{path}, document: is not an object with named values but 3" in refused(path)
     path.write_text("{")
     assert "is not JSON" in refused("demo", path)

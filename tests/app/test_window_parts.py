@@ -75,7 +75,7 @@ def test_remembered_fields_come_back_and_values_that_cannot_be_used_do_not(
 
 
 def test_a_need_that_nobody_has_and_a_circle_of_needs_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(TypeError, match="'room' needs 'size', which nobody has"):
+    with pytest.raises(TypeError, match="'room' needs 'size', which no part provides"):
         made(monkeypatch, Lamp, Room)
     with pytest.raises(TypeError, match="circle -> arc -> circle"):
         made(monkeypatch, Circle, Arc)

@@ -255,7 +255,7 @@ def test_what_two_tools_want_alike_goes_to_the_first_and_mistakes_are_told(
     assert f"switched off fourth {off}: a command 'measure' exists already" in told
     assert f"switched off fifth {off}: TypeError: COMMANDS['Tools'] must be a tuple of commands" in told
     assert told.count("a button pressed wrongly") == 1, "once while it lasts"
-    assert "The tool 'first' of other-tools 2.0 is not used: acme-tools 1.0 has one of this name" in told
+    assert "The tool 'first' of other-tools 2.0 is not used: acme-tools 1.0 already has this name" in told
     assert "not the first" not in told
     assert "switched off sixth" not in told
     assert "switched off first" not in told
@@ -299,15 +299,15 @@ def test_what_cannot_be_kept_is_refused_and_the_document_stays_whole(
         keys = TAIL.format(name=name, key=f"Alt+{name[0]}")
         (folder / f"{name}.py").write_text(KEEPING.format(name=name, kind=kind) + code + keys)
     with running_app(screen, tmp_path, scan, before=use_tools(folder)) as app:
-        app.told(r"switched off listed of acme-tools .*: TypeError: Kept\.all cannot be kept as list")
+        app.told(r"switched off listed of acme-tools .*: TypeError: Kept\.all cannot be stored as list")
         screen.do("key", "alt+p")
         click(app, *middle(app))
         screen.do("key", "alt+a")
         x, y = middle(app)
         click(app, x + 60, y)  # elsewhere: at the same pixel it could be the second click of a double click
-        app.told(r"switched off array .*: TypeError: array\.all\[0\]\.position is to be a tuple, not array")
+        app.told(r"switched off array .*: TypeError: array\.all\[0\]\.position must be a tuple, not array")
         close(app)
-    assert not [note for note in app.notes if "not kept" in note]
+    assert not [note for note in app.notes if "cannot be saved" in note]
     (kept,) = (tmp_path / "config" / "scan4d" / "scans").glob("*.json")
     (position,) = json.loads(kept.read_text())["document"]["parts"]["place"]["all"]
     assert len(position["position"]) == 3
@@ -395,11 +395,11 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         height, number = pointed(app)
         assert number == pytest.approx(5 * height[1], abs=0.05)
         press(app, "r")
-        app.told("Cannot record: the colours come from 'rising'")
+        app.told("Cannot record: Scan4D computed the colours 'rising'")
         press(app, "ctrl+e")
-        app.told("Cannot export: the colours come from 'rising'")
+        app.told("Cannot export: Scan4D computed the colours 'rising'")
         press(app, "p")
-        app.told("cannot be replayed: the colours come from 'rising'")
+        app.told("cannot be replayed: Scan4D computed the colours 'rising'")
         colored = Path(app.told(r"Saved (.+\.png)")[1])
         assert len(np.unique(pixels(colored).reshape(-1, 3), axis=0)) > 50
         with pytest.raises(InputError):

@@ -11,7 +11,7 @@ from virtual_screen import PATIENCE, RunningApp, running_app, stored_of, virtual
 
 from viewer.document.saved_session import SavedSession
 
-CHANGED = "what is kept of it was changed elsewhere, perhaps in another window"
+CHANGED = "something else, perhaps another window, has saved changes of this scan"
 
 
 def add_bookmark(app: RunningApp, count: int, right: int) -> None:

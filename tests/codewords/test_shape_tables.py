@@ -84,7 +84,11 @@ def test_the_table_is_packed() -> None:
 
 @pytest.mark.parametrize(
     ("steps", "words"),
-    [((17, 2, 60, 5), "60 normals"), ((17, 0, 61, 5), "at least 1"), ((400, 2, 61, 5), "up to 64 pixels")],
+    [
+        ((17, 2, 60, 5), "60 normals"),
+        ((17, 0, 61, 5), "at least 1"),
+        ((400, 2, 61, 5), "not exceed 64 pixels"),
+    ],
 )
 def test_steps_that_make_no_table_are_refused(steps: tuple[int, int, int, int], words: str) -> None:
     with pytest.raises(InputError, match=words):

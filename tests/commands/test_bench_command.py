@@ -127,9 +127,9 @@ def test_a_damaged_scene_is_left_out_and_the_others_are_measured(run: Run, tmp_p
     damaged = ("--data", tmp_path / "data", "--suite", "scenes")
     done = run("bench", *damaged, *SMALL, "--scene", "plane", "bunny", "plane", "-o", tmp_path / "out")
     assert done.code == 0
-    assert "bunny is left out" in done.err
+    assert "leaves out bunny" in done.err
     assert {row["scene"] for row in read_rows(tmp_path / "out")} == {"plane"}
-    assert "bunny is left out" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "leaves out bunny" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
 
     done = run("bench", *damaged, *SMALL, "--scene", "bunny", "-o", tmp_path / "none")
     assert done.code == 2

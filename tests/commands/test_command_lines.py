@@ -284,7 +284,9 @@ def test_output_that_cannot_be_written_is_told(where: str, words: str, tmp_path:
     line = f"{sys.executable} -m viewer.cli {words.format(tmp_path)} {where}"
     done = subprocess.run(line, shell=True, capture_output=True, text=True, cwd=ROOT)
     assert done.returncode == 1
-    why = "the stream is closed" if where == ">&-" else "the disk is full. Make room, or use another disk"
+    why = (
+        "the stream is closed" if where == ">&-" else "the disk is full. Free some space, or use another disk"
+    )
     assert done.stderr == f"scan4d: standard output: cannot be written: {why}\n"
 
 

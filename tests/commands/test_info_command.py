@@ -114,7 +114,7 @@ def test_info_says_how_many_poses_it_tried(
         formats.write(tmp_path / f"f{n}.npz", cloud_at(0))
     facts = json.loads(run("info", tmp_path, "--json").out)
     assert (facts["pose"], facts["unreadable"]) == (readable[0], broken)
-    told = f"unreadable  {broken} of {broken + 1} poses that were tried\n"
+    told = f"unreadable  {broken} of {broken + 1} poses that Scan4D tried\n"
     assert (told in run("info", tmp_path).out) == (broken > 0)
 
 
@@ -165,4 +165,4 @@ def test_info_of_code_words_without_any(run: Run, tmp_path: Path) -> None:
     (tmp_path / "a.cw").write_bytes(b"SCAN4DCW")
     done = run("info", tmp_path / "a.cw")
     assert done.code == 2
-    assert "is no file of code words" in done.err
+    assert "is not a file of code words" in done.err

@@ -246,7 +246,7 @@ def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
         ({"a": [0, 0, 10]}, ("--placed-in", "9"), "there is no pose 9"),
         ({"a": [0, 0, 10]}, ("--measures", "landmarks.csv"), "is neither JSON nor TOML"),
         ({"a": [0, 0, 10]}, ("--measures", "measures.json"), "lacks landmarks for every measure"),
-        ({"a": [0, 0, 10]}, ("--poses", "9:"), "there is no pose in 9:"),
+        ({"a": [0, 0, 10]}, ("--poses", "9:"), "no frame is in the range 9:"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_measured_is_told(run: Run, places: dict, words: tuple[str, ...], told: str) -> None:

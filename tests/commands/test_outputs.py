@@ -182,7 +182,7 @@ def test_other_frames_do_not_lose_their_times(
     before = contents(folder)
     message = refused("convert", scan, out, *force)
     assert there in message
-    assert "Write into a folder of its own" in message
+    assert "Write into a separate folder" in message
     assert contents(folder) == before
     for name in ("seq2", "seq2/f%d.ply", "one", "whole", "several/*/f*.ply"):
         assert run("info", name).code == 0
@@ -440,5 +440,5 @@ def test_a_full_disk_is_told_and_nothing_is_left(suffix: str, tmp_path: Path) ->
                 formats.write_poses(path, [Pose.of(0, 0.0, "a", points)], "mm", stop=Stop("depth", depth=16))
             else:
                 formats.write(path, points)
-        assert "Make room" in str(error.value)
+        assert "Free some space" in str(error.value)
         assert list(disk.iterdir()) == []

@@ -275,7 +275,7 @@ def test_broken_frames_among_several_are_left_out(run: Run, refused: Callable[..
     Path("sequence/f1.npz").write_bytes(b"no scan")
     done = run("render", "--replay", "a.json", "-o", "p%d.png")
     assert done.code == 0
-    assert "frame 2 is left out" in done.err
+    assert "leaves out frame 2" in done.err
     assert done.err.count("\n") == 1
     assert sorted(path.name for path in Path().glob("p*.png")) == ["p0.png", "p2.png", "p3.png", "p4.png"]
     Recording((entry(pose=1), entry(pose=1, at=0.2, size=(64, 48)))).save(Path("b.json"))

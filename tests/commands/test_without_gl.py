@@ -60,7 +60,9 @@ def test_normals_that_cannot_be_estimated(
     np.save(tmp_path / "bare.npy", formats.read(scans / "ball.npz").world())
     arguments = ("render", tmp_path / "bare.npy", "-o", tmp_path / "a.png", *SMALL, "--no-gl")
     done = finish(process(*arguments, **without_opengl))
-    told = "no normals and radii can be estimated here: the discs face the viewer and all have the same size"
+    told = (
+        "Scan4D cannot estimate normals or radii here: the discs face the viewer and all have the same size"
+    )
     assert (done.code, done.err) == (0, f"scan4d: {told}\n")
     assert len(np.unique(picture(tmp_path / "a.png").reshape(-1, 4), axis=0)) > 10  # by depth
 
@@ -113,7 +115,7 @@ def test_a_picture_lies_behind(run: Run, scans: Path, tmp_path: Path) -> None:
         ((scan, "--no-gl", "-o", "c.png", "--size", "50x40", *over), "has 96 x 64 pixels, but the picture"),
         ((scan, "-o", "c.cw", *SMALL, *over), "--behind: is not stored in '.cw' files"),
         ((scan, "-o", "c.png", *SMALL, *over), "--behind: is for pictures without OpenGL"),
-        ((scan, "--no-gl", "-o", "c.png", *SMALL, "--behind", scan), "is no PNG or JPEG or TIFF"),
+        ((scan, "--no-gl", "-o", "c.png", *SMALL, "--behind", scan), "is not a valid PNG or JPEG or TIFF"),
         ((scan, "--no-gl", "-o", over[1], *SMALL, "--force", *over), "behind.png"),
     ):
         done = run("render", *arguments)
@@ -133,7 +135,7 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         ),
         ((scan, "-o", "a.png", "--no-gl", "--quality", "fine"), "--quality: applies only to"),
         ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
-        ((scan, "-o", "a.png", "--no-gl", "--set", "normals=60"), "60 normals have none in the middle"),
+        ((scan, "-o", "a.png", "--no-gl", "--set", "normals=60"), "60 normals have no middle one"),
         ((scan, "-o", "a.png", "--no-gl", "--set", "sises=3"), "Did you mean 'sizes'"),
         ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),
         ((words, "-o", "a.png", "--size", "10x10"), "--size: has no effect"),
@@ -147,5 +149,5 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         assert done.err.count("\n") == 1
     words.write_bytes(words.read_bytes()[:-1])
     done = run("render", words, "-o", tmp_path / "a.png")
-    assert done == (2, "", f"scan4d: {words}: is cut short. Save it again\n")
+    assert done == (2, "", f"scan4d: {words}: is cut short. Write the file again\n")
     assert names(tmp_path) == ["a.cw"]

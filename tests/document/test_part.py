@@ -54,13 +54,13 @@ def declared(kind: Any, default: Any = (), frozen: bool = True) -> type[Part]:
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        (list[Note], r"Notes\.all cannot be kept as list\[.*Note\]: what is kept: .*tuple\[...\]"),
-        (list, r"Notes\.all cannot be kept as list"),
-        (np.ndarray, r"Notes\.all cannot be kept as ndarray"),
-        (dict[str, Note], r"Notes\.all cannot be kept as dict.*Mapping\[str, ...\]"),
-        (Mapping[int, str], r"Notes\.all cannot be kept as .*Mapping\[int, str\]"),
-        (Any, r"Notes\.all cannot be kept as .*Any"),
-        (tuple[Loose, ...], r"Notes\.all: Loose can change; .*frozen=True"),
+        (list[Note], r"Notes\.all cannot be stored as list\[.*Note\]: Scan4D stores .*tuple\[...\]"),
+        (list, r"Notes\.all cannot be stored as list"),
+        (np.ndarray, r"Notes\.all cannot be stored as ndarray"),
+        (dict[str, Note], r"Notes\.all cannot be stored as dict.*Mapping\[str, ...\]"),
+        (Mapping[int, str], r"Notes\.all cannot be stored as .*Mapping\[int, str\]"),
+        (Any, r"Notes\.all cannot be stored as .*Any"),
+        (tuple[Loose, ...], r"Notes\.all: Loose is mutable; .*frozen=True"),
     ],
 )
 def test_a_field_that_could_change_or_not_be_kept_is_refused(kind: Any, words: str) -> None:
@@ -70,7 +70,7 @@ def test_a_field_that_could_change_or_not_be_kept_is_refused(kind: Any, words: s
 
 def test_a_part_that_is_no_frozen_dataclass_with_defaults_is_refused() -> None:
     declared(tuple[Note, ...]).check_declared()
-    with pytest.raises(TypeError, match=r"Notes: Notes can change; .*frozen=True"):
+    with pytest.raises(TypeError, match=r"Notes: Notes is mutable; .*frozen=True"):
         declared(tuple[Note, ...], frozen=False).check_declared()
     with pytest.raises(TypeError, match=r"Notes\.all has no default"):
         declared(tuple[Note, ...], default=None).check_declared()
@@ -78,7 +78,7 @@ def test_a_part_that_is_no_frozen_dataclass_with_defaults_is_refused() -> None:
     class Undeclared(Part, name="undeclared"):
         pass
 
-    with pytest.raises(TypeError, match=r"Undeclared is no dataclass"):
+    with pytest.raises(TypeError, match=r"Undeclared is not a dataclass"):
         Undeclared.check_declared()
 
 
@@ -100,19 +100,19 @@ def part(**values: Any) -> Part:
     [
         (
             {"all": (Note("a", np.zeros(3)),)},  # type: ignore[arg-type]
-            r"^notes\.all\[0\]\.position is to be a tuple, not array\(\[0\., 0\., 0\.\]\) \(ndarray\)$",
+            r"^notes\.all\[0\]\.position must be a tuple, not array\(\[0\., 0\., 0\.\]\) \(ndarray\)$",
         ),
-        ({"all": (Note("a"), Note("b", (1.0, 2.0)))}, r"^notes\.all\[1\]\.position is to be 3 values"),  # type: ignore[arg-type]
+        ({"all": (Note("a"), Note("b", (1.0, 2.0)))}, r"^notes\.all\[1\]\.position must be 3 values"),  # type: ignore[arg-type]
         (
             {"all": (Note("a", size=np.float32(1)),)},  # type: ignore[arg-type]
-            r"^notes\.all\[0\]\.size is to be a finite number, not .* \(float32\)$",
+            r"^notes\.all\[0\]\.size must be a finite number, not .* \(float32\)$",
         ),
         (
             {"all": (Note("a", size=float("nan")),)},
-            r"^notes\.all\[0\]\.size is to be a finite .* nan",
+            r"^notes\.all\[0\]\.size must be a finite .* nan",
         ),
-        ({"named": {"a": 0.5}}, r"^notes\.named\.a is to be a whole number, not 0\.5 \(float\)$"),
-        ({"all": [Note("a")]}, r"^notes\.all would be read again as \(.*\(tuple\), not \[.*\(list\)$"),
+        ({"named": {"a": 0.5}}, r"^notes\.named\.a must be a whole number, not 0\.5 \(float\)$"),
+        ({"all": [Note("a")]}, r"^notes\.all would come back as \(.*\(tuple\), not \[.*\(list\)$"),
     ],
 )
 def test_a_value_that_could_not_be_read_again_is_refused_with_its_place(
@@ -133,9 +133,9 @@ def test_of_a_change_what_is_new_is_checked_and_told_with_its_place_in_the_whole
     kept = kind(all=(before.all[1], Note("c")), named={"a": 1})  # type: ignore[attr-defined]
     kept.check_storable(before)
     wrong = Note("c", (1.0, 2.0))  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"^notes\.all\[2\]\.position is to be 3 values"):
+    with pytest.raises(TypeError, match=r"^notes\.all\[2\]\.position must be 3 values"):
         kind(all=(*before.all, wrong)).check_storable(before)  # type: ignore[attr-defined]
-    with pytest.raises(TypeError, match=r"^notes\.named\.a is to be a whole number"):
+    with pytest.raises(TypeError, match=r"^notes\.named\.a must be a whole number"):
         kind(all=before.all, named={"a": 0.5}).check_storable(before)  # type: ignore[attr-defined]
 
 

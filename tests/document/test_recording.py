@@ -107,7 +107,7 @@ def test_colours_by_numbers_that_are_in_no_file_are_refused() -> None:
     for color_by, over in (
         ("deviation", layers), ("#2", layers), ("heat", Layers({"heat": np.arange(3.0)})),
     ):  # fmt: skip
-        with pytest.raises(InputError, match="which is computed and not in the scan's files"):
+        with pytest.raises(InputError, match="which the scan's files do not store"):
             entry(color_by, over)
 
 
@@ -237,7 +237,7 @@ CAMERA = FIRST.camera.to_json()
     [
         (changed(format=2), ["format 2", "reads 1", "version"]),
         (changed(format="1"), ["format '1'"]),
-        (lambda data: data.pop("format"), ["no recording"]),
+        (lambda data: data.pop("format"), ["is not a recording"]),
         (changed(entries=[]), ["no entries"]),
         (changed(entries={}), ["no entries"]),
         (changed(entries=[7]), ["entry 0", "JSON object"]),
@@ -324,7 +324,7 @@ def test_pictures_without_a_description_and_damaged_ones_are_refused(suffix: str
         import OpenEXR
 
         OpenEXR.File({}, {"Z": np.zeros((4, 4), np.float32)}).write(str(path))
-    with pytest.raises(InputError, match="holds no data on how it was made"):
+    with pytest.raises(InputError, match="does not store how it was made"):
         Recording.load(path)
 
 
@@ -374,7 +374,8 @@ def test_of_many_files_the_first_one_counts_as_a_whole_and_the_ends_of_some(
 
 
 @pytest.mark.parametrize(
-    ("scan", "where"), [("/**/*.ply", "all over"), ("//host/a.ply", "another"), (r"\\host\a.ply", "another")]
+    ("scan", "where"),
+    [("/**/*.ply", "a pattern that would search"), ("//host/a.ply", "another"), (r"\\host\a.ply", "another")],
 )
 def test_a_recording_neither_searches_nor_leads_to_another_machine(scan: str, where: str) -> None:
     with pytest.raises(InputError, match=where):

@@ -145,7 +145,7 @@ def test_broken_frames_are_told(folder: Path) -> None:
     )
     assert listed() == ["p0.png"]
     assert len(made.warnings) == 1
-    assert "frame 2 is left out" in made.warnings[0]
+    assert "leaves out frame 2" in made.warnings[0]
 
 
 def test_modules_of_the_working_directory_are_not_taken_for_scan4d() -> None:

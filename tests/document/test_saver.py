@@ -87,9 +87,9 @@ def test_what_cannot_be_kept_is_told_once() -> None:
         return problem
 
     problem = next(filter(None, map(look, count(0.0, 5.0))))
-    assert problem == "Numbers are not kept: no room"
+    assert problem == "Numbers cannot be saved: no room"
     assert not any(map(look, (1e6, 2e6, 3e6)))
-    assert "not kept" in str(keeper.close(8))
+    assert "cannot be saved" in str(keeper.close(8))
 
 
 class Disk:
@@ -127,7 +127,7 @@ def test_what_could_not_be_saved_is_saved_when_there_is_room_again() -> None:
     disk = Disk()
     saved = Saved(disk)
     disk.is_full = True
-    assert saved.look(11, 3) == ["Numbers are not kept: no room"]
+    assert saved.look(11, 3) == ["Numbers cannot be saved: no room"]
     assert saved.look(12, 1000) == []
     assert 40 <= disk.attempts <= 60, "now and then, at most once a minute"
     disk.is_full = False
@@ -136,7 +136,7 @@ def test_what_could_not_be_saved_is_saved_when_there_is_room_again() -> None:
     saved.look(14, 2)
     assert disk.held == {1: 14}, "at once again"
     disk.is_full = True
-    assert saved.look(15, 3) == ["Numbers are not kept: no room"]
+    assert saved.look(15, 3) == ["Numbers cannot be saved: no room"]
     disk.is_full = False
     assert saved.keeper.close(15) is None
     assert disk.held == {1: 15}
@@ -149,7 +149,7 @@ def test_each_file_that_cannot_be_written_is_told_and_none_is_forgotten() -> Non
     saved.keeper.note(11)
     finish(saved.keeper)
     saved.keeper.note(21)  # before anybody looked
-    assert saved.look(21, 4) == ["Numbers are not kept: no room"] * 2
+    assert saved.look(21, 4) == ["Numbers cannot be saved: no room"] * 2
     saved.look(21, 100)
     disk.is_full = False
     assert saved.look(31, 2) == []

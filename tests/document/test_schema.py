@@ -52,17 +52,17 @@ def changed(*path: Any, to: Any) -> Any:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ([], "f: It is not values by name but []"),
+        ([], "f: It is not an object with named values but []"),
         (changed("all", to="pin"), "f: 'all' is not a list but pin"),
         (changed("all", to={"a": 1}), "f: 'all' is not a list"),
-        (changed("all", 1, to=7), "f: 'all[1]' is not values by name but 7"),
+        (changed("all", 1, to=7), "f: 'all[1]' is not an object with named values but 7"),
         (changed("all", 1, "name", to=None), "f, all[1]: 'name' is not a text but None"),
         (changed("all", 0, "place", to=[1, 2]), "f, all[0]: 'place' is not 3 values but [1, 2]"),
         (changed("all", 0, "place", 2, to=True), "f, all[0]: 'place' is not a finite number but True"),
         (changed("all", 0, "place", 2, to=float("nan")), "f, all[0]: 'place' is not a finite number but nan"),
         (changed("all", 0, "place", 2, to=10**400), "f, all[0]: 'place' is not a finite number but 1000"),
         (changed("all", 0, "kind", to=["note"]), "f, all[0].kind: cannot be used"),
-        (changed("all", 0, "frame", to=-1), "f, all[0]: 'frame' is not the number of a pose but -1"),
+        (changed("all", 0, "frame", to=-1), "f, all[0]: 'frame' is not the index of a frame but -1"),
         (changed("all", 0, "nmae", to=1), "f, all[0]: unknown field 'nmae'. Did you mean 'name'?"),
         (changed("all", 0, to={"place": [1, 2, 3]}), "f, all[0]: has no 'name'"),
         (changed("even", to=3), "f: 'even' is not an even number but 3"),
@@ -70,7 +70,7 @@ def changed(*path: Any, to: Any) -> Any:
         (changed("seen", to=1), "f: 'seen' is not true or false but 1"),
         (changed("camera", "fov_y", to=0), "f, camera: the camera's fov_y is 0"),
         (changed("look", "light", to="dim"), "f, look: unknown light 'dim'"),
-        (changed("look", to=3), "f: 'look' is not values by name but 3"),
+        (changed("look", to=3), "f: 'look' is not an object with named values but 3"),
     ],
 )
 def test_what_is_wrong_is_told_with_its_place(data: Any, words: str) -> None:

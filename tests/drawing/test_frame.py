@@ -327,7 +327,7 @@ def test_a_backend_of_range_views_is_refused_for_points(renderer: Renderer) -> N
             return ("views",)
 
     request = Request(_of(BARE), Camera.orbit(BARE.bounds()), Ranging())
-    with pytest.raises(InputError, match="Ranging draws range views, and this scan has none"):
+    with pytest.raises(InputError, match="Ranging draws range views, but this scan has none"):
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))
 
 

@@ -46,4 +46,4 @@ def test_pixels_tell_what_differs(renderer: Renderer) -> None:
 def test_scenes_that_are_not_there_are_left_out(renderer: Renderer) -> None:
     bench = Bench(renderer, SETTINGS)
     assert not list(words.measure_times(bench, ["no-such.ply"], 10))
-    assert "no-such.ply is left out" in bench.notes[0]
+    assert "leaves out no-such.ply" in bench.notes[0]

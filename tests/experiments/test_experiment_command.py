@@ -18,7 +18,7 @@ def test_the_feeds_are_timed_and_stand_beside_the_papers(run_experiment: Run, tm
     small = ("--quick", "--size", "96x64", "--views", 1, "--data", tmp_path / "data")
     done = run_experiment("feeds", *small, "-o", tmp_path / "out")
     assert done.code == 0, done.err
-    assert "crane is left out" in done.err
+    assert "leaves out crane" in done.err
     assert done.out.splitlines()[-1] == str(tmp_path / "out" / "table-two.md")
     rows = read_rows(tmp_path / "out")
     assert {row["scene"] for row in rows} == {"demo"}
@@ -35,7 +35,7 @@ def test_octrees_stand_beside_the_papers(run_experiment: Run, tmp_path: Path) ->
     small = ("--quick", "--size", "96x64", "--views", 1, "--data", tmp_path / "data")
     done = run_experiment("octrees", *small, "-o", tmp_path / "out")
     assert done.code == 0, done.err
-    assert "crane is left out" in done.err
+    assert "leaves out crane" in done.err
     assert done.out.splitlines()[-1] == str(tmp_path / "out" / "octree-tables.md")
     rows = read_rows(tmp_path / "out")
     assert {row["sweep"] for row in rows} == {"instancing", "max_depth"}
@@ -69,7 +69,7 @@ def test_measuring_takes_the_scenes_that_are_named(run_experiment: Run, tmp_path
     file = tmp_path / "ball.obj"
     done = run_experiment("measuring", "--scene", file, "-o", tmp_path / "out")
     assert done.code == 2
-    assert f"{file} is left out" in done.err
+    assert f"leaves out {file}" in done.err
 
 
 def test_what_octrees_are_compared_with_is_needed_for_them_alone(

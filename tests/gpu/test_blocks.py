@@ -146,7 +146,7 @@ def test_what_a_block_cannot_hold_is_named() -> None:
     class Empty:
         word: str = ""
 
-    with pytest.raises(TypeError, match=r"Wrong\.names: a block holds no list"):
+    with pytest.raises(TypeError, match=r"Wrong\.names: a uniform block cannot hold list"):
         block_of(Wrong)
     with pytest.raises(TypeError, match="Empty has no number"):
         block_of(Empty)

@@ -246,7 +246,7 @@ def test_a_weight_that_is_none_is_as_good_as_zero(renderer: Renderer, name: str,
 
 def test_images_that_are_none_are_refused(renderer: Renderer) -> None:
     for size, channels in (((0, 3), 1), ((3, -1), 1), ((3, 3), 0), ((3, 3), 5)):
-        with pytest.raises(ValueError, match="no image: "):
+        with pytest.raises(ValueError, match="an image cannot have "):
             Image(renderer.gpu, size, channels)
 
 

@@ -79,9 +79,9 @@ def test_degrees_are_told_from_lengths(numbers: tuple[float, ...], found: bool) 
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"right": 0.0}, "its cells measure 0 x -20 from 376000"),
-        ({"down": np.nan}, "its cells measure 30 x nan"),
-        ({"left": np.inf}, "from inf"),
+        ({"right": 0.0}, "its cells have the unusable size 0 x -20, starting at 376000"),
+        ({"down": np.nan}, "its cells have the unusable size 30 x nan"),
+        ({"left": np.inf}, "starting at inf"),
         ({"degrees": True}, "its centre is at .* degrees of latitude"),
         ({"degrees": True, "first": 40.0, "down": -0.1, "unit": "units"}, "its heights are in 'units', over"),
     ],

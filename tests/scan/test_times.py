@@ -82,7 +82,7 @@ def test_the_times_csv_in_the_documentation(tmp_path: Path) -> None:
         ("file,time\na.ply,0\nb.ply,soon\n", "line 3: time 'soon' is not a number"),
         ("a.ply,0\nb.ply,nan\n", "line 2: time 'nan' is not a number"),
         ("a.ply,0\n\nb.ply\n", "line 3: a column is missing"),
-        ("a.ply,0\nb.ply,1\nb.ply,2\n", "line 3: a second time for 'b.ply', after line 2"),
+        ("a.ply,0\nb.ply,1\nb.ply,2\n", "line 3: has a second time for 'b.ply', which line 2 already has"),
         ("a.ply,0\nb.ply,2\nc.ply,2\n", "line 3: 'c.ply' is not later than 'b.ply'"),
         ("0,0\n1,1\n3,2\n", "line 3: index 3 is outside 0..2"),
         ("0,0\n1,1\n99999999999999999999,2\n", "line 3: index 99999999999999999999 is outside 0..2"),

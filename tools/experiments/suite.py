@@ -190,6 +190,6 @@ def subjects(bench: Bench, scenes: Iterable[str], count: int | None = None) -> I
             subject = bench.subject(Group(scene, (), count=count))
             subject.moment(0)
         except InputError as error:
-            bench.note(f"{scene} is left out: {error}")
+            bench.note(f"the benchmark leaves out {scene}: {error}")
             continue
         yield subject

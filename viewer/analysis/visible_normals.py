@@ -79,7 +79,7 @@ def estimate_normals(
     NoOpenGLError.
     """
     if not 3 <= k <= MOST_NEIGHBORS:
-        raise InputError(f"a neighborhood has from 3 to {MOST_NEIGHBORS} points, not {k}")
+        raise InputError(f"a neighbourhood must have 3 to {MOST_NEIGHBORS} points, not {k}")
     if not growth >= 1:
         raise InputError(f"growth must be at least 1, not {growth:g}")
     if isinstance(pose, PointCloud):

@@ -21,7 +21,7 @@ class Editing(WindowPart):
     """Takes changes of the document back, and makes them again."""
 
     name = "editing"
-    doing = "Keeping the history"
+    doing = "Recording the undo history"
     session: Session
     tools: Toolbox
     steering: Steering

@@ -160,7 +160,7 @@ def _without_clashes(
                 what = f"{text} is set for both '{other}' and '{name}'"
                 guilty = next((n for n in reversed(changes) if n in (name, other)), None)
                 if guilty:
-                    hint = f"Give one of them other keys. '{guilty}' keeps its usual ones"
+                    hint = f"Give one of them other keys. '{guilty}' keeps its default keys"
                     problems.append(InputError(what, hint=hint))
                     del changes[guilty]
                 else:

@@ -66,7 +66,7 @@ class WindowLayout(WindowPart):
     def _draw_view_alone(self) -> ViewArea:
         whole = imgui.get_io().display_size
         view = self._draw_view(0, int(whole.x), int(whole.y))
-        with self.failures.reported("The list of work"):
+        with self.failures.reported("The list of running tasks"):
             self.tasks.draw_alone(view)
         return view
 
@@ -98,7 +98,7 @@ class WindowLayout(WindowPart):
             self.timeline_bar.draw()
             imgui.end()
         if below < whole.y:
-            with self.failures.reported("What is under the timeline"):
+            with self.failures.reported("The area under the timeline"):
                 _begin_grip("grip below", 0, below, whole.x, grip)
                 self.drawer.draw_grip(whole.x)
                 imgui.end()

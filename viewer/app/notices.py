@@ -247,7 +247,7 @@ class StayingNotices(WindowPart):
 
     name = "staying_notices"
     layer = 20
-    shows = "Messages that stay"
+    shows = "The lasting messages"
     notices: Notices
     window_look: WindowLook
     keyboard: Keyboard

@@ -169,7 +169,7 @@ def part_classes() -> dict[str, type[WindowPart]]:
     for cls in _below(WindowPart):
         is_own = cls.name and cls.__module__.startswith(f"{__package__}.")
         if is_own and found.setdefault(cls.name, cls) is not cls:
-            raise TypeError(f"two parts are called '{cls.name}': {found[cls.name]} and {cls}")
+            raise TypeError(f"two parts have the name '{cls.name}': {found[cls.name]} and {cls}")
     return dict(sorted(found.items()))
 
 
@@ -227,7 +227,7 @@ class Parts:
             elif need in self._offered:
                 found[need] = partial(self._answer, *self._offered[need])
             elif of.default is MISSING and of.default_factory is MISSING:
-                raise TypeError(f"the part '{cls.name}' needs '{need}', which nobody has")
+                raise TypeError(f"the part '{cls.name}' needs '{need}', which no part provides")
         return found
 
     def _answer(self, name: str, method: str, *arguments: Any, **more: Any) -> Any:

@@ -36,7 +36,7 @@ class Tasks(WindowPart):
 
     name = "tasks"
     layer = 10
-    doing = "Looking at work"
+    doing = "Updating the list of tasks"
     turn = 5
     OFFERS = {"cancel_task": "cancel"}
     session: Session

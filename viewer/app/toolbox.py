@@ -159,7 +159,7 @@ class Toolbox(WindowPart):
     """
 
     name = "tools"
-    doing = "Advancing tools"
+    doing = "Updating tools"
     layer = 40
     shows = "Dialogs of tools"
     OFFERS = {

@@ -31,7 +31,7 @@ class Welcome(WindowPart):
 
     name = "welcome"
     layer = 70
-    shows = "The first card"
+    shows = "The welcome card"
     session: Session
     is_over: bool = remembered(False)  # whether it was seen, in this window or one before
 

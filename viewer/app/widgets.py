@@ -109,7 +109,7 @@ def _edit_row(
     if value != default:
         imgui.same_line(imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x - gutter)
         text = _value_in_words(default, words)
-        if flat_button(icons.ICON_FA_ARROW_ROTATE_LEFT, f"Back to the default, {text}"):
+        if flat_button(icons.ICON_FA_ARROW_ROTATE_LEFT, f"Reset to the default, {text}"):
             new = default
     imgui.pop_id()
     return new

@@ -17,7 +17,7 @@ from .theme import Palette
 from .window import Window, WindowPlacement
 
 ThemeName = Annotated[str, Kind("a theme", theme.PALETTES.__contains__)]
-TextScale = Annotated[float, Kind("a size of text", theme.TEXT_SCALES.__contains__)]
+TextScale = Annotated[float, Kind("a text size", theme.TEXT_SCALES.__contains__)]
 
 
 @dataclass(eq=False)

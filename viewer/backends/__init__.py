@@ -247,14 +247,19 @@ def _checked(kind: type[Backend], name: str) -> Backend:
     params = kind.params_class
     declared = getattr(params, "__dataclass_params__", None)
     if not (isinstance(params, type) and declared is not None and declared.frozen):
-        raise InputError(f"params_class of {kind.__qualname__} is no frozen dataclass", hint="Make it one")
+        raise InputError(
+            f"params_class of {kind.__qualname__} is not a frozen dataclass",
+            hint="Declare it with @dataclass(frozen=True)",
+        )
     try:
         describe(params)
     except Exception as error:
         raise InputError(f"{error}", hint="Correct the declaration of its parameters") from error
     one = kind(name)
     if not one.about.strip():
-        raise InputError(f"{kind.__module__} has no docstring", hint="Say there what it draws")
+        raise InputError(
+            f"{kind.__module__} has no docstring", hint="Say in the docstring what the backend draws"
+        )
     return one
 
 

@@ -14,7 +14,7 @@ from ..projection.settings import ProjectionParams
 from ..scan.pose import Pose
 from . import NO_SPACING, Backend, FrameView, Limit, Suited
 
-_BY_CELLS = "whole cells fill a pixel; at the edges of cells the last bit decides which cells these are"
+_BY_CELLS = "each pixel takes its values from whole cells; at the edges of cells, rounding decides from which"
 
 
 class Pyramidal(Backend):

@@ -35,8 +35,8 @@ from . import Backend, FrameView, Limit, Suited, share_param, with_levels
 
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
-    "splats drawn over each other are partly transparent; their radii, the number of copies and, at equal "
-    "depths, the last bit decide how much shows through"
+    "splats drawn over each other are partly transparent; their radii, the number of copies and, at "
+    "equal depths, rounding decide how much shows through"
 )
 
 
@@ -151,9 +151,9 @@ class Surfels(Backend):
         "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
     }
     default_reasons = {
-        "cull_back": "a scan can be open, and the eye can be inside: 2.2 % of the pixels of the "
-        "bunny, which has no base, would show the background. No test for closed scans was "
-        "both safe and faster "
+        "cull_back": "the camera can see the inside of an open scan: without splats that face "
+        "away, 2.2 % of the pixels of the bunny, which has no base, would show the background. No test for "
+        "closed scans was both safe and faster "
         "(docs/how-it-works/surfels.md)"
     }
 
@@ -213,7 +213,9 @@ def _as_many(
     """So many in place of all of these points: a coarser level of detail. margins: as `Points.of` has."""
     stats, share = surface.stats, most / points.count
     stats.asked, stats.left_out = share, 0
-    stats.chosen["share"] = f"{share:.2f}: of {points.count:,} splats in view {most:,} are listed at once"
+    stats.chosen["share"] = (
+        f"{share:.2f}, because only {most:,} of the {points.count:,} splats in view can be listed at once"
+    )
     return Points.of(pose, surface, share * frame.share, points.use_radii, *margins)
 
 
@@ -244,7 +246,9 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
         own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
             if own:
-                surface.stats.chosen["radius"] = "as large as the gaps, which the scan's own radii leave open"
+                surface.stats.chosen["radius"] = (
+                    "as large as the gaps, because the scan's own radii leave them open"
+                )
             return _Sizes(True, gaps.usual, gaps.largest, {"radii": gaps.texels}), True
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)

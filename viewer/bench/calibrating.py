@@ -87,7 +87,7 @@ def measure_ways(bench: Bench, scenes: Sequence[str] = SCENES) -> Iterator[Row]:
             subject = bench.subject(Group(scene, ()))
             frames = list(_frames(bench, subject))
         except InputError as error:
-            bench.note(f"{scene} is left out: {error}")
+            bench.note(f"the benchmark leaves out {scene}: {error}")
             continue
         for view, (moment, camera) in enumerate(frames):
             size = scaled_size(settings.size, _SIZES[view % len(_SIZES)])

@@ -71,7 +71,7 @@ def _rounded(kind: type, at: float, source: str, unit: float = _UNIT) -> Toleran
     """The tolerance where coordinates near `at` are rounded to a float type. unit: pixels."""
     return Tolerance(
         FLOAT32.error + unit * float(np.spacing(kind(at))) / 12**0.5,
-        f"{kind.__name__} {source} near {at:.0g} units, on top of: {FLOAT32.reason}",
+        f"{kind.__name__} {source} near {at:.0g} units, added to: {FLOAT32.reason}",
     )
 
 
@@ -134,7 +134,7 @@ def _typed() -> Iterator[Row]:
     yield Row("float32 input", at(100), as_float32, _rounded(np.float32, 100, "input"))
     # float32 resolves 64 units there: a file of it has a scan of 10^4 units in steps.
     large = _body().moved(shift=1e9 * _SHIFT, scale=1e4)
-    yield Row("float32 values as float64 at 10^9", lambda: as_float32(large), as_float64, EXACT)
+    yield Row("float32 values, stored as float64, around 10^9", lambda: as_float32(large), as_float64, EXACT)
 
 
 def _clipped() -> Iterator[Row]:
@@ -179,7 +179,7 @@ def _zoomed() -> Iterator[Row]:
         "zoomed in to a millionth of the scan's width",
         detail(6),
         partial(surrounded, power=6),
-        _rounded(np.float32, 2**15 / _UNIT, "offsets from an origin 2^15 pixels away"),
+        _rounded(np.float32, 2**15 / _UNIT, "float32 offsets from an origin 2^15 pixels away"),
     )
 
     def splat() -> PointView:
@@ -317,7 +317,7 @@ def _facing(shot: PointView) -> PointView:
 
 
 def _spoilt() -> Iterator[Row]:
-    yield Row("normals parallel to y", _sheet, partial(PointView.moved, turn=_QUARTER_TURN), FLOAT32)
+    yield Row("normals parallel to the y axis", _sheet, partial(PointView.moved, turn=_QUARTER_TURN), FLOAT32)
 
     def about_y(shot: PointView, angle: float) -> PointView:
         turn = 2.4 * np.arange(len(shot))
@@ -327,10 +327,10 @@ def _spoilt() -> Iterator[Row]:
     # 1e-4 is where a template that has a special case at y changes over.
     for power in (-7, -4):
         yield Row(
-            f"normals within 10^{power} of y",
+            f"normals within 10^{power} of the y axis",
             lambda: _sheet().moved(turn=_QUARTER_TURN),
             partial(about_y, angle=10.0**power),
-            Tolerance(FLOAT32.error + 5 * 10.0**power, "a splat of 5 px, leaning by that angle"),
+            Tolerance(FLOAT32.error + 5 * 10.0**power, "a splat of 5 px, tilted by that angle"),
         )
 
     def matt() -> PointView:
@@ -342,7 +342,7 @@ def _spoilt() -> Iterator[Row]:
             matt,
             partial(PointView.filled, name="normals", value=value),
             # 2 px aside, 228 px from the eye: cos 0.009 is 0.006 levels less.
-            Tolerance(1e-4, "the base faces the eye from the points, a missing normal from the pixels"),
+            Tolerance(1e-4, "one picture turns normals towards the eye per point, the other per pixel"),
         )
 
     def closed() -> PointView:

@@ -158,7 +158,7 @@ class Bench:
                 try:
                     tally.flicker |= walk.flicker(self._drawn(contender, frames), kind)
                 except InputError as error:
-                    self.note(f"{subject.name}: no flicker of {contender.backend}: {error}")
+                    self.note(f"{subject.name}: cannot measure the flicker of {contender.backend}: {error}")
                 self.tick()
 
     def steps(self, group: Group) -> int:
@@ -239,7 +239,7 @@ class Bench:
                 request = self._request(contender, shown, camera)
                 self._time(request, surface, tally, anew)
             except InputError as error:
-                self.note(f"{subject.name}: {contender.backend} is left out: {error}")
+                self.note(f"{subject.name}: the benchmark leaves out {contender.backend}: {error}")
                 del tallies[contender]
                 for _ in range(self.settings.views - view + self.walks(group)):
                     self.tick()  # of what it will not be drawn for

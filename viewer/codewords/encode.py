@@ -201,7 +201,8 @@ def emit_words(
     starts = np.concatenate([[0], np.cumsum(counts)])
     if (total := int(starts[-1])) > MOST_WORDS:
         raise InputError(
-            f"{total:,} code words in one picture", hint="Move away, or draw smaller splats with radius_scale"
+            f"one picture would need {total:,} code words",
+            hint="Move the camera away, or draw smaller splats with radius_scale",
         )
     out = emitted(starts[:-1].copy(), total)
     return EmittedWords(starts, out.words, out.ids, out.fine if exact else None)

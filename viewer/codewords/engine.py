@@ -144,10 +144,15 @@ def begun(stream: WordStream, window: int, background: NDArray[np.uint8] | None)
     """A picture of which nothing is drawn yet. Raises InputError."""
     width, height = stream.size
     if window < BITMAP:
-        raise InputError(f"a window of {window} lines", hint=f"A bitmap has {BITMAP}")
+        raise InputError(
+            f"a window of {window} lines is too low",
+            hint=f"Use at least {BITMAP} lines, the height of a bitmap",
+        )
     if background is not None and background.shape != (height, width, 4):
-        what = f"a background of shape {background.shape} for a picture of {width} x {height} pixels"
-        raise InputError(what, hint="Give one of (height, width, 4)")
+        what = (
+            f"the background has the shape {background.shape}, but the picture has {width} x {height} pixels"
+        )
+        raise InputError(what, hint="Give a background of shape (height, width, 4)")
     image = np.empty((height, width, 4), np.uint8)
     image[:] = stream.background if background is None else background
     keys = np.full((height, width), NO_KEY, np.int32)

@@ -38,9 +38,9 @@ class Materials:
     def __post_init__(self) -> None:
         tables = (self.ambient, self.diffuse, self.specular)
         if len({table.shape for table in tables}) > 1 or self.ambient.shape[1:] != (3,):
-            raise InputError("tables of materials have three columns, and as many rows each")
+            raise InputError("tables of materials must have three columns and equal numbers of rows")
         if not 1 <= len(self.ambient) <= MATERIALS:
-            raise InputError(f"{len(self.ambient)} materials, of 1 to {MATERIALS} that there may be")
+            raise InputError(f"a table has {len(self.ambient)} materials, but must have 1 to {MATERIALS}")
         if max(int(table.max()) for table in tables) > LIGHT_STEPS:
             raise InputError(f"a table of materials has more than {LIGHT_STEPS} steps of light")
 

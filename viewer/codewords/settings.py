@@ -33,7 +33,8 @@ class Params:
 
     quality: str = param(
         "table",
-        "table: shapes, places and depths in the steps of the paper; exact: exact outlines, and depths "
+        "table: shapes, positions and depths, rounded to the steps of Maršík 2010; exact: exact "
+        "outlines, and depths "
         "along the disc",
         choices=("table", "exact"),
         title="Code table",
@@ -45,7 +46,12 @@ class Params:
         17, "Number of radii in the table", low=2, high=65, group="Words", when={"quality": ("table",)}
     )
     size_parts: int = param(
-        2, "Radii of the table for each pixel", low=1, high=8, group="Words", when={"quality": ("table",)}
+        2,
+        "Number of radii in the table for each pixel",
+        low=1,
+        high=8,
+        group="Words",
+        when={"quality": ("table",)},
     )
     normals: int = param(
         61,
@@ -57,7 +63,7 @@ class Params:
     )
     normal_parts: int = param(
         5,
-        "Values of n'x and n'y from 0 to 1, a tilt of 45 degrees",
+        "Number of values of n'x and n'y from 0 to 1, where 1 is a tilt of 45 degrees",
         low=1,
         high=20,
         group="Words",

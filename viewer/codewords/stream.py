@@ -81,7 +81,7 @@ class WordStream:
     def __post_init__(self) -> None:
         check_picture_size(self.size)
         if not 1 <= self.stride <= COLUMNS:
-            raise InputError(f"strips of {self.stride} columns, of 1 to {COLUMNS} that there may be")
+            raise InputError(f"a strip has 1 to {COLUMNS} columns, not {self.stride}")
         self._check_lines()
         self._check_depths()
         self._check_words()
@@ -90,34 +90,36 @@ class WordStream:
         count = len(self.words)
         starts = self.line_starts
         if len(starts) != self.strips * self.size[1] + 1 or starts[0] != 0 or starts[-1] != count:
-            raise InputError("lines of code words do not hold as many words as there are")
+            raise InputError("the number of code words does not match the lines")
         if (np.diff(starts) < 0).any():
             raise InputError("a line of code words begins before the one above it")
         if len(self.ids) != count or (self.finer is not None and self.finer.shape != (count, 3)):
-            raise InputError("not as many ids, or finer depths, as there are code words")
+            raise InputError("the number of ids or finer depths does not match the code words")
 
     def _check_depths(self) -> None:
         least = _NEAREST if self.perspective else -_FARTHEST
         if not least <= self.near <= self.far <= _FARTHEST:
-            raise InputError(f"depths of code words from {self.near:g} to {self.far:g}")
+            raise InputError(f"the depths {self.near:g} to {self.far:g} of the code words are out of range")
         limits = np.array([1 << 30, STEEPEST_DEPTHS, STEEPEST_DEPTHS])
         if self.finer is not None and (np.abs(self.finer.astype(np.int64)) > limits).any():
-            raise InputError("finer depths of code words are beyond 2^30, or grow by more than 2^26 a pixel")
+            raise InputError(
+                "finer depths of code words are larger than 2^30, or grow by more than 2^26 per pixel"
+            )
 
     def _check_words(self) -> None:
         at, bits = FIELDS["material"]
         if len(self.words) == 0:
             return
         if int((self.words >> np.uint64(at) & np.uint64((1 << bits) - 1)).max()) >= len(self.materials):
-            raise InputError(f"a code word is of a material beyond the {len(self.materials)} that there are")
+            raise InputError(f"a code word uses a material beyond the {len(self.materials)} in the table")
         strip = np.repeat(np.arange(self.strips), np.diff(self.line_starts[:: self.size[1]]))
         at, bits = FIELDS["x"]
         x = (self.words >> np.uint64(at) & np.uint64((1 << bits) - 1)).astype(np.int64)
         if (x >= np.minimum(self.stride, self.size[0] - strip * self.stride)).any():
-            raise InputError("a code word stands beyond the columns of its strip")
+            raise InputError("a code word lies outside the columns of its strip")
         falls = np.flatnonzero(self.ids[1:] < self.ids[:-1]) + 1
         if not np.isin(falls, self.line_starts).all():
-            raise InputError("the words of a line are not sorted by their ids")
+            raise InputError("the words of a line must be sorted by their ids")
 
     def __len__(self) -> int:
         return len(self.words)
@@ -158,8 +160,8 @@ def check_picture_size(size: tuple[int, int]) -> None:
     width, height = size
     if not (1 <= width <= _LONGEST_EDGE and 1 <= height <= _LONGEST_EDGE and width * height <= _MOST_PIXELS):
         raise InputError(
-            f"a picture of code words of {width} x {height} pixels",
-            hint=f"At most {_LONGEST_EDGE:,} along an edge, and {_MOST_PIXELS:,} in all",
+            f"a picture of code words cannot have {width} x {height} pixels",
+            hint=f"Use at most {_LONGEST_EDGE:,} pixels along an edge, and {_MOST_PIXELS:,} in all",
         )
 
 
@@ -196,8 +198,8 @@ def read_stream(path: Path | str) -> WordStream:
             header = file.read(_HEADER.size)
             needed, held = _file_size(header), os.fstat(file.fileno()).st_size
             if held != needed:
-                what = "is cut short" if held < needed else "has more in it than it tells of"
-                raise InputError(what, hint="Save it again")
+                what = "is cut short" if held < needed else "is longer than its header says"
+                raise InputError(what, hint="Write the file again")
             data = header + file.read()
     except OSError as error:
         what, hint = explained(error)
@@ -207,7 +209,7 @@ def read_stream(path: Path | str) -> WordStream:
     try:
         (checksum,) = _CHECKSUM.unpack_from(data, needed - _CHECKSUM.size)
         if zlib.crc32(memoryview(data)[: -_CHECKSUM.size]) != checksum:
-            raise InputError("is damaged: its checksum is another one", hint="Save it again")
+            raise InputError("is damaged: its checksum is wrong", hint="Write the file again")
         return _stream_of(data)
     except InputError as error:
         raise InputError(error.what, path, error.hint) from error
@@ -216,15 +218,17 @@ def read_stream(path: Path | str) -> WordStream:
 def _file_size(header: bytes) -> int:
     """Bytes of the file that begins so. Raises InputError where it is no file of code words."""
     if not header.startswith(_MAGIC) or len(header) < _HEADER.size:
-        raise InputError("is no file of code words", hint=f"'scan4d render -o NAME{SUFFIX}' writes them")
+        raise InputError("is not a file of code words", hint=f"'scan4d render -o NAME{SUFFIX}' writes them")
     _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack(header)
     if version != _VERSION:
-        raise InputError(f"is of version {version}", hint=f"This program reads version {_VERSION}")
+        raise InputError(f"is of version {version}", hint=f"This version of Scan4D reads version {_VERSION}")
     if flags & ~(_PERSPECTIVE | _FINER):
-        raise InputError(f"has flags that are not known: {flags}")
+        raise InputError(f"has unknown flags: {flags}")
     check_picture_size((width, height))
     if not -(-width // COLUMNS) <= strips <= width:
-        raise InputError(f"has {strips} strips for {width} columns, of {COLUMNS} at most each")
+        raise InputError(
+            f"has {strips} strips for {width} columns, but a strip has at most {COLUMNS} columns"
+        )
     each = 12 + 12 * bool(flags & _FINER)
     return _HEADER.size + 4 * strips * (1 + height) + each * words + 18 * materials + _CHECKSUM.size
 
@@ -242,7 +246,7 @@ def _stream_of(data: bytes) -> WordStream:
     starts = take("<u4", strips).astype(np.int64)
     stride = int(starts[1]) if strips > 1 else width
     if (starts != np.arange(strips) * stride).any() or not starts[-1] < width <= strips * stride:
-        raise InputError("has strips that do not lie side by side in one width")
+        raise InputError("has strips that differ in width or do not lie side by side")
     counts = take("<u4", strips * height)
     return WordStream(
         size=(width, height),

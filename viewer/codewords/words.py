@@ -38,12 +38,12 @@ def encode_words(fields: Mapping[str, ArrayLike]) -> NDArray[np.uint64]:
     """Words of the values of all `FIELDS`, (N,) each, or one for all. A value beyond its field raises
     ValueError."""
     if fields.keys() != FIELDS.keys():
-        raise ValueError(f"the fields of a word are {', '.join(FIELDS)}")
+        raise ValueError(f"the fields of a word must be {', '.join(FIELDS)}")
     words = np.zeros((), np.uint64)
     for name, (at, bits) in FIELDS.items():
         values = np.asarray(fields[name])
         if values.size and (values.min() < 0 or values.max() >> bits):
-            raise ValueError(f"{name} has {bits} bits")
+            raise ValueError(f"a value of {name} does not fit into {bits} bits")
         words = words | values.astype(np.uint64) << np.uint64(at)
     return words
 

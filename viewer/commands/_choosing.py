@@ -15,7 +15,10 @@ from . import _drawing as drawing
 from ._console import warn
 
 AUTO = "auto"
-_OTHERS = {"set": "is for one renderer", "quality": "is more than one picture, where one is to meet a limit"}
+_OTHERS = {
+    "set": "needs a named renderer",
+    "quality": "needs several pictures, but the limit is for one picture",
+}
 
 
 def add_goal_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
@@ -64,5 +67,5 @@ def choice_of(
             "no renderer can be chosen automatically for this scan", hint="Name one with --backend"
         )
     if not choice.keeps:
-        warn(f"no renderer is expected to meet {goal}; Scan4D draws with the nearest: {choice}")
+        warn(f"no renderer is expected to meet {goal}; Scan4D uses the one that comes closest: {choice}")
     return choice

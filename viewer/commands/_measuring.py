@@ -50,7 +50,9 @@ def add_measuring_arguments(parser: ArgumentParser) -> None:
         help="measure only these scenes: names, or meshes (PLY, OBJ, NPZ)",
     )
     parser.add_argument(
-        "--quick", action="store_true", help="few scenes, few views, small pictures: two minutes"
+        "--quick",
+        action="store_true",
+        help="quick run with few scenes, few views and small pictures, about two minutes",
     )
     parser.add_argument(
         "--report", action="store_true", help="measure nothing; make the report from the rows in DIR"
@@ -75,7 +77,7 @@ def data_folder(given: Path | None = None) -> Path | None:
     """
     data = given or os.environ.get("SCAN4D_DATA") or (_BESIDE if _BESIDE.is_dir() else None)
     if data is not None and not Path(data).is_dir():
-        raise InputError("is no folder of real scans", data, "Name one with --data")
+        raise InputError("is not a folder of real scans", data, "Name one with --data")
     return data and Path(data)
 
 
@@ -94,7 +96,7 @@ def settings_of(args: Namespace, usual: BenchSettings) -> BenchSettings:
 
 def left_out(missing: Mapping[str, str]) -> list[str]:
     """Sentences on scenes that cannot be had, by name with the reason."""
-    return [f"{name} is left out: {reason}" for name, reason in missing.items()]
+    return [f"the benchmark leaves out {name}: {reason}" for name, reason in missing.items()]
 
 
 class RowSource(NamedTuple):
@@ -166,7 +168,7 @@ class MeasuringPlan(NamedTuple):
             scenes = len({group.scene for group in self.groups})
             tell(f"{rows} rows on {scenes} scenes: about {minutes}")
         if self.others:
-            tell(f"Then {', '.join(self.others)}: some minutes")
+            tell(f"After that, {', '.join(self.others)}: some more minutes")
 
 
 def _drawn(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
@@ -177,7 +179,7 @@ def _drawn(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
         try:
             yield from bench.measure(group)
         except InputError as error:
-            bench.note(f"{group.scene} is left out: {error}")
+            bench.note(f"the benchmark leaves out {group.scene}: {error}")
             warn(bench.notes[-1])
 
 

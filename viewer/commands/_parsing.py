@@ -155,7 +155,9 @@ def _common_arguments() -> _Parser:
     group.add_argument(
         "--unit", type=_unit, metavar="U", help="name of the scan's unit of length, for example mm"
     )
-    group.add_argument("--fps", type=float, metavar="F", help="frames per second of the scan; also of a film")
+    group.add_argument(
+        "--fps", type=float, metavar="F", help="frame rate of the scan, and of a film, in frames per second"
+    )
     group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: guessed")
     group.add_argument(
         "-q",

@@ -106,7 +106,7 @@ def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int,
                 if not _may_be_left_out(entry, opened.timeline, entries):
                     raise
                 if str(error) != str(failed):
-                    warn(f"{opened.timeline.name}: {frame_in_words(entry.pose)} is left out: {error}")
+                    warn(f"{opened.timeline.name}: Scan4D leaves out {frame_in_words(entry.pose)}: {error}")
                 failed = error
             else:
                 shown = _completed(entry, request, args, opened)
@@ -190,7 +190,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
         if args.scan is not None:
             timeline.close()
             what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
-            raise InputError(what, found, "Name the scan as it was when you recorded")
+            raise InputError(what, found, "Name the unchanged scan that you recorded")
         warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
     if salt is not None and not entry.anonymous:
         hash = fingerprint(timeline.files, salt)
@@ -211,5 +211,8 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
             missing = error
     if is_demo(scan) or os.path.isabs(scan):
         raise missing
-    hint = f"Looked in '{path.parent}' and in the working directory; put it there, or correct 'scan'"
+    hint = (
+        f"Scan4D looked in '{path.parent}' and in the working directory. Put the scan there, or correct "
+        "'scan'"
+    )
     raise InputError(f"its scan '{scan}' is missing", path, hint) from missing

@@ -38,7 +38,7 @@ def add_pose_arguments(parser: ArgumentParser) -> None:
     group.add_argument("--pose", type=int, metavar="I", help="one frame, counted from 0")
     group.add_argument("--time", type=float, metavar="S", help="the frame nearest to a time in seconds")
     group.add_argument("--poses", metavar="A:B[:STEP]", help="frames from A up to, but not including, B")
-    group.add_argument("--all", action="store_true", help="all poses")
+    group.add_argument("--all", action="store_true", help="all frames")
 
 
 def open_timeline(args: Namespace, scan: str) -> Timeline:
@@ -73,7 +73,9 @@ def _poses_between(text: str, timeline: Timeline) -> list[int]:
     indices = list(range(len(timeline)))[start:stop:step]
     if not indices:
         raise InputError(
-            f"there is no pose in {text}", timeline.name, f"The scan has the frames 0 to {len(timeline) - 1}"
+            f"no frame is in the range {text}",
+            timeline.name,
+            f"The scan has the frames 0 to {len(timeline) - 1}",
         )
     return indices
 
@@ -200,7 +202,7 @@ def _check_times_file(path: Path, names: set[str]) -> None:
     except (OSError, UnicodeDecodeError, csv.Error):
         listed = {"?"}
     if listed - names - {"file"}:
-        raise InputError("already holds the times of other files", path, "Write into a folder of its own")
+        raise InputError("already holds the times of other files", path, "Write into a separate folder")
 
 
 def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
@@ -216,8 +218,8 @@ def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
         found += [file for file in timeline.files if file.parent != folder]
     kinds = Counter(file.suffix.lower() for file in found)
     if kinds[out.suffix.lower()] or any(count > 1 for count in kinds.values()):
-        what = f"holds other frames, such as {found[0].name}, whose times its {TIMES_FILE} would not state"
-        raise InputError(what, folder, "Write into a folder of its own")
+        what = f"holds other frames, such as {found[0].name}, whose times the new {TIMES_FILE} would lack"
+        raise InputError(what, folder, "Write into a separate folder")
 
 
 def _scan_files(folder: Path) -> list[Path]:

@@ -161,7 +161,7 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
     except ImportError:  # the library that finds neighbours is linked to EGL
         effects = {"normals": "the discs face the viewer", "radii": "all have the same size"}
         effect = " and ".join(effects[name] for name in missing)
-        warn(f"no {' and '.join(missing)} can be estimated here: {effect}")
+        warn(f"Scan4D cannot estimate {' or '.join(missing)} here: {effect}")
         return pose
 
 

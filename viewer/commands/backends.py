@@ -37,7 +37,7 @@ def run(args: Namespace) -> int:
     else:
         print("\n\n".join(_as_text(b) for b in all_backends().values()))
         if obstacle:
-            print(f"\nNone of them is available here: {obstacle}")
+            print(f"\nNo renderer is available on this computer: {obstacle}")
     return 0
 
 

@@ -156,7 +156,9 @@ def _stop(args: Namespace) -> Stop | None:
     elif args.depth is not None:
         stated = {"rule": "depth", "depth": args.depth}
     if stated and args.out.suffix.lower() not in formats.scan_suffixes():
-        raise InputError(f"--{stated['rule']} is for octrees", args.out, "Write a .svo, or leave it out")
+        raise InputError(
+            f"--{stated['rule']} is for octrees", args.out, "Write a .svo file, or leave this option out"
+        )
     return Stop(**stated) if stated else None
 
 

@@ -180,7 +180,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         *([("read by", facts["package"])] if facts["package"] else []),
         ("poses", poses),
         ("pose", f"{facts['pose']}, {facts['label']}"),
-        *([("unreadable", f"{broken} of {broken + 1} poses that were tried")] if broken else []),
+        *([("unreadable", f"{broken} of {broken + 1} poses that Scan4D tried")] if broken else []),
         ("points", points),
         *(("view", _shown_view(view)) for view in facts["views"]),
         *(("beside", text) for text in facts["beside"]),
@@ -200,7 +200,7 @@ def _as_text(facts: dict[str, Any]) -> str:
 
 def _stream_as_text(facts: dict[str, Any]) -> str:
     depth = facts["depth"]
-    text = "finer than Z" if facts["finer"] else f"to {depth['error']:.3g}"
+    text = "in 2^24 steps" if facts["finer"] else f"accurate to {depth['error']:.3g}"
     rows = [
         ("code words", facts["name"]),
         ("picture", "{} x {} pixels".format(*facts["size"])),

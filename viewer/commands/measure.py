@@ -113,8 +113,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     how.add_argument(
         "--order", choices=ORDERS, default=ORDERS[0],
         help=(
-            "what the rows of measures contain; speed and acceleration also add rows of the landmarks' "
-            f"paths; default {ORDERS[0]}"
+            "quantity in the rows of measures; speed and acceleration also add rows for landmarks; "
+            f"default {ORDERS[0]}"
         ),
     )  # fmt: skip
     how.add_argument(
@@ -125,12 +125,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     how.add_argument(
         "--anchors", type=_names, metavar="NAME,...",
-        help="rigid references: at least three landmarks, whose common motion Scan4D removes",
+        help="rigid references: at least three landmarks; Scan4D removes their common motion",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=_time, metavar="SECONDS",
-        help="width of the smoothing window for speed, acceleration and numbers; "
-        f"default {Smoothing().seconds}",
+        help=(
+            "width of the smoothing window for speed, acceleration and the table of --numbers; default "
+            f"{Smoothing().seconds}"
+        )
+        ,
     )  # fmt: skip
     how.add_argument(
         "--aligned", metavar="MEASURE", help="measure whose peaks align the repeats; default: the first"

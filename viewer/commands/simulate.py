@@ -66,7 +66,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         type=int,
         default=2,
         metavar="N",
-        help="number of pods, 1 to 8; default 2, left and right of the front",
+        help="number of pods, 1 to 8; default 2, one to the left and one to the right of the front",
     )
     arrangement.add_argument(
         "--azimuths", type=float, nargs="+", action="extend", metavar="A", help="azimuth of each pod, degrees"
@@ -107,7 +107,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         type=float,
         default=90.0,
         metavar="DEGREES",
-        help="largest angle of incidence with a depth, degrees",
+        help="largest angle of incidence at which a pixel still gets a depth, degrees",
     )
     faults.add_argument(
         "--gain", type=_factors, nargs="+", action="extend", metavar="G|R,G,B",
@@ -115,7 +115,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     faults.add_argument(
         "--calibration-error", type=_numbers, default=(0.0,), metavar="DEGREES[,DEGREES...]",
-        help="turn the stored calibration to the left; for all pods or for each",
+        help="error of the stored calibration, as a turn to the left in degrees; for all pods or for each",
     )  # fmt: skip
     faults.add_argument(
         "--seed", type=arguments.seed, default=0, metavar="N", help="seed of all random numbers; default 0"

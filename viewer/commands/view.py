@@ -72,7 +72,7 @@ def run(args: Namespace) -> int:
                 raise
             if refused is not None:
                 raise refused from error
-            tell(f"No window: {error.what}. Playing into {args.fallback} instead.")
+            tell(f"No window: {error.what}. Scan4D writes pictures into {args.fallback} instead.")
         for problem in problems:
             warn(str(problem))
         _play_all(args, timelines)
@@ -119,7 +119,7 @@ def _open_window(args: Namespace, named: _Named, first: Timeline, refused: Input
     if display() is None:
         raise NoOpenGLError(
             "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)",
-            hint="Use --fallback DIR to play into a folder, or 'scan4d render'",
+            hint="Use --fallback DIR to write pictures into a folder, or 'scan4d render'",
         )
     from .. import app
 

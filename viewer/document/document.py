@@ -41,7 +41,10 @@ from .schema import (
 
 P = TypeVar("P", bound=Part)
 _UPRIGHT = 0.999  # cosine between a camera's up and the scan's
-Span = Annotated[tuple[PoseNumber, PoseNumber], Kind("two frames in order", lambda ends: ends[0] <= ends[1])]
+Span = Annotated[
+    tuple[PoseNumber, PoseNumber],
+    Kind("a first and a last frame, in this order", lambda ends: ends[0] <= ends[1]),
+]
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ def _read_known(data: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
     """Values by name, each of its kind; what has a name that is not known here, or cannot be read, stays as
     it is."""
     if not is_object(data):
-        raise InputError(f"is not values by name but {shortened(data)}", hint=DAMAGED)
+        raise InputError(f"is not an object with named values but {shortened(data)}", hint=DAMAGED)
     return {name: _read_or_raw(kinds.get(name), value) for name, value in data.items()}
 
 
@@ -90,7 +93,7 @@ def _read_goal(data: Any) -> Goal | None:
         goal.kind in ("time", "error") and 0 < goal.bound < math.inf and usable_unit(goal.unit)
     ):
         return goal
-    raise InputError(f"is no bound of a time or an error but {shortened(data)}", hint=DAMAGED)
+    raise InputError(f"is not a limit on time or error but {shortened(data)}", hint=DAMAGED)
 
 
 def _read_way(data: Any) -> DrawingWay | None:
@@ -155,7 +158,7 @@ class Document:
         Raises InputError where it is no object, or nested so deeply that it could not be written again.
         """
         if not is_object(data) or not is_object(data.get("unread", {})):
-            raise InputError(f"is not values by name but {shortened(data)}", hint=DAMAGED)
+            raise InputError(f"is not an object with named values but {shortened(data)}", hint=DAMAGED)
         hints = get_type_hints(cls, include_extras=True)
         stated = {name: value for name, value in data.items() if name != "unread"}
         left = dict(unread(data.get("unread", {})))

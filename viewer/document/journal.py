@@ -106,7 +106,7 @@ def _saved(journal: Path) -> Path | None:
         return None
     folder = head.pop("folder", None)
     if not isinstance(folder, str):
-        raise _put_aside(journal, "does not tell where it was to go")
+        raise _put_aside(journal, "does not name its folder")
     try:
         recording = Recording.from_json(head | {"entries": changes}, journal)
     except InputError as error:
@@ -168,7 +168,7 @@ def _put_aside(journal: Path, what: str) -> InputError:
     kept = journal.with_suffix(_ASIDE)
     with suppress(OSError):
         os.replace(journal, kept)
-    return InputError(f"a recording that was not finished {what}", kept, DAMAGED)
+    return InputError(f"an unfinished recording {what}", kept, DAMAGED)
 
 
 def _delete(journal: Path) -> None:

@@ -30,7 +30,7 @@ class Part:
         super().__init_subclass__(**others)
         known = Part.kinds.get(name)
         if known is not None and _full_name(known) != _full_name(cls):
-            raise TypeError(f"two parts are called '{name}': {_full_name(known)} and {_full_name(cls)}")
+            raise TypeError(f"two parts have the name '{name}': {_full_name(known)} and {_full_name(cls)}")
         cls.part_name = name
         Part.kinds[name] = cls
 
@@ -42,10 +42,10 @@ class Part:
         """
         name = cls.__name__
         if not is_dataclass(cls) or "__dataclass_fields__" not in vars(cls):
-            raise TypeError(f"{name} is no dataclass; declare it with @dataclass(frozen=True)")
+            raise TypeError(f"{name} is not a dataclass; declare it with @dataclass(frozen=True)")
         for field in fields(cls):
             if field.default is MISSING and field.default_factory is MISSING:
-                raise TypeError(f"{name}.{field.name} has no default, which a scan without a '{name}' has")
+                raise TypeError(f"{name}.{field.name} has no default, but a scan without '{name}' needs one")
         check_declaration(cls, name)
 
     def check_storable(self, known: Part | None = None) -> None:

@@ -92,7 +92,7 @@ def _is_place(rows: tuple[_Row, ...]) -> bool:
     return is_rigid(np.array(rows), _EXACT)
 
 
-DrawnScale = Annotated[float, Kind("a scale of at most 1", lambda scale: 0 < scale <= 1)]
+DrawnScale = Annotated[float, Kind("a scale above 0, at most 1", lambda scale: 0 < scale <= 1)]
 Matrix = Annotated[tuple[_Row, _Row, _Row, _Row], Kind("a rotation and a translation, 4 x 4", _is_place)]
 
 
@@ -119,7 +119,7 @@ class Entry:
     size: Annotated[tuple[Count, Count], Kind("width and height", lambda _: True)]
     camera: Camera
     backend: BackendName
-    params: Annotated[Any, Kind("parameters by name", is_object)]
+    params: Annotated[Any, Kind("an object with named parameters", is_object)]
     look: Look
     marks: Marks = field(default_factory=Marks)
     unit: Unit | None = None
@@ -157,8 +157,8 @@ class Entry:
         names = layers.names(request.pose.overview.scalars)
         source = value_source(drawable(request.look, names), names)
         if source in layers.scalars:
-            what = f"the colours come from '{source}', which is computed and not in the scan's files"
-            raise InputError(what, hint="It can be drawn again in other colours")
+            what = f"Scan4D computed the colours '{source}', which the scan's files do not store"
+            raise InputError(what, hint="Choose other colours and try again")
         return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
@@ -312,7 +312,11 @@ class Recording:
     def from_json(cls, data: Any, path: Path) -> Recording:
         """The recording of a JSON object of this file. Raises InputError for whatever is wrong in it."""
         if not isinstance(data, dict) or "format" not in data:
-            raise InputError("is no recording", path, "Use a JSON that the window has recorded, or a picture")
+            raise InputError(
+                "is not a recording",
+                path,
+                "Use a .json file that the window has recorded, or a saved picture",
+            )
         data = migrated(data, FORMAT, {}, path)
         entries = data.get("entries")
         if entries is None:
@@ -436,16 +440,16 @@ def checked_scan_paths(scan: str, recording: Path) -> list[str]:
     where opening it would search through folders, or ask another machine, for whoever wrote the recording.
     """
     if where := remote_location(scan):
-        hint = "If it is the right one, open it first, or name it: scan4d render SCAN --replay ..."
-        raise InputError(f"names its scan as '{shortened(scan)}', {where}", recording, hint)
+        hint = "If this is the right scan, open it first, or name it: scan4d render SCAN --replay ..."
+        raise InputError(f"names the scan '{shortened(scan)}', {where}", recording, hint)
     return scan_paths(scan, recording)
 
 
 def remote_location(scan: str) -> str:
     """Words on where a scan may be that only the user may name; "" where a recording may."""
     if scan.startswith(("//", "\\\\")):
-        return "on another machine"
-    return "all over the folders" if searches_folders(scan) else ""
+        return "which is on another machine"
+    return "a pattern that would search through folders" if searches_folders(scan) else ""
 
 
 def scan_path(scan: str, recording: Path) -> str:
@@ -468,7 +472,7 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
         complete |= change
         entries.append(Entry.from_json(complete, where))
         if number and entries[-1].at < entries[-2].at:
-            raise InputError("is earlier than the entry before it", where, "Put the entries in order of 'at'")
+            raise InputError("is earlier than the entry before it", where, "Sort the entries by 'at'")
     return tuple(entries)
 
 

@@ -74,7 +74,7 @@ class SavedSession:
         Raises InputError where something else is wrong.
         """
         if not is_object(data) or "document" not in data:
-            raise InputError("is no session", where, DAMAGED)
+            raise InputError("is not a session", where, DAMAGED)
         current = migrated(data, FORMAT, {}, where)
         known = {field.name for field in fields(cls)}
         session = structured(cls, {name: current[name] for name in known & current.keys()}, where)
@@ -91,8 +91,10 @@ class SavedSession:
         """The note for the user about a session that was read; None where nothing is unreadable."""
         if not (names := ", ".join(self.document.unreadable)):
             return None
-        what = f"of what was kept of it, these cannot be read: {names}"
-        return str(InputError(what, self.scan, "They stay in its file, for a Scan4D that can"))
+        what = f"Scan4D cannot read some of the saved changes: {names}"
+        return str(
+            InputError(what, self.scan, ("They stay in the file for a version of Scan4D that can read them"))
+        )
 
     def save(self, path: Path) -> None:
         """Write the file. Raises InputError where it cannot be written."""
@@ -163,8 +165,10 @@ def store(session: SavedSession) -> str | None:
         _delete_oldest(path.parent)
     if aside is None:
         return None
-    what = "what is kept of it was changed elsewhere, perhaps in another window"
-    return str(InputError(what, session.scan, f"That is put aside; open {aside} to see it"))
+    what = "something else, perhaps another window, has saved changes of this scan"
+    return str(
+        InputError(what, session.scan, (f"Scan4D moved those changes to {aside}. Open this file to see them"))
+    )
 
 
 def stored(scan: str) -> SavedSession | None:
@@ -182,14 +186,16 @@ def stored(scan: str) -> SavedSession | None:
         _seen[path] = digest, session.document.made
         return session
     except InputError as error:
-        what = f"what was kept of it cannot be read ({error.what})"
+        what = f"Scan4D cannot read the saved changes ({error.what})"
         if _is_foreign(error):
             hint = (
-                f"It stays unchanged in {path}. The scan opens without it, and Scan4D does not store changes"
+                f"They stay unchanged in {path}. The scan opens without them, and Scan4D saves no new changes"
             )
             raise InputError(what, scan, hint) from error
         aside = _put_aside(path)
-        raise InputError(what, scan, f"Scan4D renamed it to {aside}; the scan opens without it") from error
+        raise InputError(
+            what, scan, f"Scan4D renamed their file to {aside}. The scan opens without them"
+        ) from error
 
 
 def stored_elsewhere(scan: str, hash: str) -> list[SavedSession]:
@@ -266,7 +272,7 @@ def _put_aside(path: Path) -> Path:
         os.replace(path, aside)
     except OSError as error:
         what, hint = explained(error)
-        raise InputError(f"cannot be put aside: {what}", path, hint) from error
+        raise InputError(f"cannot be moved out of the way: {what}", path, hint) from error
     return aside
 
 
@@ -284,8 +290,8 @@ def _free_aside(path: Path) -> Path:
             continue
         except OSError as error:
             what, hint = explained(error)
-            raise InputError(f"cannot be put aside: {what}", path, hint) from error
-    raise AssertionError("there is always a number")
+            raise InputError(f"cannot be moved out of the way: {what}", path, hint) from error
+    raise AssertionError("an unused file name always exists")
 
 
 def _delete_oldest(folder: Path) -> None:

@@ -92,7 +92,7 @@ class Saver(Generic[T]):
         self._take_written(0.0)
 
     def _message(self, error: BaseException) -> str:
-        return f"{self._what} are not kept: {error}"
+        return f"{self._what} cannot be saved: {error}"
 
     def _take_written(self, now: float) -> None:
         """Take in what has come of writing."""

@@ -47,14 +47,15 @@ class NewerFormatError(InputError):
     """File of a later Scan4D, whose format is not known here."""
 
 
-DAMAGED = "It is damaged, or was not written by Scan4D; make it again"
+DAMAGED = "The file is damaged, or Scan4D did not write it. Make it again"
 _MOST_BYTES = 256 * 2**20
 _MOST_SECONDS = 86_400.0
 _LATEST = 1e12  # seconds, of a scan
 _LONGEST_WORD = 200
 _DEEPEST = 40  # levels of what is kept unread
 _KEPT = (
-    "what is kept: bool, int, float, str, None, tuple[...], Mapping[str, ...], frozen dataclasses of these"
+    "Scan4D stores only bool, int, float, str, None, tuple[...], Mapping[str, ...], frozen "
+    "dataclasses of these"
 )
 
 
@@ -103,11 +104,11 @@ Unit = Annotated[str, Kind("a unit", _is_unit)]
 Hash = Annotated[str, Kind("a hash", _is_word)]
 ScanName = Annotated[str, Kind("the name of a scan", _is_name)]
 Count = Annotated[int, Kind("a whole number", lambda value: 0 <= value < 2**31)]
-PoseNumber = Annotated[int, Kind("the number of a pose", lambda value: 0 <= value < 2**31)]
+PoseNumber = Annotated[int, Kind("the index of a frame", lambda value: 0 <= value < 2**31)]
 Time = Annotated[float, Kind("a time in seconds", lambda value: abs(value) <= _LATEST)]
 FrameRate = Annotated[float, Kind("frames a second", lambda value: FPS_LIMITS[0] <= value <= FPS_LIMITS[1])]
-Stamp = Annotated[float, Kind("a time within a day, in seconds", _is_stamp)]
-Values = Annotated[Any, Kind("values by name", is_object)]
+Stamp = Annotated[float, Kind("a time from 0 to 86400 s", _is_stamp)]
+Values = Annotated[Any, Kind("an object with named values", is_object)]
 
 
 def _known_backend(value: Any) -> str:
@@ -202,13 +203,13 @@ def check_declaration(kind: Any, where: str) -> None:
                 check_declaration(one, where)
     elif isinstance(kind, type) and is_dataclass(kind):
         if not kind.__dataclass_params__.frozen:  # type: ignore[attr-defined]
-            raise TypeError(f"{where}: {kind.__name__} can change; declare it with @dataclass(frozen=True)")
+            raise TypeError(f"{where}: {kind.__name__} is mutable; declare it with @dataclass(frozen=True)")
         hints = get_type_hints(kind, include_extras=True)
         for field in fields(kind):
             check_declaration(hints[field.name], f"{kind.__name__}.{field.name}")
     else:
         name = kind.__name__ if isinstance(kind, type) and origin is None else kind
-        raise TypeError(f"{where} cannot be kept as {name}: {_KEPT}")
+        raise TypeError(f"{where} cannot be stored as {name}: {_KEPT}")
 
 
 def check_storable(value: Any, name: str, known: Any = None) -> None:
@@ -248,11 +249,11 @@ def _check_storable(value: Any, name: str) -> None:
         where = ".".join(filter(None, (name, path)))
         if isinstance(cause, _Unfit):
             expected = cause.words.replace("a list", "a tuple")  # which JSON has as a list
-            raise TypeError(f"{where} is to be {expected}, not {_typed(cause.value)}") from None
-        raise TypeError(f"{where} cannot be kept: {cause}") from None
+            raise TypeError(f"{where} must be {expected}, not {_typed(cause.value)}") from None
+        raise TypeError(f"{where} cannot be stored: {cause}") from None
     if again != value:
         where, kept, read = _difference(value, again, name)
-        raise TypeError(f"{where} would be read again as {_typed(read)}, not {_typed(kept)}")
+        raise TypeError(f"{where} would come back as {_typed(read)}, not {_typed(kept)}")
 
 
 def _typed(value: Any) -> str:
@@ -300,9 +301,9 @@ def migrated(
 
     found = data.get("format")
     if type(found) is not int or not (found == to or found in steps):
-        what = f"has the format {found!r:.40}, this Scan4D ({__version__}) reads {to}"
+        what = f"has the format {found!r:.40}, but this version of Scan4D ({__version__}) reads {to}"
         kind = NewerFormatError if type(found) is int and found > to else InputError
-        raise kind(what, where, f"It was written by version {data.get('version')!r:.40}; use that")
+        raise kind(what, where, f"Use version {data.get('version')!r:.40}, which wrote it")
     current = dict(data)
     while found < to:
         current = steps[found](current)
@@ -408,7 +409,7 @@ def _is_declaration(kind: Any) -> bool:
 
 def _declaration(data: Any, kind: type) -> Any:
     if not isinstance(data, dict):
-        raise _Unfit("values by name", data)
+        raise _Unfit("an object with named values", data)
     return parse(kind, data, kind.__name__.lower().removesuffix("s"))
 
 
@@ -422,7 +423,7 @@ def _reading_fields(kind: type, converter: Converter) -> Callable[[Any, Any], An
 
     def read(data: Any, _: Any) -> Any:
         if not isinstance(data, dict):
-            raise _Unfit("values by name", data)
+            raise _Unfit("an object with named values", data)
         return read_fields(data, kind)
 
     return read

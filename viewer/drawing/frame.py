@@ -115,7 +115,7 @@ def reshade(ready: Ready, surface: Surface) -> bool:
     surface.drawn = {**before, "values": surface.values_key}
     shade(surface, request.look)
     stats = surface.stats
-    stats.skipped["draw"] = "the visible surface is the same"
+    stats.skipped["draw"] = "the visible surface has not changed"
     stats.samples = 1
     _note_times(stats, {ready.pose}, ready.start)
     return True

@@ -40,7 +40,7 @@ class Resolved:
     @property
     def size(self) -> tuple[int, int]:
         """The size of the picture, pixels."""
-        assert self.view is not None, "a plan that is drawn has a size"
+        assert self.view is not None, "a plan to draw must have a size"
         return self.view.size
 
 

@@ -74,7 +74,9 @@ def _missing(pose: GpuPose, request: Request) -> tuple[str, ...]:
     """Attributes of the points to estimate. Looks at no point if the backend draws samples."""
     backend, wanted = request.backend, set(request.needs)
     if "views" in wanted and not pose.views:
-        raise InputError(f"{backend.title} draws range views, and this scan has none", hint="Choose another")
+        raise InputError(
+            f"{backend.title} draws range views, but this scan has none", hint="Choose another renderer"
+        )
     has_own = backend.finds_normals or request.draws_samples
     if wants_normals(request.look) and not has_own:
         wanted.add("normals")

@@ -95,7 +95,7 @@ def block_of(declaration: type[Values]) -> Block:
         if kind is str:
             continue
         if kind not in _KINDS:
-            raise TypeError(f"{declaration.__qualname__}.{field.name}: a block holds no {kind}")
+            raise TypeError(f"{declaration.__qualname__}.{field.name}: a uniform block cannot hold {kind}")
         glsl, word, count, multiple = _KINDS[kind]
         gap = -len(words) % multiple
         members.append(Member(glsl, field.name, field.metadata.get("help", ""), gap))

@@ -165,7 +165,7 @@ class Chunks:
     @property
     def known(self) -> Ordered:
         """The order that is known."""
-        assert self._order is not None, "take_order comes before"
+        assert self._order is not None, "call take_order first"
         return self._order
 
     def _known_order(self, cloud: PointCloud) -> Ordered:

@@ -97,7 +97,7 @@ def list_flagged(
     and 5. Where no order is needed and few items are listed, `reserve` of common/list.glsl reads flags once.
     """
     if count > listed.capacity:
-        raise ValueError(f"a list of {listed.capacity:,} has no room for {count:,} items")
+        raise ValueError(f"a list for {listed.capacity:,} items has no room for {count:,} items")
     listed.clear()
 
     def bind_list(program: Program) -> None:
@@ -129,7 +129,7 @@ def scan_words(
     Each word is asked for three times, once where there is one block.
     """
     if count > MOST_WORDS:
-        raise ValueError(f"prefix sums of {count:,} words; at most {MOST_WORDS:,}")
+        raise ValueError(f"prefix sums of {count:,} words are too many; the limit is {MOST_WORDS:,}")
     _scan_level(gpu, 1, words, count, bind, defines or {}, parts or {})
 
 

@@ -80,8 +80,10 @@ class Gpu:
             raise NoOpenGLError(
                 f"OpenGL {ctx.version_code / 100:.1f} on '{ctx.info['GL_RENDERER']}' is not enough"
                 + (f" (no {', '.join(missing)})" if missing else ""),
-                hint="Scan4D needs OpenGL 4.3 with ARB_clip_control. Update the graphics driver, or run "
-                "'scan4d doctor' to see what there is",
+                hint=(
+                    "Scan4D needs OpenGL 4.3 with ARB_clip_control. Update the graphics driver, or run "
+                    "'scan4d doctor' to see what this computer has"
+                ),
             )
         self.ctx = ctx
         self._headless = headless

@@ -72,7 +72,8 @@ class GpuPose:
         """The points as the scan has them. Raises InputError for more than the driver takes."""
         if self.pose.count > self.gpu.max_points:
             raise InputError(
-                f"{self.pose.count:,} points in one pose; this driver takes {self.gpu.max_points:,}",
+                f"has {self.pose.count:,} points in one pose, but this driver can handle only "
+                f"{self.gpu.max_points:,}",
                 hint="Split the scan or thin it out",
             )
         return self.pose.cloud
@@ -279,7 +280,9 @@ class GpuPose:
         values: NDArray | None = getattr(self._centered if name == "positions" else self.cloud, name)
         if values is None:
             hint = (
-                "Give the look when rendering, which estimates what is missing" if name == "normals" else None
+                "Pass the look to the rendering call, which then estimates missing data"
+                if name == "normals"
+                else None
             )
             raise InputError(f"the scan has no {name}", hint=hint)
         return values

@@ -69,7 +69,7 @@ class Image:
     def __init__(self, gpu: Gpu, size: tuple[int, int], channels: int) -> None:
         width, height = size
         if width < 1 or height < 1 or channels not in _FORMATS:
-            raise ValueError(f"no image: {width}x{height} samples of {channels} channels")
+            raise ValueError(f"an image cannot have {width}x{height} samples of {channels} channels")
         nbytes = 4 * channels * width * height
         if nbytes > gpu.max_storage_bytes or width * height > gpu.max_points:
             raise InputError(f"an image of {width}x{height} samples is too large for this driver")
@@ -220,8 +220,8 @@ def _check(
     fine, coarse = (source, result) if name == "reduce" else (result, source)
     images = [image for image in (source, result, detail) if image is not None]
     if coarse.size != sizes(fine.size, 2)[1] or (detail is not None and detail.size != fine.size):
-        raise ValueError(f"no levels that follow one another: {[image.size for image in images]}")
+        raise ValueError(f"the levels do not follow one another: {[image.size for image in images]}")
     if channels and len({image.channels for image in images}) > 1:
-        raise ValueError("levels with different channels")
+        raise ValueError("the levels have different channels")
     if result is detail or result is source:
-        raise ValueError("a level cannot be made in place")
+        raise ValueError("a level cannot be computed in place")

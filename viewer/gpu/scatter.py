@@ -124,7 +124,7 @@ class FixedPoint:
 
     def __post_init__(self) -> None:
         if self.most < 0:
-            raise ValueError(f"no count of numbers: {self.most}")
+            raise ValueError(f"a count of numbers must be 0 or more, not {self.most}")
         _ = self.steps
 
     @cached_property
@@ -147,7 +147,9 @@ class FixedPoint:
 
 def _step(limit: float, finest: float, most: int) -> float:
     if not (0 < finest <= limit < np.inf):
-        raise ValueError(f"no limit and step of a channel: {limit}, {finest}")
+        raise ValueError(
+            f"a channel's step must be above 0 and at most its limit: limit {limit}, step {finest}"
+        )
     step = float(2.0 ** np.ceil(np.log2(finest)))
     while most * round(float(np.float32(limit)) / step) > _LARGEST_SUM:
         step *= 2
@@ -166,7 +168,7 @@ class CellSums:
 
     def __init__(self, gpu: Gpu, cells: int, channels: int) -> None:
         if cells < 0 or channels < 1:
-            raise ValueError(f"no sums: {channels} channels in {cells} cells")
+            raise ValueError(f"sums need 0 or more cells and at least 1 channel, not {cells} and {channels}")
         nbytes = 4 * channels * cells
         if nbytes > gpu.max_storage_bytes:
             raise InputError(f"sums of {channels} channels in {cells:,} cells are too large for this driver")

@@ -34,7 +34,7 @@ def triangulated(views: Sequence[RangeView]) -> Mesh:
         faces.append(own + np.uint32(before))
         before += int(np.count_nonzero(view.valid()))
     if not sum(map(len, faces)):
-        raise InputError("no neighbours of the range views are of one surface")
+        raise InputError("no neighbouring samples of the range views lie on one surface")
     return Mesh(points, np.concatenate(faces))
 
 

@@ -37,7 +37,7 @@ class Mesh:
         if self.points.dropped:
             raise InputError(f"{self.points.dropped} vertices of the mesh are not finite")
         if int(self.faces.max()) >= len(self.points):
-            raise InputError(f"a face names vertex {self.faces.max()} of {len(self.points)}")
+            raise InputError(f"a face refers to vertex {self.faces.max()} of {len(self.points)}")
 
     @property
     def origin(self) -> NDArray[np.float64]:
@@ -162,7 +162,7 @@ class Mesh:
 def read_mesh(path: Path | str) -> Mesh:
     """The mesh of a file of points with faces. Raises InputError where it is damaged or has no faces."""
     faces, points = read_faces(path), read(path)
-    assert isinstance(points, PointCloud), "the formats with faces hold points"
+    assert isinstance(points, PointCloud), "formats with faces also hold points"
     try:
         return Mesh(points, faces.triangles())
     except InputError as error:

@@ -72,7 +72,7 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     """
     suffix = path.suffix.lower()
     if suffix not in suffixes:
-        what = f"cannot write '{suffix}' files" if suffix else "has no suffix that tells the format"
+        what = f"cannot write '{suffix}' files" if suffix else "has no suffix that sets the format"
         raise InputError(what, path, f"Known: {', '.join(suffixes)}")
     if not os.path.isdir(path.parent):  # which raises nothing
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
@@ -81,7 +81,9 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     places = len(_NUMBER.findall(path.name))
     film = suffix == FILM_SUFFIX
     if places > 1 or (places and film):
-        raise InputError("has too many number fields", path, "A film takes none, others one")
+        raise InputError(
+            "has too many number fields", path, "Use no field such as %04d for a film, and one for pictures"
+        )
     if several and not places and not film:
         film_hint = f" or {path.stem}{FILM_SUFFIX}" if FILM_SUFFIX in suffixes else ""
         hint = f"Use a pattern such as {path.stem}%04d{path.suffix}{film_hint}"
@@ -177,10 +179,12 @@ def read_description(path: Path) -> str:
         if isinstance(error, OSError) and error.errno:
             what, hint = explained(error)
             raise InputError(f"cannot be read: {what}", path, hint) from error
-        raise InputError("cannot be read as a picture", path, "It is damaged, or of another kind") from error
+        raise InputError(
+            "cannot be read as a picture", path, "The file is damaged, or has another format"
+        ) from error
     if not isinstance(text, str):
-        hint = "Pictures that 'scan4d render' and the window save hold it"
-        raise InputError("holds no data on how it was made", path, hint)
+        hint = "Use a picture that 'scan4d render' or the window has saved"
+        raise InputError("does not store how it was made", path, hint)
     return text
 
 

@@ -28,11 +28,12 @@ class Marks:
     """A choice of what is drawn over a picture."""
 
     scale_bar: bool = param(
-        False, "Scale bar of a round length. In perspective it is right at the depth of the camera's target"
+        False,
+        ("Scale bar of a round length. In perspective it is valid only at the depth of the camera's target"),
     )
     color_bar: bool = param(
         False,
-        "Colour bar, if the look colours by a number or by level, or paints holes",
+        "Colour bar, if the colours show a number or a level, or mark holes",
     )
     stamp: bool = param(False, "Number and time of the frame")
     notes: bool = param(False, "Notes on positions and on the frame")

@@ -66,7 +66,7 @@ class ProjectionParams:
     )
     step: float = param(
         6.0,
-        "Largest depth step between neighbours of one surface, in cells of their level",
+        "Largest depth step between neighbouring samples of one surface, in cell widths at their level",
         low=0.1,
         high=100,
         group=_LEVELS,
@@ -92,7 +92,7 @@ class ProjectionParams:
     )
     widest: float = param(
         1.0,
-        "Widest hole that a level fills beyond the gaps between samples, in cells of the level",
+        "Widest hole that a level fills beyond the gaps between samples, in cell widths at that level",
         low=0,
         high=3,
         group=_LEVELS,
@@ -109,7 +109,7 @@ class ProjectionParams:
     )
     tolerance: float = param(
         2.0,
-        "How far behind a nearer surface a sample must lie to be hidden, in cells of its level",
+        "How far behind a nearer surface a sample must lie to be hidden, in cell widths at its level",
         low=0,
         high=100,
         group=_HIDDEN,
@@ -118,7 +118,7 @@ class ProjectionParams:
 
     neighbors: int = param(
         4,
-        "Samples this close to a sample of the nearer surface stay visible",
+        "Samples within this distance from a sample of the nearer surface stay visible",
         low=0,
         high=100,
         unit="samples",

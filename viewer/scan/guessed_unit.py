@@ -8,7 +8,7 @@ from .upright import first_elevation
 
 # What is scanned: how long it is in metres, at least and below what; and in which units that is usual.
 _SUBJECTS = (
-    ("m", 0.03, 0.12, "what fits into a hand"),
+    ("m", 0.03, 0.12, "an object that fits into a hand"),
     ("m", 0.12, 0.45, "a head or a hand"),
     ("m", 0.45, 3.0, "a body"),
     ("m", 3.0, 12.0, "a room"),

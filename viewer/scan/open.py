@@ -61,10 +61,7 @@ def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float 
         what = f"The folder also holds {_listed(others)}, which this scan does not use"
         timeline.messages.append(ScanMessage("beside", f"{what}. Open such a file by its name to see it."))
     if stated and not usable_unit(stated):
-        what = (
-            f"the scan names '{shortened(stated)}' as its unit of length, which is not a short word "
-            "such as mm"
-        )
+        what = f"the scan has the unit of length '{shortened(stated)}', which is not a short word such as mm"
         timeline.messages.append(ScanMessage("unit", f"{what}: the unit stays unknown"))
     if measured and fps is not None:
         timeline.messages.append(

@@ -94,7 +94,10 @@ class RangeView:
         if self.kind not in (kinds := get_args(DepthKind)):
             raise unknown_name("kind of depth", self.kind, kinds)
         if self.kind == "range" and self.xy is not None:
-            raise InputError("a range view has measured x and y beside a range", hint="Give z instead")
+            raise InputError(
+                "a range view cannot have measured x and y together with a range",
+                hint="Give z instead of the range",
+            )
         numbers = np.array([self.fx, self.fy, self.cx, self.cy])
         if not ((np.abs(numbers) < _LARGEST).all() and (numbers[:2] > 1 / _LARGEST).all()):
             given = f"fx {self.fx:g}, fy {self.fy:g}, cx {self.cx:g}, cy {self.cy:g}"
@@ -218,7 +221,8 @@ class RangeView:
         x, y = self._seen(rows, columns)
         if not can_be_undone(x, -y, self.distortion):
             raise InputError(
-                f"a range view's distortion ({shown}) folds the picture over before its corners",
+                f"a range view's distortion ({shown}) maps different rays to the same pixel before "
+                "it reaches the picture's corners",
                 hint="Check the coefficients and their order: k1 k2 p1 p2 k3 k4 k5 k6",
             )
 

@@ -69,7 +69,10 @@ def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, nam
     x, y = ground.left + ground.right * columns / 2, ground.first + ground.down * rows / 2
     right, down = ground.right, ground.down
     if not (np.isfinite([x, y]).all() and right and down):
-        raise InputError(f"its cells measure {right:g} x {down:g} from {ground.left:g}, {ground.first:g}")
+        raise InputError(
+            f"its cells have the unusable size {right:g} x {down:g}, starting at {ground.left:g}, "
+            f"{ground.first:g}"
+        )
     if ground.degrees:
         if abs(y) >= 90:
             raise InputError(f"its centre is at {y:g} degrees of latitude")

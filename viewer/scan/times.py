@@ -114,7 +114,11 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> NDArray[np.float64]:
         if index is None:
             continue
         if lines[index]:
-            raise _bad_row(path, line, f"a second time for '{labels[index]}', after line {lines[index]}")
+            raise _bad_row(
+                path,
+                line,
+                (f"has a second time for '{labels[index]}', which line {lines[index]} already has"),
+            )
         times[index], lines[index] = time, line
     if np.isnan(times).any():
         missing = labels[int(np.isnan(times).argmax())]

@@ -59,7 +59,7 @@ class Faults:
         ):
             if not (0 <= value <= most and np.isfinite(value)):
                 limits = "0 or more" if most == np.inf else f"0 to {most}"
-                raise InputError(f"a scanner's {name} is {value}, expected {limits}")
+                raise InputError(f"a scanner's {name} must be {limits}, not {value}")
 
     def deviation(
         self, depth: NDArray[np.float64], cosine: NDArray[np.float64], distance: float
@@ -98,7 +98,7 @@ def rig(
     if not 1 <= len(azimuths) <= MOST_PODS:
         raise InputError(f"a scanner has 1 to {MOST_PODS} pods, not {len(azimuths)}")
     if not np.isfinite([*azimuths, elevation]).all():
-        raise InputError("azimuth and elevation of a pod are finite numbers")
+        raise InputError("azimuth and elevation of a pod must be finite numbers")
     return [
         Camera.orbit(bounds, azimuth, elevation, aspect=aspect, up=up, fov_y=fov_y) for azimuth in azimuths
     ]

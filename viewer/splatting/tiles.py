@@ -49,7 +49,7 @@ def splat_first(points: Points, surface: Surface, splats: Splats, farthest: int)
     farthest = farthest if away or farthest == LIMIT else 0
     show_all(points, surface, lists, splats, farthest)
     if not away:
-        surface.stats.skipped["second lists"] = "no splat that is drawn faces away"
+        surface.stats.skipped["second lists"] = "all drawn splats face the viewer"
         return True
     if not fill_away(points, surface, lists, splats):
         return False
@@ -64,7 +64,9 @@ def fill_away(
     over next, to blend what they hold."""
     fits = lists.fill(points, surface, splats, AWAY, ListPurpose(both=blends, looks=blends))
     if not fits:
-        surface.stats.skipped["tiles"] = f"lists of {lists.length:,} entries: all rasterised"
+        surface.stats.skipped["tiles"] = (
+            f"the lists have {lists.length:,} entries, so all splats are rasterised"
+        )
     return fits
 
 
@@ -90,18 +92,18 @@ def tile_lists(
             surface.clear()
             fits = lists.fill(points, surface, splats, side, ListPurpose(sends=True))
         if not fits:
-            reason = f"too long lists, {lists.length:,} entries"
+            reason = f"the lists are too long ({lists.length:,} entries)"
         elif not lists.away and lists.large * _LARGE_COST > lists.length + lists.sent:
             reason = f"{lists.large:,} large splats"
     if reason:
-        surface.stats.skipped["tiles"] = f"{reason}: all rasterised"
+        surface.stats.skipped["tiles"] = f"{reason}, so all splats are rasterised"
         return None
     if lists.large:
         surface.stats.skipped["large splats in tiles"] = f"{lists.large:,} rasterised"
     else:
         surface.stats.skipped["splat"] = "no splat is large"
     if lists.sent:
-        surface.stats.skipped["lists of small splats"] = f"{lists.sent:,} sent to their pixels"
+        surface.stats.skipped["lists of small splats"] = f"{lists.sent:,} drawn without a list"
         lists.take_sent(points, surface, splats)
     return lists
 

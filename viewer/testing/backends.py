@@ -82,7 +82,7 @@ def backend_checks(name: str) -> list[Check]:
 
 
 def _declarations(one: Backend) -> None:
-    assert isinstance(one.title, str), "title is no text"
+    assert isinstance(one.title, str), "title is not a text"
     assert one.title.strip(), "title is empty"
     assert one.help.strip(), "the docstring of its module does not say what it draws"
     assert one.good_for.strip(), "good_for does not say when to choose it"
@@ -226,7 +226,7 @@ def _ids_are_those_of_the_file(name: str) -> None:
 def _a_preview_shows_rows_of_the_sample_and_counts_the_others(name: str) -> None:
     cloud = sphere(20_000)
     surface = _preview(cloud, name, 0.25)
-    assert surface.stats.share in (0.25, 1.0), "one that is fast enough may draw all"
+    assert surface.stats.share in (0.25, 1.0), "a renderer that is fast enough may draw all points"
     rows = np.unique(surface.row[surface.row != NOTHING])
     sampled = is_sampled(np.arange(len(cloud), dtype=np.uint32), surface.stats.share)
     assert sampled[rows].all()

@@ -42,16 +42,18 @@ def measure_checks(kind: str) -> list[Check]:
 
 
 def _it_declares_itself(kind: MeasureKind) -> None:
-    assert kind.name.isidentifier(), "files and commands know it by its name"
+    assert kind.name.isidentifier(), "the name must be an identifier, for files and commands"
     assert kind.title
     assert kind.about
     assert kind.quantity in get_args(Quantity)
     assert kind.least >= 1
     assert kind.most is None or kind.most >= kind.least
     for name, values in kind.choices.items():
-        assert isinstance(values, tuple), f"the values of {name} are a tuple of texts"
+        assert isinstance(values, tuple), f"the values of {name} must be a tuple of texts"
         assert values
-    assert not (kind.needs_surface and kind.lines), "a measure of a surface gives its lines with the value"
+    assert not (kind.needs_surface and kind.lines), (
+        "a measure on the surface must return its lines with the value"
+    )
 
 
 # --- measures of landmarks ------------------------------------------------------------------------
@@ -60,7 +62,7 @@ def _it_declares_itself(kind: MeasureKind) -> None:
 def _it_has_a_value_a_frame(kind: MeasureKind, options: dict[str, str]) -> None:
     positions = _landmarks(kind)
     values = _values(kind, positions, options)
-    assert np.isfinite(values).all(), "landmarks at random have values"
+    assert np.isfinite(values).all(), "random landmarks must have values"
     for frame in range(_FRAMES):
         alone = _values(kind, positions[frame : frame + 1], options)
         np.testing.assert_allclose(alone, values[frame : frame + 1], rtol=1e-9)
@@ -95,7 +97,7 @@ def _its_lines_can_be_drawn(kind: MeasureKind, options: dict[str, str]) -> None:
 def _it_has_a_value_or_a_reason(kind: MeasureKind, options: dict[str, str]) -> None:
     found = _on_ball(kind, options)
     if isinstance(found, Refused):
-        assert found.reason, "a refusal says why"
+        assert found.reason, "a refusal must say why"
         return
     assert np.isfinite(found.value)
     assert found.deviation >= 0
@@ -137,7 +139,7 @@ def _values(kind: MeasureKind, positions: NDArray[np.float64], options: dict[str
     compute: Any = kind.compute
     with np.errstate(all="ignore"):
         values = np.asarray(compute(positions, options))
-    assert values.shape == (len(positions),), f"values have shape {values.shape}, expected one a frame"
+    assert values.shape == (len(positions),), f"values have shape {values.shape}, expected one per frame"
     return values
 
 
@@ -161,12 +163,12 @@ def _on_ball(
     cloud = PointCloud.from_arrays(scale * ball.world() + away, normals=ball.normals)
     compute: Any = kind.compute
     found = compute(PoseSurface(Pose.of(0, 0.0, "ball", cloud)), scale * _around_a_cap(kind) + away, options)
-    assert isinstance(found, Found | Refused), f"it gives a {type(found).__name__}, not Found or Refused"
+    assert isinstance(found, Found | Refused), f"it returns a {type(found).__name__}, not Found or Refused"
     return found
 
 
 def _assert_lines(lines: Any) -> None:
     for line in lines:
-        assert np.ndim(line) == 2, "a line is an array of positions (P, 3)"
+        assert np.ndim(line) == 2, "a line must be an array of positions (P, 3)"
         assert np.shape(line)[1] == 3
         assert np.isfinite(line).all()

@@ -60,11 +60,11 @@ def full_cloud(offset: tuple[float, float, float] = (0, 0, 0), count: int = 50) 
 
 
 def _it_declares_itself(suffix: str, module: ModuleType) -> None:
-    assert isinstance(module.TITLE, str), "TITLE is the name of the format in messages"
+    assert isinstance(module.TITLE, str), "TITLE must be the name of the format in messages"
     assert module.TITLE
     for each in module.SUFFIXES:
-        assert each == each.lower(), f"{each}: suffixes are in lower case"
-        assert each.startswith("."), f"{each}: suffixes begin with a dot"
+        assert each == each.lower(), f"{each}: suffixes must be in lower case"
+        assert each.startswith("."), f"{each}: suffixes must begin with a dot"
     assert suffix in module.SUFFIXES
     assert callable(module.read)
 
@@ -228,7 +228,7 @@ def _refused(path: Path, frame: int = 0) -> str:
     except InputError as error:
         assert error.hint, f"the message does not say what to do: {error}"
         return str(error)
-    raise AssertionError(f"{path.name} is read, and should be refused")
+    raise AssertionError(f"{path.name} is read, but should be refused")
 
 
 def _assert_equal(one: Scanned, other: Scanned) -> None:

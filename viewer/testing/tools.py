@@ -40,8 +40,8 @@ def tool_checks(name: str) -> list[Check]:
 
 def _it_declares_itself(module: str) -> None:
     tool = import_module(module)
-    assert (tool.__doc__ or "").strip(), "the docstring says what the tool does"
-    assert isinstance(tool.TITLE, str), "TITLE names its section of the panel"
+    assert (tool.__doc__ or "").strip(), "the docstring must say what the tool does"
+    assert isinstance(tool.TITLE, str), "TITLE must name its section of the panel"
     assert tool.TITLE
     assert isinstance(tool.Tool, type), "Tool is a class"
     _assert_takes(tool.Tool, 1, "Tool(context)")
@@ -53,9 +53,9 @@ def _its_commands_have_names_and_titles(module: str) -> None:
     menus = getattr(import_module(module), "COMMANDS", {})
     entries = [one for entries in menus.values() for entry in entries for one in _flat(entry)]
     commands = [entry for entry in entries if isinstance(entry, Command)]
-    assert len({command.name for command in commands}) == len(commands), "two commands have one name"
+    assert len({command.name for command in commands}) == len(commands), "two commands have the same name"
     for command in commands:
-        assert command.name.isidentifier(), f"'{command.name}' is no name for keys.toml"
+        assert command.name.isidentifier(), f"'{command.name}' is not a valid name for keys.toml"
         assert command.title, f"{command.name} has no title"
         _assert_takes(command.act, 1, f"the function of {command.name}")
 
@@ -68,7 +68,7 @@ def _flat(entry: object) -> Iterator[object]:
         for inner in (inner for group in entry.groups for inner in group):
             yield from _flat(inner)
         return
-    assert isinstance(entry, Command | Listing), f"{entry!r} is no command: is a comma missing?"
+    assert isinstance(entry, Command | Listing), f"{entry!r} is not a command: is a comma missing?"
     yield entry
 
 
@@ -83,7 +83,9 @@ def _its_settings_have_defaults(module: str) -> None:
     settings: Any = getattr(import_module(module), "Settings", None)
     if settings is not None:
         fields = dataclasses.fields(settings)
-        assert all(field.default is not dataclasses.MISSING for field in fields), "a field has no default"
+        assert all(field.default is not dataclasses.MISSING for field in fields), (
+            "every field must have a default"
+        )
 
 
 def _its_parts_can_be_stored(module: str) -> None:
@@ -105,7 +107,9 @@ def _it_knows_its_context_alone(module: str) -> None:
     for name in names:
         inner = name.removeprefix(window)
         known = inner == name or any(f"{inner}.".startswith(f"{each}.") for each in KNOWN)
-        assert known, f"it imports {name}; of the window, a tool may import {', '.join(KNOWN)}"
+        assert known, (
+            f"it imports {name}; a tool may import only these parts of the window: {', '.join(KNOWN)}"
+        )
 
 
 _FOR_ALL = (
@@ -127,7 +131,7 @@ def _own(module: ModuleType) -> Iterator[type[Part]]:
 
 def _assert_takes(function: object, count: int, what: str) -> None:
     """That a function can be called with so many positional arguments."""
-    assert callable(function), f"{what} is no function"
+    assert callable(function), f"{what} is not a function"
     try:
         inspect.signature(function).bind(*range(count))
     except TypeError as error:

@@ -60,7 +60,7 @@ class SeenPoints:
         """The points of a cloud from an eye (3,), absolute. Raises InputError for what is no place."""
         at = np.asarray(eye, np.float64)
         if at.shape != (3,) or not np.isfinite(at).all():
-            raise InputError(f"an eye has three finite coordinates, not {eye!r}")
+            raise InputError(f"the eye must have three finite coordinates, not {eye!r}")
         positions = cloud.positions.astype(np.float64)
         if cloud.remainders is not None:
             positions += cloud.remainders
@@ -105,7 +105,7 @@ def flipping(seen: SeenPoints, radius: float) -> Kernel:
     farthest = float(seen.distance.max(initial=0.0))
     if not farthest <= radius * _ROUNDED < np.inf:
         raise InputError(
-            f"a sphere of radius {radius:g} round the eye does not hold all points",
+            f"a sphere of radius {radius:g} around the eye does not contain all points",
             hint=f"The farthest is {farthest:g} away",
         )
 

@@ -141,7 +141,7 @@ class SeenPicture(_Search):
         stats = surface.stats
         known = self._found is not None and self._pose is not None and self._pose() is pose
         if known and self._sought in ((sought, None), (sought, sides)):
-            stats.skipped["visible"] = "pose and eye stand still"
+            stats.skipped["visible"] = "neither the pose nor the eye has changed"
         else:
             clip = (near, *(sides or EVERYWHERE[1:]))
             self._find(pose, directions, clip, (settings, frame.moving), sample, surface.stats.share)

@@ -138,7 +138,7 @@ def test_c3d_of_many_points_and_long_names(tmp_path: Path) -> None:
     wanted = moving(3, names)
     remark = write_landmarks(tmp_path / "m.c3d", wanted)
     assert remark is not None
-    assert "names end after 50 bytes" in remark
+    assert "names are cut after 50 bytes" in remark
     found = read_landmarks(tmp_path / "m.c3d", "mm")
     assert len(set(found.names)) == 600
     np.testing.assert_allclose(found.positions[0, :-1], wanted.positions[0, :-1], atol=1e-5)

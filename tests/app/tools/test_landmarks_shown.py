@@ -20,7 +20,7 @@ from viewer.app.tool_context import ToolContext
 from viewer.app.tools.landmarks import Settings, Tool
 from viewer.app.tools.landmarks.corners import regions_of
 from viewer.app.tools.landmarks.shown import ShownLandmarks
-from viewer.app.tools.landmarks.words import corners_words, gap_spans, position_words
+from viewer.app.tools.landmarks.words import corners_words, gap_spans, placed_words, position_words
 from viewer.document.landmarks import Landmarks
 from viewer.scan.units import Scale
 
@@ -118,6 +118,13 @@ def test_corners_of_regions_are_listed_below_them_and_bear_no_names_of_their_own
     tracks = {name: track(Known.PLACED, Known.GAP, Known.GAP, Known.GAP) for name in names}
     (span,) = gap_spans(corners, tracks, tool.regions)
     assert span.words == "No data for Region 1"
+
+
+def test_when_no_landmark_waits_the_prompt_counts_those_that_are_not_placed() -> None:
+    skipped, hidden = Landmark("skipped", skipped=True), Landmark("hidden", missing=(3,))
+    assert placed_words([PLACED, PLACED]) == "All landmarks are placed"
+    assert placed_words([PLACED, skipped]) == "1 of 2 landmarks are placed, 1 skipped"
+    assert placed_words([PLACED, skipped, hidden]) == "1 of 3 landmarks are placed, 1 skipped, 1 not visible"
 
 
 def test_a_correction_can_be_removed_where_there_is_one() -> None:

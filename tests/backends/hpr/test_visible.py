@@ -156,7 +156,7 @@ def test_what_makes_no_sense_is_refused(seen: Seen) -> None:
     points = bumpy(100)
     with pytest.raises(InputError, match="not a viewpoint"):
         seen(points, [0, 0, np.nan])
-    with pytest.raises(InputError, match="does not hold all points"):
+    with pytest.raises(InputError, match="does not contain all points"):
         seen(points, radius=3.0)
     with pytest.raises(InputError, match="mode"):
         seen(points, mode="x-ray")

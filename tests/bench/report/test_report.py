@@ -335,7 +335,7 @@ def test_nothing_to_report_is_said(tmp_path: Path) -> None:
 def test_a_broken_picture_is_said(tmp_path: Path) -> None:
     folder = filled(tmp_path, a_row())
     picture_path(folder, "torus", "points").write_bytes(b"not a picture")
-    with pytest.raises(InputError, match="is no picture"):
+    with pytest.raises(InputError, match="is not a picture"):
         write_report(folder)
 
 

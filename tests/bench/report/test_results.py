@@ -90,8 +90,8 @@ def test_what_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:
     [
         ("{", "is not a row of data"),
         ("[1, 2]", "not a JSON object"),
-        ('{"backend": "points"}', "without a usable scene, scene_hash"),
-        (json.dumps({**a_row(), "errors": 3}), "without a usable errors"),
+        ('{"backend": "points"}', "it lacks a usable scene, scene_hash"),
+        (json.dumps({**a_row(), "errors": 3}), "it lacks a usable errors"),
     ],
 )
 def test_a_broken_line_is_named(tmp_path: Path, line: str, what: str) -> None:
@@ -169,13 +169,17 @@ def test_times_of_another_device_are_not_compared_but_errors_are() -> None:
     old = [a_row(n=n, ms=1.0) for n in (1, 2)]
     new = [a_row({"hole_percent": 5.0}, n=n, ms=9.0, device="another") for n in (1, 2)]
     lines = compare(old, new)
-    assert [line.split(":")[0] for line in lines] == ["worse", "worse", "times not compared"]
+    assert [line.split(":")[0] for line in lines] == [
+        "worse",
+        "worse",
+        "times not compared, because the machine changed",
+    ]
     assert "a device, a driver, finish is now another, a driver, finish" in lines[-1]
 
 
 def test_another_scene_of_the_same_name_is_not_compared() -> None:
     (line,) = compare([a_row()], [a_row({"hole_percent": 50.0}, scene_hash="f" * 16)])
-    assert line == "not compared, the scene changed (scene_hash): points, torus, 1000 points"
+    assert line == "not compared, because the scene changed (scene_hash): points, torus, 1000 points"
 
 
 def test_a_swept_parameter_is_in_the_words() -> None:

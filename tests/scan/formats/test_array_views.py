@@ -155,7 +155,7 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
         ({"xyz": np.ones((2, 2, 3), int)}, "'xyz' is of type int64, expected floats"),
         ({"xyz": np.full((9, 9, 3), np.nan)}, "has only 0 points, too few for a surface"),
         ({"xyz": np.ones((9, 9, 3))}, "its points lie along a line"),
-        ({"depth": np.ones((2, 2)), "mask": np.ones((2, 3))}, r"'mask' has shape \(2, 3\), 'depth' \(2, 2\)"),
+        ({"depth": np.ones((2, 2)), "mask": np.ones((2, 3))}, r"\(2, 3\), but 'depth' has shape \(2, 2\)"),
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 2, 1))}, r"'mask' has shape \(2, 2, 1\)"),
         ({"depth": np.ones((2, 2)), "color": np.ones((2, 2, 2))}, r"array 'color' has shape \(2, 2, 2\)"),
         ({"depth": np.ones((2, 2)), "color": np.ones((2, 2), int)}, "array 'color' is of type int64"),
@@ -184,7 +184,7 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
         ),
         ({"depth": np.ones((2, 2)), "distortion": np.ones(3)}, "expected the numbers k1 k2 p1 p2"),
         ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add dx and dy"),
-        ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "its cells measure 0 x -1"),
+        ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "its cells have the unusable size 0 x -1"),
         ({"normals": np.ones((2, 3))}, "has no array 'positions', only: normals. Name points 'positions'"),
     ],
 )

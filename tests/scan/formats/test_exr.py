@@ -166,7 +166,7 @@ def test_a_cropped_picture_keeps_its_rays(tmp_path: Path) -> None:
         (
             (),
             {"X": np.zeros((40, 48), np.float32), "Y": np.zeros((40, 48), np.float32), "kind": "range"},
-            "beside",
+            "together with a range",
         ),
         ((), {"cx": "middle"}, "could not convert string"),
         ((), {"worldToCamera64": np.eye(3)}, "cannot reshape"),
@@ -372,7 +372,7 @@ def test_empty_pixels_of_a_large_picture_are_no_bomb(tmp_path: Path) -> None:
 
 def test_writing_needs_views_with_names_that_differ(tmp_path: Path) -> None:
     left, _ = pods()
-    with pytest.raises(InputError, match=r"EXR holds range views.* written as \.npz, \.pcd, \.ply"):
+    with pytest.raises(InputError, match=r"EXR stores range views.* written as \.npz, \.pcd, \.ply"):
         formats.write(tmp_path / "f.exr", PointCloud.from_arrays(np.eye(3)))
     for views in ((left, left), (replace(left, name=""),)):
         with pytest.raises(InputError, match="the names of the pods must differ"):

@@ -165,7 +165,7 @@ def test_headers_that_promise_too_much(shape: tuple[int, ...], tmp_path: Path) -
     with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
         archive.writestr("positions.npy", header(shape) + bytes(6 * 12))
     for name in ("scan.npy", "scan.npz"):
-        with pytest.raises(InputError, match=r"promises .* bytes and holds 72|holds no points"):
+        with pytest.raises(InputError, match=r"promises .* bytes but holds 72|holds no points"):
             read(tmp_path / name)
 
 
@@ -199,7 +199,7 @@ def end_of_archive(entry: bytes, count: int, told: int, large: bool) -> bytes:
 @pytest.mark.parametrize(
     ("told", "large", "reason"),
     [
-        (60_000, True, "has 60,000 members, more than the 4,096 that are read"),
+        (60_000, True, "has 60,000 members, more than the 4,096 that Scan4D reads"),
         (60_000, False, "has 60,000 members, more than"),
         (1, True, "has 2,820,000 bytes of names, more than"),
         (1, False, "has 2,820,000 bytes of names, more than"),
@@ -266,10 +266,10 @@ def test_arrays_that_cannot_be_used(arrays: dict[str, np.ndarray], reason: str, 
 @pytest.mark.parametrize(
     ("shape", "descr", "reason"),
     [
-        ((10**9, 1, 3), "<f4", "promises 12000000000 bytes and holds 12"),
+        ((10**9, 1, 3), "<f4", "promises 12000000000 bytes but holds 12"),
         ((10**18, 0, 3), "<f4", "holds no points"),
         ((10**18, 1, 3), "<U0", "is of type <U0, expected numbers"),
-        ((-1, 1, 3), "<f4", "promises -12 bytes and holds 12"),
+        ((-1, 1, 3), "<f4", "promises -12 bytes but holds 12"),
         ((2**63, 1, 3), "<f4", "promises"),
     ],
 )

@@ -113,7 +113,7 @@ def test_damaged_compressed_data(path: Path) -> None:
         whole[:20]: f"holds 12 of its {packed} bytes",
         whole[:4]: "ends early: 4 bytes where 8 should be",
         struct.pack("<II", packed, 10**9)
-        + whole[8:]: "holds 1000000000 bytes of points, its header promises",
+        + whole[8:]: "holds 1000000000 bytes of points, but its header promises",
         struct.pack("<II", 1, unpacked) + whole[8:]: f"1 bytes of compressed data cannot hold {unpacked}",
         whole[:8] + bytes([255]) * packed: "cannot be read as PCD|damaged",
     }

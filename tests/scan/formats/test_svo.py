@@ -351,7 +351,7 @@ def test_files_of_very_many_octrees_are_refused(tmp_path: Path, monkeypatch: pyt
     tree = Octree(np.zeros(3), 1.0, (), 1, 1)
     (tmp_path / "scan.svo").write_bytes(b"".join(to_bytes(tree, time=float(i)) for i in range(6)))
     monkeypatch.setattr(svo, "_MOST_POSES", 5)
-    with pytest.raises(InputError, match="has 6 octrees, more than the 5 that are read"):
+    with pytest.raises(InputError, match="has 6 octrees, more than the 5 that Scan4D reads"):
         formats.frame_count(tmp_path / "scan.svo")
 
 

@@ -105,7 +105,7 @@ def test_a_conf_file_places_no_more_scans_than_a_frame_has(tmp_path: Path) -> No
     FOLDERS["stanford"](tmp_path)
     line = (tmp_path / "scans.conf").read_text()
     (tmp_path / "scans.conf").write_text(3000 * line)
-    with pytest.raises(InputError, match="has 3,000 scans to place, more than the 256 that are read"):
+    with pytest.raises(InputError, match="has 3,000 scans to place, more than the 256 that Scan4D reads"):
         find_source(tmp_path)
 
 

@@ -142,7 +142,7 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
         (json.dumps(CAMERA | {"kind": []}), "unknown kind of depth"),
         (
             json.dumps(CAMERA | {"width": 640, "height": 480}),
-            "6 x 4 pixels, its calibration is for 640",
+            "6 x 4 pixels, but its calibration is for 640",
         ),
         (json.dumps({"intrinsic_matrix": [1, 2]}), "9 numbers"),
     ],
@@ -239,10 +239,10 @@ def test_broken_frames_are_left_out(tmp_path: Path) -> None:
     with open_scan(tmp_path) as scan:
         assert [pose.index for pose in scan] == [0]
         told = {index: str(error) for index, error in scan.broken.items()}
-    assert "depth_1.png: is no PNG or TIFF, or damaged" in told[1]
+    assert "depth_1.png: is not a valid PNG or TIFF file" in told[1]
     assert "depth_2.png: is a picture of type RGB" in told[2]
-    assert "color_3.jpg: is no PNG or JPEG" in told[3]
-    assert "color_4.jpg: has 6 x 2 pixels, its depth 6 x 4" in told[4]
+    assert "color_3.jpg: is not a valid PNG or JPEG" in told[3]
+    assert "color_4.jpg: has 6 x 2 pixels, but its depth picture has 6 x 4" in told[4]
     assert "depth_5.png: has no camera pose" in told[5]
     assert "pose_6.txt: holds 9 numbers" in told[6]
     assert "pose_7.txt: its pose is not a rotation" in told[7]

@@ -150,8 +150,8 @@ def test_pods_that_cannot_be_used(changes: dict[str, object], reason: str, tmp_p
         ("", "is not JSON"),
         ("{", "is not JSON"),
         ("[]", "is not a JSON object"),
-        ("{}", "names no pods"),
-        ('{"pods": []}', "names 0 pods"),
+        ("{}", "lists no pods"),
+        ('{"pods": []}', "lists 0 pods"),
         ('{"pods": [3]}', "pod0 is not a JSON object"),
     ],
 )
@@ -172,7 +172,7 @@ def test_images_of_other_pixels_are_refused(tmp_path: Path) -> None:
     save(tmp_path / "left_0_texture.png", COLORS[1:])
     with (
         open_scan(tmp_path) as scan,
-        pytest.raises(InputError, match="has 121 x 96 pixels, its depth 121 x 97"),
+        pytest.raises(InputError, match="has 121 x 96 pixels, but its depth picture has 121 x 97"),
     ):
         scan.pose(0)
 

@@ -75,7 +75,7 @@ SCENES = (
 
 def rounds_of(surface: Surface) -> list[int]:
     """How many points were left before each round of the search for a surface's last picture."""
-    known = list(surface.stats.counted["neighborhoods by searches"]().values())
+    known = list(surface.stats.counted["neighbourhoods by searches"]().values())
     return [sum(known[number:]) for number in range(len(known))]
 
 

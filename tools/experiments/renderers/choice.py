@@ -110,7 +110,8 @@ EXPERIMENT = Suite(
             [
                 Column("limit", "goal", left=True), Column("views", form="{}"), Column("possible", form="{}"),
                 Column("met, %", "share", "{:.1f}"),
-                Column("at most 1.2 times the best, %", "near", "{:.1f}"), Column("median ratio", "ratio"),
+                Column("share of views within 1.2 times the best, %", "near", "{:.1f}"),
+                Column("median ratio", "ratio"),
             ],
             _choices,
         )

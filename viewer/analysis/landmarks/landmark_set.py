@@ -250,13 +250,13 @@ def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
         return None
     if fits(points * _TURNED):
         return (
-            "with the signs of x and y reversed they lie on it, so one of the two is in RAS and the "
-            "other in LPS"
+            "with the signs of x and y reversed, they lie on the scan, so one of the two is in RAS "
+            "and the other in LPS"
         )
     span = float(np.linalg.norm(np.ptp(points, axis=0)))
     for factor in _FACTORS:
         if factor * span >= _WIDE * bounds.radius and fits(points * factor):
-            return f"multiplied by {factor:.4g} they lie on it, so they are in another unit"
+            return f"multiplied by {factor:.4g} they lie on the scan, so they are in another unit"
     return None
 
 

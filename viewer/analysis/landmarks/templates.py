@@ -69,7 +69,7 @@ def _template(data: Any) -> Template:
     for name, partner in partners.items():
         if partners.get(partner) != name:
             raise InputError(
-                f"'{name}' has the partner '{partner}', which has another partner or none", "landmarks"
+                f"'{name}' has the partner '{partner}', which has a different partner or none", "landmarks"
             )
     names = {landmark.name for landmark in landmarks}
     measures = tuple(

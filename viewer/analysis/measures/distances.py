@@ -30,7 +30,7 @@ from . import Measure, Series
 from .series import series_of
 
 _MOST_BYTES = 16 * 2**20  # of a table
-_HINT = "Use a table that 'Export distances...' has written, unchanged"
+_HINT = "Use an unchanged table that 'Export distances...' has written"
 _OF_END = ("state", "point", "x", "y", "z", "uncertainty", "spacing", "level")
 COLUMNS = (
     "scan", "measure", "frame", "time", "distance", "uncertainty", "unit",

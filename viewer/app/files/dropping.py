@@ -21,7 +21,7 @@ class Dropping(WindowPart):
     """Takes what is dropped onto the window."""
 
     name = "dropping"
-    doing = "Taking what was dropped"
+    doing = "Opening what you dropped"
     window: Window
     scans: Scans
     sessions: Sessions

@@ -45,7 +45,7 @@ class Loading(WindowPart):
     name = "loading"
     doing = "Loading"
     layer = 21
-    shows = "What is loaded"
+    shows = "The loading message"
     session: Session
     playback: Playback
     viewport: Viewport

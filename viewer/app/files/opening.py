@@ -59,7 +59,7 @@ Find = Callable[[], SavedSession | None]  # how a scan was left; it may raise In
 def begin(timeline: Timeline, find: Find, session: SavedSession | None = None) -> Opened:
     """Have its poses come with their facts, and find its hash in the background."""
     timeline.finish = partial(find_facts, is_first=True)
-    hash = in_background(Task("Hashing"), lambda: fingerprint(timeline.files))
+    hash = in_background(Task("Computing the checksum"), lambda: fingerprint(timeline.files))
     left, problem = None, None
     try:
         left = find()
@@ -158,4 +158,6 @@ def read_from(timeline: Timeline, first: int) -> int:
     assert problem is not None  # a timeline has a frame
     if count == 1:
         raise problem
-    raise InputError(f"none of its {count} frames can be read. The first: {problem}", timeline.name)
+    raise InputError(
+        f"Scan4D cannot read any of its {count} frames. The first problem: {problem}", timeline.name
+    )

@@ -27,7 +27,7 @@ def offer_of_stored(scan: str, hash: Future[str | None], use: Callable[[SavedSes
         return ""
     named = [f"{printable(each.scan)} ({_made(each)})" for each in found]
     gone = "" if os.path.lexists(found[0].scan) else ", which is no longer there"
-    choices = {f"Use kept {_made(each)} of {_title(each.scan)}": partial(use, each) for each in found[::-1]}
+    choices = {f"Use {_made(each)} of {_title(each.scan)}": partial(use, each) for each in found[::-1]}
     text = f"Scan4D has seen these files under another name: {'; '.join(named)}{gone}."
     return Offer(text, dict(reversed(choices.items())), _ABOUT)
 
@@ -40,7 +40,7 @@ def offer_of_change(saved: SavedSession, hash: Future[str | None], begin: Callab
     """
     if hash.result() in (saved.hash, None):
         return ""
-    text = "The scan has changed since you saved this: views and distances may no longer fit."
+    text = "The scan has changed since you saved this: bookmarks and distances may no longer fit."
     if not saved.document.made:
         return text
     with suppress(InputError):  # what is kept stays as it is, and a message says so when it is written

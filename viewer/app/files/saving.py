@@ -37,7 +37,7 @@ class Saving(WindowPart):
         save = partial(settings.save, path=user_folder() / settings.FILE)
         self._settings = Saver("Settings", save, self.stored, _EVERY)
         self._document: Saver[SavedSession] = Saver(
-            "Changes of scans", store, None, _EVERY_DOCUMENT, lambda session: session.scan
+            "Changes to scans", store, None, _EVERY_DOCUMENT, lambda session: session.scan
         )
         self._index = 0
 

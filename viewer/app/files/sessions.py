@@ -58,7 +58,7 @@ class Sessions(WindowPart):
         try:
             self._save(file)
         except InputError as error:
-            self.note_of_work(Problem(f"The session is not saved: {error}"))
+            self.note_of_work(Problem(f"Scan4D cannot save the session: {error}"))
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with the session's file, or one that is named like the scan."""

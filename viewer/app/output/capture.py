@@ -217,7 +217,10 @@ class Capture(WindowPart):
 
     def _tell_unsafe(self, error: OSError) -> None:
         what, _ = explained(error)
-        self.note_of_work(f"The recording is only in memory until you stop it ({journal_folder()}: {what}).")
+        self.note_of_work(
+            "Scan4D keeps the recording only in memory until you stop it, because it cannot write to "
+            f"{journal_folder()}: {what}."
+        )
 
     def find_unfinished(self) -> None:
         """Save what processes have recorded that were killed meanwhile."""

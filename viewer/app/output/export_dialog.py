@@ -112,7 +112,9 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
         titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, as the view"
     now = f"{choices.width}x{choices.height}"
     widgets.label(
-        "Size", "Width and height in pixels. Other proportions than the view's show more or less at the sides"
+        "Size",
+        "Width and height in pixels. If the proportions differ from the view's, the picture shows "
+        "more or less at the sides",
     )
     chosen = widgets.combo("size", now if now in titles else "Other", list(titles), titles)
     if chosen in titles and chosen != now:

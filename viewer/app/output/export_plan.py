@@ -53,7 +53,7 @@ class Choices:
     )  # fmt: skip
     anonymous: bool = param(
         False,
-        "Overlays show no notes, and landmarks and measures without names. "
+        "Overlays leave out notes and the names of landmarks and measures. "
         "The files store no name, path or date of the scan",
     )
     folder: str = param("", "Folder of the exported files")

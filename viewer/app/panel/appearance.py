@@ -130,13 +130,14 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
     if has_own and (look.color_by in ("auto", "own") or not is_here):
         idle["plain"] = "The scan has its own colours; choose Single colour above"
     elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
-        idle["plain"] = f"Colours show {COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()} now"
+        shown = COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()
+        idle["plain"] = f"This has no effect while the colours show {shown}"
     if not is_here:
-        idle |= dict.fromkeys(_OF_NUMBERS, "This frame has no data of the kind that the colours show")
+        idle |= dict.fromkeys(_OF_NUMBERS, "This frame lacks the data that the colours show")
     if look.light == "auto" and why_unlit:
         idle |= dict.fromkeys(_OF_LIGHT, why_unlit)
     elif look.eye_dome is None:
-        idle |= dict.fromkeys(_OF_EDGES, "Edge shading is on automatically only where nothing is lit")
+        idle |= dict.fromkeys(_OF_EDGES, "Automatic edge shading is on only if the view has no light")
     return idle
 
 

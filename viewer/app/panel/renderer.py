@@ -46,8 +46,8 @@ class RendererSection(WindowPart):
         if imgui.checkbox("Use for all scans", is_for_all)[1] != is_for_all:
             self.rendering.toggle_for_all()
         widgets.tooltip(
-            "Scans that you open for the first time begin with this renderer and its options.\n"
-            "Otherwise each begins with the one that suits it best."
+            "New scans start with this renderer and its options.\n"
+            "Otherwise, each new scan starts with the renderer that suits it best."
         )
         if self.rendering.others_begin_with and not is_for_all:
             widgets.faint(f"New scans start with: {self.rendering.others_begin_with}")

@@ -92,8 +92,7 @@ class ScanSection(WindowPart):
         if estimated := _estimated(pose, *self.session.document.chosen(pose)):
             widgets.fact("Estimated", ", ".join(estimated))
             widgets.tooltip(
-                "The scan does not store these data, which the renderer needs: Scan4D estimates them "
-                "from the points"
+                "The renderer needs data that the scan does not store: Scan4D estimates them from the points"
             )
 
     def _draw_unit(self, pose: Pose) -> None:

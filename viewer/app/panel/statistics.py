@@ -46,7 +46,10 @@ class StatisticsSection(WindowPart):
         widgets.fact("Samples per pixel", str(stats.samples))
         if self.playback.player.playing:
             held = f"{self.renderer.held_bytes / 1e6:,.0f} MB"
-            widgets.fact("Ahead", f"{self.ahead.ready} ready, {self.renderer.work.unfinished} begun, {held}")
+            widgets.fact(
+                "Frames ahead",
+                f"{self.ahead.ready} ready, {self.renderer.work.unfinished} in progress, {held}",
+            )
         for name, choice in stats.chosen.items():
             widgets.fact(name.capitalize(), choice)
         rate = f", {viewport.rate:.0f} fps" if self.activity.is_moving else ""

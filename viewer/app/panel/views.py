@@ -18,7 +18,7 @@ class ViewsSection(WindowPart):
     """The section."""
 
     name = "views_section"
-    SECTION = Section("Views", 40)
+    SECTION = Section("View and bookmarks", 40)
     session: Session
     steering: Steering
     bookmarks: Bookmarks

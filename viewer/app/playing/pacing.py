@@ -21,7 +21,7 @@ class Pacing(WindowPart):
     """
 
     name = "pacing"
-    doing = "Pacing"
+    doing = "Setting the times of frames"
     turn = -2
     session: Session
     playback: Playback

@@ -42,7 +42,7 @@ class Thumbnails(WindowPart):
     read for this; a frame that is not in memory takes no room there."""
 
     name = "thumbnails"
-    doing = "Picturing frames"
+    doing = "Drawing thumbnails"
     window: Window
     activity: Activity
 

@@ -93,7 +93,7 @@ class Bookmarks(WindowPart):
     def draw(self, ui: Ui) -> None:
         """Declare the list: a click on a name goes there; buttons rename and delete."""
         if not self.all:
-            widgets.faint("No views yet. Press Add to store the current view.")
+            widgets.faint("No bookmarks yet. Press Add to store the current view.")
         deleted = None
         for number, bookmark in enumerate(self.all):
             imgui.push_id(number)
@@ -139,7 +139,7 @@ class Bookmarks(WindowPart):
             self.editing = None
 
     COMMANDS = (
-        Command("bookmark_add", "Add this view", add, "Ctrl+B", "view"),
+        Command("bookmark_add", "Add bookmark", add, "Ctrl+B", "view"),
         Command("bookmark_next", "Next", lambda bookmarks: bookmarks.step(1), "N", "bookmarks"),
         Command(
             "bookmark_previous", "Previous", lambda bookmarks: bookmarks.step(-1), "Shift+N", "bookmarks"

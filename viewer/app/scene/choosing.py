@@ -123,7 +123,7 @@ class Choosing(WindowPart):
         assert request is not None
         self._request, self._size, self._seen = request, size, None
         view = view_of(request, size)
-        self._seeing = in_background(Task("Looking at the view"), lambda: ScanInView.of(request.pose, view))
+        self._seeing = in_background(Task("Analysing the view"), lambda: ScanInView.of(request.pose, view))
 
     def _choose(self, goal: Goal) -> bool:
         """Choose by what is known of the view, unless that was done."""

@@ -79,7 +79,7 @@ def words(viewport: Viewport, counts: Mapping[str, int] | None) -> list[tuple[st
         pixels = math.prod(surface.size) / math.prod(viewport.size)
         return [
             ("Drawn", f"{drawn:,} at most"),
-            ("Preview", f"{left_out:,} points fewer"),
+            ("Preview", f"{left_out:,} points left out"),
             ("", f"{pixels:.0%} of the pixels"),
         ]
     names = ("drawn", "hidden", "outside", *(("away",) if surface and surface.stats.faces_away else ()))

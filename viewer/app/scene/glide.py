@@ -27,7 +27,7 @@ class Glide(WindowPart):
     """Follows the document's camera."""
 
     name = "glide"
-    doing = "Gliding"
+    doing = "Animating the view"
     is_wanted: bool = remembered(True)  # whether views glide
 
     def __post_init__(self) -> None:

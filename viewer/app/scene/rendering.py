@@ -90,7 +90,7 @@ class Rendering(WindowPart):
             why = (
                 f"{known.title} cannot draw this scan"
                 if known
-                else f"This Scan4D has no renderer '{chosen_backend}'"
+                else f"This version of Scan4D has no renderer '{chosen_backend}'"
             )
             self.note_of_scan(f"{why}. {backends()[stand_in].title} draws it instead.")
         missed = self.session.scan, look.color_by
@@ -105,8 +105,10 @@ class Rendering(WindowPart):
                 f"{drawn_by.title} does not compute {name}, but {' and '.join(finders)} can. The "
                 "view shows other colours."
                 if finders
-                else f"{frame_in_words(pose.index).capitalize()} has no {name} to colour by: "
-                "other colours are shown until a frame has it."
+                else (
+                    f"{frame_in_words(pose.index).capitalize()} has no {name} to colour by. Scan4D shows "
+                    "other colours until a frame has it."
+                )
             )
 
     @property
@@ -270,7 +272,7 @@ class Naming(WindowPart):
     """
 
     name = "naming"
-    doing = "Naming the renderer"
+    doing = "Updating the renderer's name"
     rendering: Rendering
     viewport: Viewport
 

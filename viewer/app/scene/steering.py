@@ -57,7 +57,7 @@ class Steering(WindowPart):
     """
 
     name = "steering"
-    doing = "Turning"
+    doing = "Turning the view"
     CONDITIONS = {"view": lambda steering: steering.session.document.camera is not None}
     session: Session
     playback: Playback

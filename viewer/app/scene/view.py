@@ -181,7 +181,9 @@ class SceneView(WindowPart):
             return str(playback.problem) if playback.problem else None
         if playback.player.playing or playback.pose.index == self.session.index:
             return self._words_on_nothing()
-        return f"{playback.problem}\nYou see {playback.pose.label} instead." if playback.problem else None
+        return (
+            f"{playback.problem}\nThe view shows {playback.pose.label} instead." if playback.problem else None
+        )
 
     def _words_on_nothing(self) -> str | None:
         """The words over a picture at rest that shows nothing: why, and which key helps."""

@@ -157,7 +157,9 @@ class Neighborhoods:
         splats may reach into it."""
         made_of = (view.key, search, share, border)
         if not anew and self._pose is not None and self._pose() is pose and self._made_of == made_of:
-            surface.stats.skipped["neighborhoods"] = "points, camera and search are those of the last picture"
+            surface.stats.skipped["neighborhoods"] = (
+                "points, camera and search have not changed since the last picture"
+            )
             return
         self._made_of, self._pose = None, weakref.ref(pose)
         self.count, self.is_whole = 0, not search.culls
@@ -302,7 +304,7 @@ class Neighborhoods:
             if self._find_usual(search) <= _LARGEST_CROWD:
                 break
         if search.hidden_neighbors and not hidden:
-            surface.stats.skipped["hidden neighbors"] = "too many points would take part"
+            surface.stats.skipped["hidden neighbours"] = "they would be too many"
         if self.participants < search.k:  # an outlier is far from others, of which there are none
             self._grids = replace(grids, alone=UNKNOWN)
 

@@ -15,7 +15,9 @@ VALUES = {
         is_length=True,
         is_log=True,
     ),
-    "curvature": ValueKind("Share of the neighbourhood's variance across its plane: 0 if flat, at most 1/3"),
+    "curvature": ValueKind(
+        "Share of the neighbourhood's variance perpendicular to its plane: 0 if flat, at most 1/3"
+    ),
     "splat_radius": ValueKind(
         "Radius of a splat; of an ellipse, the shorter half-axis", is_length=True, is_log=True
     ),

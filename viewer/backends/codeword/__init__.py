@@ -32,8 +32,8 @@ from .encoder import encode_points
 from .engine import Sheet, WordBuffers, draw_bands
 
 _HELD = (
-    "code words store positions, shapes, depths and colours in steps: the last bit can move a value by a "
-    "whole step, and added points move the steps"
+    "code words store positions, shapes, depths and colours in steps: a rounding difference can move "
+    "a value by a whole step, and added points move the steps"
 )
 _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
 

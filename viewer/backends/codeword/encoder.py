@@ -135,7 +135,8 @@ def encode_points(
     line_starts = np.frombuffer(starts.read(4 * (lines + 1)), np.uint32)
     if (total := int(line_starts[-1])) > MOST_WORDS or 8 * total > gpu.max_storage_bytes:
         raise InputError(
-            f"{total:,} code words in one picture", hint="Move away, or draw smaller splats with radius_scale"
+            f"one picture would need {total:,} code words",
+            hint="Move the camera away, or draw smaller splats with radius_scale",
         )
     with gpu.timers.measure("encode"):
         cursors = words.reserve("cursors", 4 * lines).buffer

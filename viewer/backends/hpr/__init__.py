@@ -74,7 +74,7 @@ class Params:
         "point is visible if no disc around another point covers it. combined shows more points in "
         "folds and hides more points behind gaps",
         choices=MODES,
-        title="Visible by",
+        title="Visibility test",
         basic=True,
         group=_VISIBLE,
     )
@@ -95,7 +95,7 @@ class Params:
         "value shows deeper folds, but also more of what lies behind gaps",
         low=1e-3,
         high=1e6,
-        title="Hides from",
+        title="Depth tolerance",
         sweep=(1, 2, 4),
         basic=True,
         group=_VISIBLE,
@@ -113,7 +113,7 @@ class Params:
     )
     sectors: int | None = param(
         None,
-        "Number of sectors; auto: from the quality",
+        "Number of sectors; auto: from the sector density",
         type=int,
         low=1,
         high=MOST_SECTORS,

@@ -51,13 +51,14 @@ class Params:
     )
     kernel: str = param(
         "5x5",
-        "Filter that makes coarser levels. 5x5: Burt and Adelson's; 3x3: a Gaussian of spread 0.5",
+        "Filter that makes coarser levels. 5x5: Burt and Adelson's; 3x3: a Gaussian with a sigma of "
+        "0.5 samples",
         choices=tuple(FILTERS),
         group=_BANDS,
         sweep=("5x5", "3x3"),
     )
     detail: float = param(
-        1.0, "Factor on the finest band, which sharpens or softens", low=0, high=4, group=_BANDS
+        1.0, "Factor on the finest band: above 1 sharpens, below 1 softens", low=0, high=4, group=_BANDS
     )
     weights: str = param(
         "mixed",
@@ -86,7 +87,7 @@ class Params:
     cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
     quality: str = param(
         "fast",
-        "How a view is read where its samples lie closer than pixels. fast: once per pixel, between "
+        "How a view is read where its samples lie closer together than pixels. fast: once per pixel, between "
         "two levels; fine: four times per pixel, from a finer level",
         choices=("fast", "fine"),
         title="Texture sampling",

@@ -98,7 +98,7 @@ def spline_views(surface: Surface, source: ViewSource, channels: Sequence[str], 
     if not colored:
         surface.stats.skipped["bands"] = "views have no colours"
     elif not merges:
-        surface.stats.skipped["bands"] = "one view is in the picture"
+        surface.stats.skipped["bands"] = "only one view is in the picture"
     if len(views) < 2 and not (merges or sharpens or (colored and bands.fine)):
         return
     size = surface.size

@@ -189,9 +189,10 @@ class Voxels(Backend):
         ),
     }
     default_reasons = {
-        "cull_back": "a scan can be open, and the eye can be inside: 1.5 % of the pixels of the "
-        "bunny, which has no base, would show the background",
-        "radius_scale": "with 0.8, holes stay open: 0.1 % of the armadillo and 1 % of a dancing body",
+        "cull_back": "the camera can see the inside of an open scan: without octants that face "
+        "away, 1.5 % of the pixels of the bunny, which has no base, would show the background",
+        "radius_scale": "with a radius_scale of 0.8, holes stay open: 0.1 % of the pixels of the armadillo, "
+        "and 1 % of a dancing body",
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:

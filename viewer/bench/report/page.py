@@ -371,7 +371,9 @@ def _inline(path: Path) -> str:
         with Image.open(path) as image:
             image.convert("RGB").save(stream, "webp", quality=75, method=4)
     except OSError as error:
-        raise InputError(f"is no picture: {error}", path, "Remove it, or run the benchmark again") from error
+        raise InputError(
+            f"is not a picture: {error}", path, "Remove it, or run the benchmark again"
+        ) from error
     return f"data:image/webp;base64,{base64.b64encode(stream.getvalue()).decode()}"
 
 

@@ -71,7 +71,7 @@ COSTS = [
     Metric("peak_rss", "bytes", "peak memory of the process"),
 ]
 _ERRORS = [
-    Metric("hole_percent", "%", "empty share of the true silhouette"),
+    Metric("hole_percent", "%", "share of the true silhouette that the picture leaves empty"),
     Metric("through_percent", "%", "share of the true silhouette that shows a farther layer"),
     Metric(
         "closed_percent",
@@ -79,22 +79,30 @@ _ERRORS = [
         "share of the true silhouette that is neither empty nor shows a farther layer",
         "high",
     ),
-    Metric("hole_scanned_percent", "%", "empty share of the visible, scanned surface"),
+    Metric(
+        "hole_scanned_percent", "%", "share of the visible, scanned surface that the picture leaves empty"
+    ),
     Metric("spill_percent", "%", "covered pixels outside the true silhouette, relative to its area"),
-    Metric("spill_p95", "px", "distance of such pixels to the true silhouette, 95th percentile"),
+    Metric(
+        "spill_p95", "px", "distance from the true silhouette to covered pixels outside it, 95th percentile"
+    ),
     Metric("boundary_mean", "px", "distance between drawn and true outline, mean"),
     Metric("boundary_p95", "px", "distance between drawn and true outline, 95th percentile"),
     *(
         Metric(f"depth_{name}{suffix}", unit, f"{text}, {units}", best)
         for suffix, unit, units in (("_px", "px", "pixel footprints"), ("", "units", "scan units"))
         for name, text, best in (
-            ("bias", "mean depth error, positive is too far", "zero"),
+            ("bias", "mean depth error; positive: too far away", "zero"),
             ("rmse", "root mean square of the depth error", "low"),
-            ("median", "median size of the depth error", "low"),
-            ("p95", "95th percentile of the size of the depth error", "low"),
+            ("median", "median of the absolute depth error", "low"),
+            ("p95", "95th percentile of the absolute depth error", "low"),
         )
     ),
-    Metric("wrong_layer_percent", "%", "share of the pixels more than four point spacings off in depth"),
+    Metric(
+        "wrong_layer_percent",
+        "%",
+        "share of the pixels whose depth is wrong by more than four point spacings",
+    ),
     *(
         Metric(f"normal{suffix}_{name}", "°", f"angle to the true normal, {text}{sign}")
         for suffix, sign in (("", ", sign ignored"), ("_signed", ""))
@@ -105,19 +113,28 @@ _ERRORS = [
         for suffix, where in (("", "inside the true silhouette"), ("_frame", "whole frame"))
         for name, unit, text, best in (
             ("psnr", "dB", "peak signal-to-noise ratio of the shaded picture", "high"),
-            ("ssim", "", "structural similarity of the shaded picture, 1 is equal", "high"),
-            ("flip", "", "visible difference when pictures alternate, 0 to 1", "low"),
+            ("ssim", "", "structural similarity of the shaded picture; 1: identical", "high"),
+            ("flip", "", "visible difference (FLIP) from the true picture, 0 to 1", "low"),
         )
     ),
     Metric(
         "psnr_scanned", "dB", "PSNR of the shaded picture where the scan measured the visible surface", "high"
     ),
-    Metric("false_positives", "points", "hidden points found visible"),
-    Metric("false_negatives", "points", "visible points found hidden"),
-    Metric("correct", "points", "points with the right visibility", "high"),
-    Metric("visibility_error_percent", "%", "false positives and negatives, relative to the correct points"),
+    Metric("false_positives", "points", "hidden points that the renderer takes for visible"),
+    Metric("false_negatives", "points", "visible points that the renderer takes for hidden"),
+    Metric("correct", "points", "points whose visibility the renderer finds correctly", "high"),
+    Metric(
+        "visibility_error_percent",
+        "%",
+        "false positives and negatives, divided by the number of correct points",
+    ),
     *(
-        Metric(f"flicker_{kind}_{name}", unit, f"change of {text} {between} beyond that of the truth", "zero")
+        Metric(
+            f"flicker_{kind}_{name}",
+            unit,
+            f"change of {text} {between}, minus the same change in true pictures",
+            "zero",
+        )
         for kind, between in (("orbit", "along a camera orbit"), ("pose", "from pose to pose"))
         for name, unit, text in (("color", "", "colour"), ("normal", "°", "normal"))
     ),
@@ -197,7 +214,7 @@ def _parsed(line: str, needed: dict[str, Any]) -> Row:
     if not isinstance(row, dict):
         raise ValueError("not a JSON object")
     if missing := [name for name, kind in needed.items() if not isinstance(row.get(name), kind)]:
-        raise ValueError(f"without a usable {', '.join(missing)}")
+        raise ValueError(f"it lacks a usable {', '.join(missing)}")
     return _from_json(row)
 
 
@@ -265,13 +282,15 @@ def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
             )
             continue
         if was[_SCENE] != now[_SCENE]:
-            notes.append(f"not compared, the scene changed ({_SCENE}): {row_title(now)}")
+            notes.append(f"not compared, because the scene changed ({_SCENE}): {row_title(now)}")
             continue
         if _machine(was) == _machine(now):
             losses += (f"slower: {row_title(now)}: {change}" for change in _slower(was, now))
             gains += (f"faster: {row_title(now)}: {change}" for change in _slower(was, now, back=True))
         else:
-            notes.append(f"times not compared: {_machine(was)} is now {_machine(now)}")
+            notes.append(
+                f"times not compared, because the machine changed: {_machine(was)} is now {_machine(now)}"
+            )
         losses += (f"worse: {row_title(now)}: {change}" for change in _worse(was, now))
         gains += (f"better: {row_title(now)}: {change}" for change in _worse(was, now, back=True))
     return [*losses, *gains, *dict.fromkeys(notes)]

@@ -118,7 +118,7 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
 
         def load(index: int) -> Moment:
             points = source.load(index)
-            assert isinstance(points, PointCloud), "the formats with faces hold points"
+            assert isinstance(points, PointCloud), "formats with faces also hold points"
             mesh = smooth(Mesh(points, source.faces(index).triangles()))
             return _of_mesh(mesh, request, index, float(times[index]), labels[index])
 
@@ -213,7 +213,7 @@ def _lattice(folder: str, counts: tuple[int, int, int], credit: str) -> _Scene:
 
         def frame(index: int) -> Mesh:
             points = source.load(index)
-            assert isinstance(points, PointCloud), "the formats with faces hold points"
+            assert isinstance(points, PointCloud), "formats with faces also hold points"
             return smooth(Mesh(points, source.faces(index).triangles()))
 
         def load(_: int) -> Moment:
@@ -379,12 +379,12 @@ def subject(
     else:
         needs = [Path(data or "") / need for need in scene.needs]
     if count is not None and not (scene.counts and 1 <= count <= _MOST_POINTS):
-        known = f"1 to {_MOST_POINTS:,}" if scene.counts else "only as many as were scanned"
-        raise InputError(f"cannot be had with {count:,} points", name_or_file, f"It has {known}")
+        known = f"1 to {_MOST_POINTS:,}" if scene.counts else "only the number of points that was scanned"
+        raise InputError(f"is not available with {count:,} points", name_or_file, f"It has {known}")
     if noise and scene.noise is None:
-        raise InputError("has no noise", name_or_file, "Noise is the virtual scanner's: NAME-simulated")
+        raise InputError("has no noise", name_or_file, "Only simulated scans have noise: use NAME-simulated")
     if noise is not None and not (0 <= noise < np.inf):
-        raise InputError(f"the noise of a scanner is 0 or more, not {noise}", name_or_file)
+        raise InputError(f"the noise of a scanner must be 0 or more, not {noise}", name_or_file)
     noise = (scene.noise or 0.0) if noise is None else noise
     name = name_or_file if name_or_file in _SCENES else Path(name_or_file).name
     return scene.make(_Request(name, tuple(needs), count, noise, seed))
@@ -416,7 +416,7 @@ def _missing(scene: _Scene, data: Path | None) -> str:
     """The files that a scene lacks; "": none."""
     for need in scene.needs:
         if data is None:
-            return f"needs {need} of the data folder"
+            return f"needs {need} from the data folder"
         if not (data / need).exists():
             return f"no {need} in {data}"
     return ""

@@ -48,11 +48,11 @@ class DepthFrames:
     def __init__(self, folder: Path, reference: Path) -> None:
         self._source = find_source(folder)
         if len(self._source) <= _FIRST:
-            raise InputError(f"holds {len(self._source)} frames, more than {_FIRST} are needed", folder)
+            raise InputError(f"holds {len(self._source)} frames, but must hold more than {_FIRST}", folder)
         times = self._source.times()
         self._times = np.zeros(len(self)) if times is None else times
         surfels = read(reference)
-        assert isinstance(surfels, PointCloud), "the reference holds surfels"
+        assert isinstance(surfels, PointCloud), "the reference has surfels"
         self._surfels = surfels
 
     def __len__(self) -> int:
@@ -90,14 +90,14 @@ class DepthFrames:
     ) -> NDArray[np.float64]:
         motion, rms, share = register(self._points(index), target, start, _REACHES)
         if rms > _MOST_RMS or share < _LEAST_SHARE:
-            found = f"{1e3 * rms:.2f} mm rms, {share:.0%} of the points"
-            raise InputError(f"does not fit its reference: {found}", self._source.label(index))
+            found = f"{1e3 * rms:.2f} mm rms, {share:.0%} of the points near it"
+            raise InputError(f"does not match its reference: {found}", self._source.label(index))
         return motion
 
     def _view(self, index: int, motion: NDArray[np.float64] | None = None) -> RangeView:
         """The view of a frame. motion: from the image's axes (+y down, +z ahead) to the world."""
         views = self._source.load(index)
-        assert isinstance(views, tuple), "a phone's frames are range views"
+        assert isinstance(views, tuple), "frames of a phone are range views"
         (view,) = views
         world_to_image = np.eye(4) if motion is None else np.linalg.inv(motion).astype(np.float64)
         near = view.mask & (np.nan_to_num(view.depth) < _ROOM)

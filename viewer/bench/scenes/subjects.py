@@ -53,7 +53,9 @@ class Subject:
     def moment(self, index: int) -> Moment:
         """The moment of this index; the last two are cached. Raises InputError where there is none."""
         if not 0 <= index < self.moments:
-            raise InputError(f"there is no moment {index}", self.name, f"It has 0 to {self.moments - 1}")
+            raise InputError(
+                f"has no moment {index}", self.name, f"It has the moments 0 to {self.moments - 1}"
+            )
         return self._latest(index)
 
     @cached_property

@@ -47,11 +47,13 @@ class Rules:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.ties) and self.ties >= 0):
-            raise InputError(f"the threshold of ties is {self.ties}, expected 0 or more")
+            raise InputError(f"the threshold of ties must be 0 or more, not {self.ties}")
         if not 0 <= self.smoothing <= 100:
-            raise InputError(f"weights are averaged over {self.smoothing} pixels, expected 0 to 100")
+            raise InputError(
+                f"the radius for averaging weights must be 0 to 100 pixels, not {self.smoothing}"
+            )
         if self.tolerance is not None and not (np.isfinite(self.tolerance) and self.tolerance > 0):
-            raise InputError(f"the tolerance is {self.tolerance}, expected a length above 0")
+            raise InputError(f"the tolerance must be a length above 0, not {self.tolerance}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +103,7 @@ def compete(views: Sequence[RangeView], rules: Rules | None = None) -> Competiti
     for less than two views.
     """
     if len(views) < 2:
-        raise InputError(f"there are {len(views)} range views, and two or more compete")
+        raise InputError(f"merging needs two or more range views, not {len(views)}")
     return _Contest([RangeSurface.of(view) for view in views], rules or Rules()).result()
 
 

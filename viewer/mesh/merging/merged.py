@@ -94,7 +94,7 @@ def merge_views(views: Sequence[RangeView], rules: Rules | None = None, refined:
 
 def _agreement(competition: Competition, i: int, j: int) -> dict[str, Any]:
     one, other = competition.agreements[i][j], competition.agreements[j][i]
-    assert one is not None and other is not None, "they are two views"
+    assert one is not None and other is not None, "the two views differ"
     return {
         "overlap": [one.overlap, other.overlap],
         "depth_rmse": _number(one.depth_rmse),

@@ -193,7 +193,7 @@ def write(path: Path | str, cloud: PointCloud, views: Sequence[RangeView] = ()) 
     module = _formats()[suffix]
     if not (views or hasattr(module, "write")):
         hint = f"Points can be written as {', '.join(writable_suffixes())}"
-        raise InputError(f"{module.TITLE} holds range views, and this scan has none", path, hint)
+        raise InputError(f"{module.TITLE} stores range views, but this scan has none", path, hint)
     with _writing(path, module) as temporary:
         if hasattr(module, "write"):
             remark: str | None = module.write(temporary, cloud)

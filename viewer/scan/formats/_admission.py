@@ -129,7 +129,7 @@ def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
 def check_count(number: int, most: int, what: str) -> None:
     """Raise InputError where a file has more of something than any scan; what: for example "columns"."""
     if number > most:
-        raise InputError(f"has {number:,} {what}, more than the {most:,} that are read")
+        raise InputError(f"has {number:,} {what}, more than the {most:,} that Scan4D reads")
 
 
 def whole_number(word: str, what: str) -> int:

@@ -74,7 +74,7 @@ def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
     for name in images:
         image = arrays[name].shape
         if image[:2] != shape[:2] or (name != source and image[2:] and name != "color"):
-            raise InputError(f"array '{name}' has shape {image}, '{source}' {shape}")
+            raise InputError(f"array '{name}' has shape {image}, but '{source}' has shape {shape}")
     stored = sum(arrays[name].memory() for name in images)
     admit(held, stored + shape[0] * shape[1] * _BYTES[source], _MOST_RATIO)
     make = {"depth": _of_depth, "xyz": _of_grid, "elevation": _of_terrain}[source]

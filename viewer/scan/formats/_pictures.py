@@ -57,12 +57,12 @@ def opened_picture(path: Path, kinds: tuple[str, ...]) -> Iterator[Image]:
         raise InputError(error.what, error.where or path, error.hint) from error
     except Image.DecompressionBombError as error:
         most = 2 * (Image.MAX_IMAGE_PIXELS or 0)
-        raise InputError(f"has more than the {most:,} pixels that are read", path) from error
+        raise InputError(f"has more than the {most:,} pixels that Scan4D reads", path) from error
     except OSError as error:
-        what, hint = (f"is no {title}, or damaged", _HINT) if error.errno is None else explained(error)
+        what, hint = (f"is not a valid {title} file", _HINT) if error.errno is None else explained(error)
         raise InputError(what, path, hint) from error
     except Exception as error:  # Pillow's readers raise what they like
-        raise InputError(f"is no {title}, or damaged ({error})", path) from error
+        raise InputError(f"is not a valid {title} file ({error})", path) from error
 
 
 def numbers_of_picture(image: Image) -> NDArray:

@@ -55,7 +55,7 @@ class StoredArray:
             shape, column_order, dtype = headers[version](header)
         array = cls(name, stream, shape, dtype, column_order, size - stream.tell())
         if not dtype.hasobject and (min(shape, default=0) < 0 or array.nbytes > array.size):
-            raise InputError(f"array '{name}' promises {array.nbytes} bytes and holds {array.size}")
+            raise InputError(f"array '{name}' promises {array.nbytes} bytes but holds {array.size}")
         return array
 
     @property

@@ -121,7 +121,7 @@ def _checked_format(head: bytes, held: int) -> int:
     if _SMALLEST_RECORD * records > held:
         raise InputError(f"promises {records:,} records before its points, more than the file can hold")
     if begin > held:
-        raise InputError(f"states that its points begin at byte {begin:,}, and has {held:,} bytes")
+        raise InputError(f"states that its points begin at byte {begin:,}, but has only {held:,} bytes")
     return form
 
 

@@ -218,7 +218,7 @@ def _read_ascii(stream: BinaryIO, header: _Header) -> Columns:
         raise too_few(len(table), header.points, "points")
     ends = np.cumsum([f.count for f in header.fields])
     if table.shape[1] < ends[-1]:
-        raise InputError(f"its rows hold {table.shape[1]} values, the header promises {ends[-1]}")
+        raise InputError(f"its rows hold {table.shape[1]} values, but the header promises {ends[-1]}")
     blocks = np.split(table, ends[:-1], axis=1)
     return _unpacked(
         _columns(
@@ -239,12 +239,12 @@ def _read_compressed(stream: BinaryIO, header: _Header) -> Columns:
     packed, unpacked = struct.unpack("<II", read_exactly(stream, 8))
     promised = header.points * header.dtype.itemsize
     if unpacked != promised:
-        raise InputError(f"holds {unpacked} bytes of points, its header promises {promised}")
+        raise InputError(f"holds {unpacked} bytes of points, but its header promises {promised}")
     held = size_of(stream) - stream.tell()
     if packed > held:
         raise InputError(f"holds {held} of its {packed} bytes of compressed data")
     if unpacked > packed * _LZF_MAX_RATIO:
-        raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked}")
+        raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked} bytes")
     admit(size_of(stream), packed + 2 * unpacked)  # the library has two, and so have the fields
     data = lzf.decompress(read_exactly(stream, packed), unpacked)
     if data is None or len(data) != unpacked:

@@ -190,7 +190,7 @@ def _read_ascii(stream: BinaryIO, element: Element, encoding: str) -> Columns:
         table = parse_table(text_lines(stream), rows=element.count)
         if len(table) and table.shape[1] < len(element.properties):
             promised = len(element.properties)
-            raise InputError(f"its rows hold {table.shape[1]} values, the header promises {promised}")
+            raise InputError(f"its rows hold {table.shape[1]} values, but the header promises {promised}")
     if len(table) < element.count:
         raise too_few(len(table), element.count, _rows_of(element))
     return named(

@@ -109,7 +109,7 @@ class Frames:
                 admit(size_of(file), self._extents[index].memory, _MOST_RATIO)
                 data = read_exactly(file, self._extents[index].size)
                 previous = from_bytes(data, previous)
-            assert previous is not None, "there is the one asked for"
+            assert previous is not None, "the requested octree exists"
             admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES, _MOST_RATIO)
             self._last = frame, previous
             strays = read_strays(data)

@@ -82,7 +82,10 @@ def shortfall(octree: Octree, stop: Stop) -> str | None:
     """Why a tree tells fewer positions apart than its rule asks for; None where it does not."""
     if stop.rule != "delta" or octree.loss <= stop.delta:
         return None
-    return f"the octree reached its deepest level, {octree.depth}, with a loss of {octree.loss:.2%}"
+    return (
+        f"the octree reached its deepest level, {octree.depth}: {octree.loss:.2%} of the positions still "
+        "lack a leaf of their own"
+    )
 
 
 def sort_points(positions: NDArray[np.float32], grid: Grid) -> Sorted:

@@ -153,7 +153,7 @@ def to_bytes(
     """
     if len(unit.encode()) > _MOST_UNIT or octree.counts.max() >> 31:
         raise InputError(
-            f"an octree is stored with a unit of {_MOST_UNIT} bytes and 2^31 nodes a level at most"
+            f"an octree file has room for {_MOST_UNIT} bytes of the unit's name, and for 2^31 nodes per level"
         )
     can_tell = packed and previous is not None and chain <= MOST_BEFORE and _same_cube(octree, previous)
     blocks = _store(octree, previous if can_tell else None, packed)
@@ -385,7 +385,7 @@ def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> 
     if header.flags & _PACKED:
         masks = coder.restore(masks, predicted=bool(header.predicted >> level & 1))
     if np.bitwise_count(masks).sum(dtype=np.int64) != header.levels[level + 1].nodes:
-        raise InputError(f"level {level + 1} of an octree has not as many nodes as its header says")
+        raise InputError(f"level {level + 1} of an octree does not have as many nodes as its header says")
     return masks
 
 

@@ -45,7 +45,7 @@ class Calibration:
         """Raise InputError where a picture of this size, width and height, is not what it is for."""
         stated = (self.width, self.height)
         if None not in stated and tuple(size) != stated:
-            what = "has {} x {} pixels, its calibration is for {} x {}".format(*size, *stated)
+            what = "has {} x {} pixels, but its calibration is for {} x {}".format(*size, *stated)
             raise InputError(what, where)
 
 

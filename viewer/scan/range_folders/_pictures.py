@@ -81,7 +81,7 @@ def depth_view(
     def of_same_pixels(path: Path, what: str, read: Callable[[Path], NDArray]) -> NDArray:
         image = read(path)
         if image.shape[:2] != stored.shape:
-            sizes = f"has {_size(image)} pixels, its depth {_size(stored)}"
+            sizes = f"has {_size(image)} pixels, but its depth picture has {_size(stored)}"
             raise InputError(sizes, path, f"{what} must have the same size")
         return image
 

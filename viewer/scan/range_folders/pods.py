@@ -90,10 +90,10 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
 def _rig(stored: dict[str, Any]) -> tuple[str, list[_Pod]]:
     """The unit and the pods of a file. Raises InputError."""
     if not isinstance(stored.get("pods"), list):
-        raise InputError("names no pods")
+        raise InputError("lists no pods")
     unit = str(stored.get("unit", UNKNOWN_UNIT))
     if not 0 < len(stored["pods"]) <= _MOST_PODS:
-        raise InputError(f"names {len(stored['pods'])} pods, where 1 to {_MOST_PODS} can be read")
+        raise InputError(f"lists {len(stored['pods'])} pods, but Scan4D reads 1 to {_MOST_PODS}")
     pods = [_pod(pod, f"pod{number}", unit) for number, pod in enumerate(stored["pods"])]
     if len({pod.name for pod in pods}) < len(pods):
         raise InputError("gives several pods the same name")

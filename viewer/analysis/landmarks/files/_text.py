@@ -147,6 +147,7 @@ def without_states(landmarks: LandmarkSet, title: str) -> str | None:
     """The remark of a format that has no states, where the landmarks have some."""
     if (landmarks.known == Known.TRACKED).any() or np.isfinite(landmarks.sigmas).any():
         return (
-            f"{title} stores no states and no uncertainty: tracked landmarks count as placed when you read it"
+            f"{title} stores no states and no uncertainty: tracked landmarks count as placed when "
+            "you read the file"
         )
     return None

@@ -201,9 +201,9 @@ def _remark(landmarks: LandmarkSet, labels: Sequence[bytes], longest: int, is_ev
     """Losses of the file, in words."""
     lost = []
     if any(label.decode() != name for label, name in zip(labels, landmarks.names, strict=True)):
-        lost.append(f"names end after {longest} bytes")
+        lost.append(f"names are cut after {longest} bytes")
     if not is_even:
-        lost.append("frames have regular times that start at 0")
+        lost.append("the frames get regular times from 0")
     points = landmarks.positions[landmarks.is_defined]
     if len(points):
         off = np.abs(points.astype(np.float32) - points).max()

@@ -10,7 +10,10 @@ from ..planes import PLANES, plane_of
 from . import MeasureKind, Options
 
 _BETWEEN = 32  # places on a curve from one landmark to the next
-_PLANE = "the other landmarks define the plane: it fits three or more, or lies halfway between pairs"
+_PLANE = (
+    "the other landmarks define the plane: it fits three or more landmarks, or lies halfway between the "
+    "two landmarks of each pair"
+)
 
 Positions = NDArray[np.float64]  # (T, K, 3)
 Values = NDArray[np.float64]  # (T,)

@@ -32,7 +32,7 @@ from .exchange import Exchange
 from .following import Following
 from .notebook import Notebook
 from .shown import ShownLandmarks, drawn_landmarks
-from .words import gap_spans
+from .words import gap_spans, placed_words
 
 TITLE = "Landmarks"
 _GRAB = 0.7  # how near the mouse has to be to take hold of one, in heights of the font
@@ -208,7 +208,7 @@ class Tool:
             return f"{target.title}: click it in {frame_in_words(self.frame)}."
         if self.is_free:
             return f"{self.made.free_name()}: click its position."
-        return "All landmarks are placed: drag one to correct it, or choose one in the list."
+        return f"{placed_words(self.made.listed)}: drag one to correct it, or choose one in the list."
 
     def on_click(self, click: Click) -> bool:
         """Set the next one at what was clicked; raises InputError where it cannot be."""

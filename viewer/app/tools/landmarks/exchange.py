@@ -47,7 +47,7 @@ class Exchange:
         written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
         redraw = context.redraw
         self._saving = FileDialog(
-            SAVE, "Export landmarks", f"The ending sets the format: {_USUAL}, {', '.join(written)}",
+            SAVE, "Export landmarks", f"The suffix sets the format: {_USUAL}, {', '.join(written)}",
             (_USUAL, *written), self._save, redraw,
         )  # fmt: skip
         self._reading = FileDialog(
@@ -160,7 +160,7 @@ class Exchange:
 
         def tell(remark: str | None) -> None:
             frames = frame_in_words(frame) if is_one else f"{len(timeline)} frames"
-            gaps = "" if is_one or is_whole else "; some frames are not tracked yet, and have no data in it"
+            gaps = "" if is_one or is_whole else "; frames that are not tracked yet have no data in the file"
             context.note(f"Saved {file}, {frames}{gaps}." + (f" {remark}" if remark else ""))
 
         context.run(f"Saving {file.name}", save, tell)

@@ -33,7 +33,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     imgui.begin_disabled(not tool.is_active)
     if row.button():
         tool.skip()
-    ui.tooltip("Skip the next landmark, or bring it back", "skip_landmark")
+    ui.tooltip("Skip the next landmark, or place a skipped one after all", "skip_landmark")
     if row.button():
         tool.set_missing()
     ui.tooltip("Mark the landmark as not visible in this frame", "missing_landmark")

@@ -38,6 +38,16 @@ def corners_words(states: Sequence[str]) -> str:
     return f"{len(states)} corners: {', '.join(counts)}"
 
 
+def placed_words(landmarks: Sequence[Landmark]) -> str:
+    """Say that no landmark waits, and how many of them are skipped or not visible instead of placed."""
+    counts = Counter(landmark.state for landmark in landmarks)
+    others = {"skipped": counts["skipped"], "not visible": counts["not placed"]}
+    if not any(others.values()):
+        return "All landmarks are placed"
+    rest = "".join(f", {count} {state}" for state, count in others.items() if count)
+    return f"{counts['placed']} of {len(landmarks)} landmarks are placed{rest}"
+
+
 def gap_spans(
     landmarks: Iterable[Landmark], tracks: Mapping[str, Track], regions: Mapping[str, str]
 ) -> list[FrameSpan]:

@@ -65,7 +65,7 @@ class Tool:
         self.filled = False
         about = "All distances, as a table of comma separated values"
         self.saving = FileDialog(SAVE, "Export distances", about, (".csv",), self._save, context.redraw)
-        about = "A table that 'Export distances...' has written of this scan"
+        about = "A table that 'Export distances...' has written for this scan"
         self.reading = FileDialog(OPEN, "Import distances", about, (".csv",), self._read, context.redraw)
         self.begun: SurfacePoint | None = None
 
@@ -213,7 +213,11 @@ class Tool:
         refuse_input(file, timeline)
         save_rows(file, self._table(range(len(timeline))))
         ends = [tracks[name] for measure in self.made.distances for name in measure.landmarks]
-        gaps = "" if all(track.is_whole for track in ends) else "; some frames are not tracked yet"
+        gaps = (
+            ""
+            if all(track.is_whole for track in ends)
+            else "; frames that are not tracked yet have no data in the table"
+        )
         frames = f", in all {len(timeline)} frames" if len(timeline) > 1 else ""
         self.context.note(f"Saved {file}{gaps or frames}")
 

@@ -34,7 +34,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         if _draw_row(tool, row_of):
             tool.delete(row_of.measure.name)
         imgui.pop_id()
-    row = ui.row("Copy", "Export CSV...", "Clear")
+    row = ui.row("Copy", "Export distances...", "Clear")
     if row.button():
         tool.copy()
     widgets.tooltip("Copy all distances as a table")

@@ -59,7 +59,7 @@ class Settings:
     lines: bool = param(True, "Draw each measure in the view, with its value", title="In the view")
     least: float = param(
         0.5, "Smallest height of a peak that counts as a repeat, as a share of the curve's range",
-        low=0.05, high=1.0, title="Least repeat",
+        low=0.05, high=1.0, title="Smallest repeat",
     )  # fmt: skip
     trajectories: bool = param(
         True, "Draw the paths of the landmarks that are ticked", title="Show paths", basic=True

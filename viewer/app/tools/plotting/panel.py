@@ -105,7 +105,8 @@ def _draw_paths(tool: Tool) -> None:
             ("path", "Draw its path over the picture"),
             (
                 "rigid reference",
-                "A part that does not deform, such as the forehead. Scan4D removes its motion",
+                "A landmark on a part that does not deform, such as the forehead. Scan4D removes the "
+                "motion of these landmarks",
             ),
         ):
             imgui.table_next_column()

@@ -82,7 +82,7 @@ def _why_none(tool: Tool) -> str:
     if mode == REPEATS and len(tool.times) == 1:
         return "Repeats need several frames."
     return (
-        "This needs two measures."
+        "A plot of one measure against another needs two measures."
         if mode == AGAINST
         else "No peak is high enough: lower the smallest height at the left."
     )
@@ -128,7 +128,10 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         widgets.number_format("%.2f", f"s{points}"),
         logarithmic,
     )[1]
-    widgets.tooltip("Width of the smoothing window (Savitzky-Golay), for speed, acceleration and numbers")
+    widgets.tooltip(
+        "Width of the smoothing window (Savitzky-Golay), for speed, acceleration and the numbers under "
+        "the plot"
+    )
     tool.settings = replace(
         settings, mode=mode, order=order, bands=bands, least=least, seconds=float(f"{seconds:.3g}")
     )
