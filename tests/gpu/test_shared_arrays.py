@@ -14,6 +14,7 @@ from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
+from viewer.gpu.arrays import shared_arrays
 from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
@@ -102,7 +103,7 @@ def test_an_array_stays_for_as_long_as_a_pose_has_it(own: Renderer) -> None:
     assert colors.buffer.read() == second.cloud.colors.tobytes()
     assert own.nbytes == COUNT * (12 + 12 + 4 + 4)
     np.testing.assert_array_equal(drawn(own, second, surface), wanted)
-    shared = own.resident(second)._shared["colors"]
+    shared = shared_arrays(own.gpu)["colors", id(second.cloud.colors)]
     assert list(shared.holders) == [own.resident(second)]
     own.release()
 

@@ -26,6 +26,7 @@ from viewer.errors import InputError
 from viewer.gpu.pose import GpuPose
 from viewer.look import Look, color_table
 from viewer.output.export import write_picture
+from viewer.picture.rows import PointRows
 from viewer.picture.surface import Surface
 from viewer.scan.layers import NO_LAYERS, Layers
 from viewer.scan.points import PointCloud
@@ -128,12 +129,11 @@ def test_numbers_of_samples_are_packed_once_and_counted(renderer: Renderer) -> N
     assert samples.row_values.buffer.size == 4 * count
     assert pose.uploaded_bytes == held
     for axis in ((0.0, 1.0, 0.0), (1.0, 0.0, 0.0)):
-        heights = pose.heights(axis, by_sample=True)
-        assert pose.heights(axis, by_sample=True) is heights
-        assert pose.uploaded_bytes == held + 4 * count + pose.samples.nbytes, "of the last axis alone"
-    points = pose.heights((1.0, 0.0, 0.0))
-    assert points.buffer.size == 4 * pose.pose.count
-    assert pose.uploaded_bytes == held + 4 * pose.pose.count + pose.samples.nbytes
+        heights = samples.kind.heights(axis)
+        assert samples.kind.heights(axis) is heights
+        assert pose.uploaded_bytes == held + pose.samples.nbytes, "samples count the last axis alone"
+        assert PointRows(pose).heights(axis).buffer.size == 4 * pose.pose.count
+        assert pose.uploaded_bytes == held + pose.samples.nbytes + 4 * pose.pose.count, "and so do points"
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -315,7 +315,7 @@ def test_points_alone_have_no_samples(renderer: Renderer) -> None:
     cloud = PointCloud.from_arrays(np.eye(3))
     pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", cloud))
     with pytest.raises(InputError, match="the scan has no range views"):
-        _ = pose.range_points
+        _ = pose.pose.range_points
     request = Request(pose.pose, Camera.orbit(cloud.bounds()), sampling.BACKEND)
     with pytest.raises(InputError, match="Sampling draws range views, but this scan has none"):
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))

@@ -7,7 +7,6 @@ from numpy.typing import NDArray
 
 from ..drawing.renderer import shared_renderer
 from ..drawing.request import Request
-from ..gpu.pose import drawn_bounds
 from ..view import View
 from ..visibility.search import visible_points
 
@@ -24,7 +23,7 @@ def visible_ids(request: Request, size: tuple[int, int]) -> NDArray[np.uint32]:
     pose, place, cloud = request.pose, request.layers.world_from_pose, request.pose.cloud
     if not len(cloud):
         return np.empty(0, np.uint32)
-    bounds = drawn_bounds(pose, request.camera)
+    bounds = pose.drawn_bounds(request.camera)
     view = View.of(request.camera, size, pose.origin, bounds, place)
     offsets = cloud.positions + (cloud.origin - view.origin)
     if view.perspective:

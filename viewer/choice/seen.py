@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gpu.chunks import LEAST, MOST
-from ..gpu.pose import drawn_bounds
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import sparse_spacing
@@ -53,7 +52,7 @@ class ScanInView:
         share = len(sample) / max(len(positions), 1)
         count, in_view = float(pose.count), pose.count * share
         pixels, depths = view.project(sample)
-        middle = drawn_bounds(pose).center - view.origin
+        middle = pose.drawn_bounds().center - view.origin
         usual = float(np.median(depths)) if len(sample) else float(view.depths(middle))
         footprint = max(usual, view.near) / view.scale if view.perspective else 1 / view.scale
         by_chunks = is_cloud and count >= LEAST and share <= MOST

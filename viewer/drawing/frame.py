@@ -11,7 +11,7 @@ from typing import Any
 
 from ..camera import Camera
 from ..gpu.context import Gpu
-from ..gpu.pose import GpuPose, drawn_bounds
+from ..gpu.pose import GpuPose
 from ..look import SAMPLES, Look
 from ..picture.frame_view import Before, FrameView
 from ..picture.mean import PictureMean
@@ -142,11 +142,11 @@ def _before(ready: Ready, surface: Surface | None) -> Before | None:
 
 def _note_times(stats: Stats, poses: Set[GpuPose], start: float) -> None:
     """Note what a frame took, and what was uploaded and derived of its poses since their last pictures."""
-    uploaded = [pose.take_uploaded() for pose in poses]
-    stats.upload_ms = sum(pose.take_ms("upload") for pose in poses)
-    stats.derive_ms = sum(pose.take_ms("derive") for pose in poses)
-    stats.uploaded_bytes = sum(each.nbytes for each in uploaded)
-    stats.shared = tuple(name for each in uploaded for name in each.shared)
+    spent = [pose.take_spent() for pose in poses]
+    stats.upload_ms = sum(each.upload_ms for each in spent)
+    stats.derive_ms = sum(each.derive_ms for each in spent)
+    stats.uploaded_bytes = sum(each.nbytes for each in spent)
+    stats.shared = tuple(name for each in spent for name in each.shared)
     stats.passes = next(iter(poses)).gpu.timers.passes()
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
@@ -244,7 +244,7 @@ def render(
     renderer, layers = shared_renderer(), layers or NO_LAYERS
     name, chosen = backend_for(pose, backend, params)
     views = pose.views if layers.world_from_pose.is_identity else ()
-    bounds = layers.world_from_pose.bounds(drawn_bounds(pose))
+    bounds = layers.world_from_pose.bounds(pose.drawn_bounds())
     camera = camera or first_camera(views, bounds, size[0] / size[1], pose.upright)
     request = Request(pose, camera, name, chosen, look, layers)
     surface = Surface(renderer.gpu, size)

@@ -11,7 +11,6 @@ from weakref import WeakKeyDictionary
 from ..backends import Backend, backends
 from ..backends import backend as find_backend
 from ..camera import Camera
-from ..gpu.pose import drawn_bounds
 from ..look import Look, drawable
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Life, Pose
@@ -104,7 +103,7 @@ def view_of(request: Request, size: tuple[int, int]) -> View:
     """The view that a request shows its pose by, in a picture of this size, pixels."""
     pose, camera, place = request.pose, request.camera, request.layers.world_from_pose
     origin = origin_near(camera, size, pose.origin, place)
-    bounds = drawn_bounds(pose, camera)
+    bounds = pose.drawn_bounds(camera)
     return View.of(camera, size, origin, bounds, place).straightened(bounds)
 
 

@@ -118,7 +118,7 @@ class BackgroundWork:
         """Take in the result of a job. Raises what it failed with."""
         job, take, _ = resident.jobs.pop(key)
         result, ms = job.future.result()
-        resident.gpu_pose.add_ms("derive", ms)
+        resident.gpu_pose.spent.derive_ms += ms
         take(result)
 
     def _take_finished(self) -> None:

@@ -1,29 +1,25 @@
-"""A pose on the GPU: a structure of arrays, each uploaded once and only when asked for."""
+"""A pose on the GPU: a structure of arrays, each uploaded once and only when something reads it."""
 
 from __future__ import annotations
 
 import time
-import weakref
-from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import chain
 from typing import Any, TypeVar
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from ..bounds import Bounds
-from ..camera import Camera
-from ..errors import InputError, unknown_name
-from ..scan.points import PointCloud, strided
+from ..errors import InputError
+from ..scan.points import PointCloud
 from ..scan.pose import Pose
-from ..scan.range_points import RangePoints
 from ..scan.range_view import RangeView
-from ..scan.ranges import robust_range
 from . import gl
+from .arrays import GpuArray, shared_arrays
 from .context import Gpu, Workspace
 from .range_samples import RangeSamples
 
@@ -37,35 +33,46 @@ FORMATS = {
     "axes": gl.RGBA32F,
 }
 _RANGES = "samples"  # the name that samples of range views are uploaded by
-_TELEPHOTO = 0.5  # degrees from bottom to top, below which rays may be as good as parallel
 M = TypeVar("M", bound=Workspace)
 
-_SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
+
+@dataclass
+class Spent:
+    """The work on a pose since its last picture.
+
+    upload_ms, derive_ms: time, milliseconds. nbytes: of the arrays that came to the GPU. shared: names of
+    arrays that other poses already had there.
+    """
+
+    upload_ms: float = 0.0
+    derive_ms: float = 0.0
+    nbytes: int = 0
+    shared: tuple[str, ...] = ()
 
 
 class GpuPose:
     """The arrays of a pose's points as buffer textures, indexed by row, and the samples of its range views.
 
-    A row is a point's place in the cloud's arrays; `cloud.ids` gives its index in the file.
-    `stored` is the cloud as the scan has it, `cloud` the same with what was estimated since;
-    whatever is chosen automatically looks at `stored`, so that it does not change by history. Points of
-    range views are merged when either is first read. pose: as it was given.
+    A row is the index of a point in the cloud's arrays; `cloud.ids` gives its index in the file.
+    `stored` is the cloud as the scan has it, `cloud` the same with what was estimated since.
+    Automatic choices look at `stored`, so that they do not depend on what happened before. The first read of
+    either merges the points of range views.
+
+    pose: as it was given. spent: the work since the last picture, which the frame takes. origin: what
+    positions on the GPU are relative to, (3,) scan units: the pose's origin, or that of the view drawn last.
     """
 
     def __init__(self, gpu: Gpu, pose: Pose) -> None:
         self.gpu = gpu
         self.pose = pose
-        self._arrays: dict[Hashable, gl.BufferTexture] = {}  # by name; what is packed, by how
-        self._shared: dict[str, SharedArray] = {}  # what holds those of them that poses may have in common
+        self.origin = pose.origin
+        self.spent = Spent()
+        self._arrays: dict[str, GpuArray] = {}
+        self._packed: dict[tuple[Hashable, ...], GpuArray] = {}  # by function and arguments
+        self._uploads: dict[str, GpuArray] = {}  # arrays that are not complete yet
         self._samples: RangeSamples | None = None
-        self._uploads: dict[str, _Upload] = {}  # that have begun
         self._estimated: PointCloud | None = None
-        self._uploaded_bytes = 0
-        self._uploads_of_late = Uploaded()
-        self._spent = {"upload": 0.0, "derive": 0.0}
-        self._layers: dict[int, Layer] = {}
         self._made: dict[Callable[..., Any], Workspace] = {}
-        self._origin = pose.origin
 
     @cached_property
     def stored(self) -> PointCloud:
@@ -84,12 +91,12 @@ class GpuPose:
         return self._estimated or self.stored
 
     def add_estimates(self, arrays: Mapping[str, Any]) -> None:
-        """Take in attributes that the scan lacks, by name."""
+        """Add attributes that the scan lacks, by name."""
         self._estimated = replace(self.cloud, **arrays)
 
     @property
     def estimated_bytes(self) -> int:
-        """Bytes on the CPU of what was estimated."""
+        """Bytes of the estimates on the CPU."""
         return 0 if self._estimated is None else self._estimated.nbytes - self.stored.nbytes
 
     @property
@@ -98,73 +105,81 @@ class GpuPose:
         return self.pose.views
 
     @property
-    def range_points(self) -> RangePoints:
-        """The points of the range views. Raises InputError where there are none."""
-        if isinstance(self.pose.points, PointCloud):
-            raise InputError("the scan has no range views")
-        return self.pose.points
-
-    @property
     def overview(self) -> PointCloud:
-        """The pose's cloud that tells origin and attributes."""
+        """A cloud with the pose's origin and attributes, without merging, see `Pose.overview`."""
         return self.pose.overview
 
     @property
-    def origin(self) -> NDArray[np.float64]:
-        """The origin that positions on the GPU are relative to, (3,) scan units: the pose's, unless the view
-        that was drawn last has another one."""
-        return self._origin
+    def bounds(self) -> Bounds:
+        """The pose's robust bounds; a box of two units if there is no point."""
+        return self.pose.drawn_bounds()
+
+    @property
+    def sample(self) -> NDArray[np.float64]:
+        """Some of the positions, (M, 3), relative to the origin: for ranges."""
+        return self.pose.sample + (self.pose.origin - self.origin)
 
     def center(self, origin: NDArray[np.float64]) -> None:
-        """Have positions on the GPU count from this origin, (3,), from now on: where it is another one, they
-        are uploaded anew, and what was packed of them."""
-        if (origin == self._origin).all():
+        """Count positions on the GPU from this origin, (3,). If it is another one, positions and packed
+        arrays are uploaded again."""
+        if (origin == self.origin).all():
             return
-        self._origin = origin
+        self.origin = origin
         self._uploads.pop("positions", None)
-        for key in [key for key in self._arrays if key == "positions" or isinstance(key, tuple)]:
-            self._drop_array(key)
+        self._arrays.pop("positions", None)
+        self._packed.clear()
 
     @property
     def _centered(self) -> PointCloud:
-        """The cloud as the GPU has it: relative to its origin."""
-        if (self._origin == self.cloud.origin).all():
-            return self.cloud
-        return self.cloud.centered(self._origin)
+        """The cloud relative to the origin of positions on the GPU."""
+        return self.cloud if (self.origin == self.cloud.origin).all() else self.cloud.centered(self.origin)
+
+    # --- bytes and times --------------------------------------------------------------
 
     @property
     def uploaded_bytes(self) -> int:
-        """Bytes that it holds on the GPU."""
-        samples = self._samples
-        made = sum(each.nbytes for each in self._made.values())
-        shared = sum(each.nbytes for each in self._shared.values())
-        return self._uploaded_bytes + shared + made + (samples.nbytes if samples and samples.complete else 0)
+        """Bytes on the GPU."""
+        return self._bytes_of(lambda array: array.nbytes)
 
     @property
     def counted_bytes(self) -> int:
-        """Bytes that it holds on the GPU, and of what it shares with other poses its part: what adds up."""
-        others = (each.nbytes - each.nbytes // len(each.holders) for each in self._shared.values())
-        return self.uploaded_bytes - sum(others)
+        """Bytes on the GPU; of arrays that it shares with other poses, its part. Parts add up."""
+        return self._bytes_of(lambda array: array.nbytes // len(array.holders))
 
-    @property
-    def bounds(self) -> Bounds:
-        """The pose's robust bounds; a box of two units where there is no point."""
-        return drawn_bounds(self.pose)
+    def _bytes_of(self, nbytes: Callable[[GpuArray], int]) -> int:
+        samples = self._samples.nbytes if self._samples is not None and self._samples.complete else 0
+        made = sum(each.nbytes for each in self._made.values())
+        return samples + made + sum(map(nbytes, chain(self._arrays.values(), self._packed.values())))
+
+    @contextmanager
+    def preparing(self, kind: str) -> Iterator[None]:
+        """Count the time that runs inside as spent on "upload" or "derive"."""
+        start = time.perf_counter()
+        yield
+        name = f"{kind}_ms"
+        setattr(self.spent, name, getattr(self.spent, name) + (time.perf_counter() - start) * 1e3)
+
+    def take_spent(self) -> Spent:
+        """The work since the last call."""
+        taken, self.spent = self.spent, Spent()
+        return taken
+
+    # --- arrays -----------------------------------------------------------------------
 
     def array(self, name: str) -> gl.BufferTexture:
-        """positions, normals, colors, radii, axes, ids, or 'scalar:NAME', with a texel for each row; or
-        'sample:NAME', the scalar with a texel for each sample of range views. Uploaded at the first call."""
+        """positions, normals, colors, radii, axes or ids, with a texel for each row. The first call uploads
+        it. Raises InputError if the scan has none and none was estimated."""
         self.upload([name])
-        return self._arrays[name]
+        return self._arrays[name].texels
 
     def find(self, name: str) -> gl.BufferTexture | None:
-        """The attribute on the GPU; None where the scan has none such and none was estimated."""
+        """The array on the GPU; None if the scan has none and none was estimated."""
         return None if getattr(self.cloud, name) is None else self.array(name)
 
     @property
     def samples(self) -> RangeSamples:
-        """The samples of the range views; uploaded, and their pyramids made, at the first call. Raises
-        InputError where there is no range view, or the driver takes no so many samples."""
+        """The samples of the range views. The first call uploads them and makes their pyramids. Raises
+        InputError if there is no range view, or the driver does not take so many samples."""
         self.upload([_RANGES])
         assert self._samples is not None
         return self._samples
@@ -172,9 +187,7 @@ class GpuPose:
     def names_of(self, needs: Iterable[str]) -> list[str]:
         """The arrays that a backend with these needs reads, of those that are there, or "samples"."""
         names = [name for name in needs if name != "views" and getattr(self.cloud, name) is not None]
-        if "views" not in needs:
-            return ["positions", *names]
-        return [*names, _RANGES]
+        return [*names, _RANGES] if "views" in needs else ["positions", *names]
 
     def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:
         """Upload what is missing of these arrays, in slices until the time is over; whether all is there."""
@@ -188,95 +201,86 @@ class GpuPose:
             return all(self._upload(name, end) for name in missing)
 
     def packed(
-        self, pack: Callable[..., NDArray], *args: Hashable, texel_format: int = gl.R32F
+        self,
+        pack: Callable[..., NDArray],
+        *args: Hashable,
+        texel_format: int = gl.R32F,
+        of: Any = None,
+        only: bool = False,
     ) -> gl.BufferTexture:
-        """Another arrangement of the pose's arrays, which `pack` makes of its cloud and the arguments at the
-        first call for these. Counted, kept and deleted with the arrays."""
-        key = (pack, *args)
-        if key not in self._arrays:
-            with self.preparing("upload"):
-                upload = _array_upload(self.gpu, pack(self._centered, *args))
-                upload.go_on(np.inf)
-                self._store_array(key, upload, texel_format)
-        return self._arrays[key]
+        """Another arrangement of the pose's points: `pack(cloud, *args)`, made and uploaded at the first call
+        for these arguments. of: what `pack` reads instead of the cloud. only: drop those for other arguments.
+        """
+        key = (pack, of, *args)
+        if key not in self._packed:
+            for gone in [other for other in self._packed if only and other[0] is pack]:
+                del self._packed[gone]
+            self._packed[key] = self.new_array(
+                lambda: pack(self._centered if of is None else of, *args), texel_format
+            )
+        return self._packed[key].texels
+
+    def new_array(self, make: Callable[[], NDArray], texel_format: int = gl.R32F) -> GpuArray:
+        """Upload an array for the caller to hold, and count this as work on the pose."""
+        with self.preparing("upload"):
+            array = GpuArray(self.gpu, make(), texel_format)
+            array.write()
+            self._hold(array)
+            array.values = None  # only shared arrays hold these
+        return array
 
     def cached(self, make: Callable[[GpuPose], M]) -> M:
-        """Make, once, what a backend finds of this pose's points on the GPU. Counted, kept and deleted with
-        the arrays."""
+        """Make `make(pose)` once. The pose counts and releases the result."""
         if make not in self._made:
             self._made[make] = make(self)
         return self._made[make]  # type: ignore[return-value]
+
+    def adopt(self, passed: GpuPose) -> None:
+        """Take the arrays that this pose has in common with one that goes: else they would go with it."""
+        for name, array in passed._arrays.items():
+            values = getattr(self.overview, name)
+            is_same = name != "positions" and values is not None and values is array.values
+            if is_same and name not in self._arrays:
+                self._take_shared(name, values)
 
     def _upload(self, name: str, end: float) -> bool:
         """Go on with an array or the samples until that time of the performance counter; whether it is
         there."""
         if name == _RANGES:
-            return self._upload_samples(end)
-        values = self._values(name) if name not in self._uploads else None
-        if values is not None and self._take_shared(name, values):
-            return True
-        if values is not None:
-            self._uploads[name] = _array_upload(self.gpu, values)
-        if not self._uploads[name].go_on(end):
+            if self._samples is None:
+                self._samples = RangeSamples(self.gpu, self.pose.range_points.views)
+            return self._samples.upload(end)
+        if name not in self._uploads:
+            values = self._values(name)
+            if self._take_shared(name, values):
+                return True
+            self._uploads[name] = GpuArray(self.gpu, values, FORMATS[name])
+        if not self._uploads[name].write(end):
             return False
-        upload, texel_format = self._uploads.pop(name), FORMATS.get(name, gl.R32F)
-        if name in FORMATS and upload.values is getattr(self.cloud, name):
-            self._arrays[name] = gl.BufferTexture(upload.target, texel_format)
-            self._share(name, _shared_arrays(self.gpu).add(name, upload.values, self._arrays[name]))
-            self._uploads_of_late.nbytes += upload.nbytes
+        array = self._arrays[name] = self._uploads.pop(name)
+        self._hold(array)
+        if array.values is getattr(self.cloud, name):
+            shared_arrays(self.gpu)[name, id(array.values)] = array
         else:
-            self._store_array(name, upload, texel_format)
+            array.values = None
         return True
+
+    def _hold(self, array: GpuArray) -> None:
+        array.holders.add(self)
+        self.spent.nbytes += array.nbytes
 
     def _take_shared(self, name: str, values: NDArray) -> bool:
-        """Take an array that another pose has brought to the GPU, where there is one; whether there is."""
-        shared = _shared_arrays(self.gpu).find(name, values)
-        if shared is None:
+        """Take an array that another pose has brought to the GPU; whether there is one."""
+        # While the entry holds the values, no other object has their id.
+        array = shared_arrays(self.gpu).get((name, id(values)))
+        if array is None:
             return False
-        self._arrays[name] = shared.texels
-        self._share(name, shared)
-        self._uploads_of_late.shared += (name,)
+        self._arrays[name] = array
+        array.holders.add(self)
+        self.spent.shared += (name,)
         return True
 
-    def adopt(self, passed: GpuPose) -> None:
-        """Take the arrays that a pose has on the GPU which goes, where this one has the same: else they would
-        go with it."""
-        for name, shared in passed._shared.items():
-            is_same = name != "positions" and shared.values is getattr(self.pose.overview, name)
-            if is_same and name not in self._arrays:
-                self._take_shared(name, shared.values)
-
-    def _share(self, name: str, shared: SharedArray) -> None:
-        shared.holders.add(self)
-        self._shared[name] = shared
-
-    def _upload_samples(self, end: float) -> bool:
-        if self._samples is None:
-            self._samples = RangeSamples(self.gpu, self.range_points.views)
-        return self._samples.upload(end)
-
-    def _store_array(self, key: Hashable, upload: _Upload, texel_format: int) -> None:
-        self._arrays[key] = gl.BufferTexture(upload.target, texel_format)
-        self._count_upload(upload)
-
-    def _count_upload(self, upload: _Upload) -> None:
-        self._uploaded_bytes += upload.nbytes
-        self._uploads_of_late.nbytes += upload.nbytes
-
-    def _drop_array(self, key: Hashable) -> None:
-        texels = self._arrays.pop(key)
-        if isinstance(key, str) and key in self._shared:
-            self._shared.pop(key).holders.discard(self)
-        else:
-            self._uploaded_bytes -= texels.buffer.size
-            self.gpu.discard(texels)
-
     def _values(self, name: str) -> NDArray:
-        kind, _, scalar = name.partition(":")
-        if scalar:
-            zero = self.scalar_range(scalar)[0]
-            stored = self.scalar(scalar) if kind == "scalar" else self.range_points.all_samples(scalar)
-            return as_float32(stored, zero)
         values: NDArray | None = getattr(self._centered if name == "positions" else self.cloud, name)
         if values is None:
             hint = (
@@ -287,200 +291,5 @@ class GpuPose:
             raise InputError(f"the scan has no {name}", hint=hint)
         return values
 
-    def scalar(self, name: str) -> NDArray:
-        """The named scalar, (N,); raises InputError that lists the known ones."""
-        self._check_scalar(name)
-        return self.cloud.scalars[name]
-
-    def _check_scalar(self, name: str) -> None:
-        if name not in self.overview.scalars:
-            raise unknown_name("scalar", name, list(self.overview.scalars))
-
-    def scalar_range(self, name: str) -> tuple[float, float]:
-        """The 2 % and 98 % quantiles of a scalar's finite values."""
-        self._check_scalar(name)
-        return self.overview.remember(_scalar_range, name)
-
-    def layer(self, values: NDArray) -> Layer:
-        """Numbers of the scan's points that are not part of it, (N,): kept, where they are uploaded, for as
-        long as somebody holds this array."""
-        for key in [key for key, layer in self._layers.items() if layer.values() is None]:
-            gone = self._layers.pop(key)
-            self._uploaded_bytes -= sum(texels.buffer.size for texels in gone.texels.values())
-            self.gpu.discard(*gone.texels.values())
-        if id(values) not in self._layers:
-            self._layers[id(values)] = Layer(weakref.ref(values), robust_range(strided(values)))
-        return self._layers[id(values)]
-
-    def layer_texels(
-        self, values: NDArray, zero: float, rows: NDArray[np.uint32] | None = None, by_sample: bool = False
-    ) -> gl.BufferTexture:
-        """Texels of a layer, relative to zero, uploaded at the first call. rows: those of the layer that this
-        pose's points stand for; None where they are the scan's. by_sample: a texel for each sample of range
-        views rather than for each point."""
-        layer = self.layer(values)
-        if by_sample not in layer.texels:
-            with self.preparing("upload"):
-                made = as_float32(values if rows is None else values[rows], zero)
-                upload = _array_upload(self.gpu, self.range_points.by_sample(made) if by_sample else made)
-                upload.go_on(np.inf)
-                layer.texels[by_sample] = gl.BufferTexture(upload.target, gl.R32F)
-                self._count_upload(upload)
-        return layer.texels[by_sample]
-
-    def heights(self, axis: tuple[float, ...], by_sample: bool = False) -> gl.BufferTexture:
-        """The height of each point along an axis, relative to the origin, for what cannot go by positions;
-        by_sample: of each sample of range views. The last axis' alone is kept: it turns with the pose."""
-        key = (_heights, axis, by_sample)
-        for gone in [name for name in self._arrays if isinstance(name, tuple) and name[0] is _heights]:
-            if gone != key:
-                self._drop_array(gone)
-        if by_sample and key not in self._arrays:
-            samples = self.samples
-            with self.preparing("upload"):
-                self._arrays[key] = samples.heights(np.array(axis), self.origin)
-                self._uploaded_bytes += self._arrays[key].buffer.size
-        return self._arrays[key] if by_sample else self.packed(_heights, axis, by_sample)
-
-    @property
-    def sample(self) -> NDArray[np.float64]:
-        """Some of the positions, (M, 3), relative to the origin: for ranges."""
-        return self.pose.sample + (self.pose.origin - self.origin)
-
-    @contextmanager
-    def preparing(self, kind: str) -> Iterator[None]:
-        """Count what runs inside as time spent on "upload" or "derive"."""
-        start = time.perf_counter()
-        yield
-        self.add_ms(kind, (time.perf_counter() - start) * 1e3)
-
-    def add_ms(self, kind: str, ms: float) -> None:
-        """Count time spent on "upload" or "derive"."""
-        self._spent[kind] += ms
-
-    def take_ms(self, kind: str) -> float:
-        """How long "upload" or "derive" took since the last call."""
-        taken, self._spent[kind] = self._spent[kind], 0.0
-        return taken
-
-    def take_uploaded(self) -> Uploaded:
-        """Take note of what arrays came to the GPU since the last call, and which were there already."""
-        taken, self._uploads_of_late = self._uploads_of_late, Uploaded()
-        return taken
-
     def __del__(self) -> None:
-        begun = (upload.target for upload in self._uploads.values())
-        layers = (texels for layer in self._layers.values() for texels in layer.texels.values())
-        own = (texels for key, texels in self._arrays.items() if key not in self._shared)
-        self.gpu.discard(*own, *self._made.values(), *layers, *begun, self._samples)
-
-
-@dataclass
-class Uploaded:
-    """Arrays that came to the GPU. nbytes: of them. shared: names of those that other poses had there."""
-
-    nbytes: int = 0
-    shared: tuple[str, ...] = ()
-
-
-class SharedArray:
-    """An array on the GPU for the poses that have the same one, for as long as any of them does.
-
-    values: what it was made of, which poses hold by themselves.
-    """
-
-    def __init__(self, gpu: Gpu, values: NDArray, texels: gl.BufferTexture) -> None:
-        self._gpu, self.values, self.texels = gpu, values, texels
-        self.nbytes = texels.buffer.size
-        self.holders: weakref.WeakSet[GpuPose] = weakref.WeakSet()
-
-    def __del__(self) -> None:
-        self._gpu.discard(self.texels)
-
-
-class SharedArrays:
-    """The arrays on the GPU by those that they were made of: by the object, as what is equal in frames of a
-    scan is made one when it is read (`PointCloud.sharing`)."""
-
-    def __init__(self, gpu: Gpu) -> None:
-        self._gpu = gpu
-        self._known: weakref.WeakValueDictionary[tuple[str, int], SharedArray] = weakref.WeakValueDictionary()
-
-    def find(self, name: str, values: NDArray) -> SharedArray | None:
-        """That of an array, if it is there under this name."""
-        return self._known.get((name, id(values)))  # which no other object has while this one is held
-
-    def add(self, name: str, values: NDArray, texels: gl.BufferTexture) -> SharedArray:
-        """Take in what was uploaded of an array."""
-        shared = self._known[name, id(values)] = SharedArray(self._gpu, values, texels)
-        return shared
-
-
-def _shared_arrays(gpu: Gpu) -> SharedArrays:
-    return gpu.cached(SharedArrays)
-
-
-def drawn_bounds(pose: Pose, camera: Camera | None = None) -> Bounds:
-    """The pose's robust bounds, or through a telephoto lens those of all of its points and their splats, none
-    of which may be drawn elsewhere for that; a box of two units where there is no point."""
-    if not len(pose.overview):
-        return Bounds(pose.origin - 1, pose.origin + 1)
-    if camera is None or camera.fov_y > _TELEPHOTO or not isinstance(pose.points, PointCloud):
-        return pose.bounds
-    return pose.points.whole_bounds().grown(pose.points.longest_reach())
-
-
-@dataclass(eq=False)
-class Layer:
-    """Numbers that lie over a pose: one object for each array of them.
-
-    range: their 2 % and 98 % quantiles. texels: on the GPU, of points (False) and of samples (True), where
-    they are asked for.
-    """
-
-    values: weakref.ref[NDArray]
-    range: tuple[float, float]
-    texels: dict[bool, gl.BufferTexture] = field(default_factory=dict)
-
-
-@dataclass
-class _Upload:
-    """A buffer on its way to the GPU: of which values, what it will be, and what is to be done, a slice a
-    step."""
-
-    values: NDArray
-    target: moderngl.Buffer
-    nbytes: int
-    steps: deque[Callable[[], object]]
-
-    def go_on(self, end: float) -> bool:
-        """Upload slices until that time of the performance counter, at least one; whether all is there."""
-        while self.steps:
-            self.steps.popleft()()
-            if time.perf_counter() > end:
-                break
-        return not self.steps
-
-
-def _array_upload(gpu: Gpu, values: NDArray) -> _Upload:
-    # A buffer of no bytes is not allowed; an empty pose gets one texel that nothing reads.
-    data = values if values.size else np.zeros(4, np.float32)
-    words = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
-    buffer = gpu.buffer(reserve=len(words))
-    slices = range(0, len(words), _SLICE)
-    steps = (partial(buffer.write, words[start : start + _SLICE], offset=start) for start in slices)
-    return _Upload(values, buffer, len(words), deque(steps))
-
-
-def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:
-    return robust_range(strided(cloud.scalars[name]))
-
-
-def _heights(cloud: PointCloud, axis: tuple[float, ...], _: bool) -> NDArray[np.float32]:
-    return cloud.positions @ np.array(axis, np.float32)
-
-
-def as_float32(values: NDArray, zero: float = 0.0) -> NDArray[np.float32]:
-    """Numbers relative to `zero` as the GPU holds them; those beyond its range are infinite there."""
-    with np.errstate(over="ignore"):
-        return (values - zero).astype(np.float32)
+        self.gpu.discard(*self._made.values(), self._samples)

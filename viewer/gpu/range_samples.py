@@ -157,13 +157,15 @@ class RangeSamples:
         self.spacing = max(_spacing(view) for view in views)
         self.has_color = any(view.color is not None for view in views)
         self._normals: _Normals | None = None
+        self._heights: gl.BufferTexture | None = None
+        self._heights_of: tuple[object, ...] = ()  # the axis and origin of these
         self._steps: Iterator[Callable[[], object]] = chain(self._uploads(views), self._reductions())
         self.complete = False  # all is uploaded, and the coarser levels made
 
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        textures = (self.depths, self.looks, self.xy, self.tiles, self._table)
+        textures = (self.depths, self.looks, self.xy, self.tiles, self._table, self._heights)
         normals = self._normals.nbytes if self._normals else 0
         return sum(texture.buffer.size for texture in textures if texture is not None) + normals
 
@@ -198,17 +200,21 @@ class RangeSamples:
         for step in self._reductions(tiled_from=1):
             step()
 
-    def heights(self, axis: NDArray[np.float64], origin: NDArray[np.float64]) -> gl.BufferTexture:
-        """Make texels of the height along an axis, (3,) in the world, of each sample of level 0 by its id,
-        scan units, relative to an origin, (3,); any number where there is no sample. The caller keeps
-        them."""
-        made = self._texels(gl.R32F, 4 * self.count)
+    def heights(self, axis: tuple[float, ...], origin: NDArray[np.float64]) -> gl.BufferTexture:
+        """Texels of the height along an axis, (3,) in the world, of each sample of level 0 by its id, scan
+        units, relative to an origin, (3,); any number where there is no sample. Those of the last axis and
+        origin are cached."""
+        if self._heights is not None and self._heights_of == (axis, origin.tobytes()):
+            return self._heights
+        self._gpu.discard(self._heights)
+        self._heights_of = axis, origin.tobytes()
+        made = self._heights = self._texels(gl.R32F, 4 * self.count)
         program = self._gpu.compute("range/heights.comp", self.defines)
         self._bind_read()
         made.buffer.bind_to_storage_buffer(Storage.RANGE_VALUES)
         for number, (pod, levels) in enumerate(zip(self._pods, self.view_levels, strict=True)):
             to_world = np.linalg.inv(pod.world_to_camera)
-            up = (*(axis @ to_world[:3, :3]), axis @ (to_world[:3, 3] - origin))
+            up = (*(np.array(axis) @ to_world[:3, :3]), axis @ (to_world[:3, 3] - origin))
             for first in range(0, levels[0].count, _SLICE):
                 self._gpu.set(program, number=number, up=up, first=first)
                 with self._gpu.timers.measure("heights"):
@@ -270,7 +276,7 @@ class RangeSamples:
         if self._normals is not None:
             self._gpu.discard(self._normals.words, self._normals.rows)
         self._steps = iter(())
-        self._gpu.discard(self.depths, self.looks, self.xy, self.tiles, self._table)
+        self._gpu.discard(self.depths, self.looks, self.xy, self.tiles, self._table, self._heights)
 
     def _texels(self, texel_format: int, nbytes: int) -> gl.BufferTexture:
         return gl.BufferTexture(self._gpu.buffer(reserve=nbytes), texel_format)

@@ -12,7 +12,9 @@ from ..gpu import gl
 from ..gpu.pose import GpuPose
 from ..look import Look, ValueKind, value_source
 from ..scan.layers import Layers
+from ..scan.ranges import scalar_range
 from ..view import View
+from .laid_over import LaidOver, laid_over
 from .rows import PointRows
 
 
@@ -69,8 +71,7 @@ class Coloring:
         """Key of what `row_values` and `resolve` give of a pose."""
         source = self.value_source
         axis = self.height_axis if source == "height" else None
-        numbers = self.layers.scalars.get(source or "")
-        return source, axis, None if numbers is None else self.kind.scanned.layer(numbers), self.look.plain
+        return source, axis, self._laid_over(source or ""), self.look.plain
 
     @property
     def value_zero(self) -> float:
@@ -87,15 +88,17 @@ class Coloring:
 
     def scalar_range(self, name: str, pose: GpuPose) -> tuple[float, float]:
         """The 2 % and 98 % quantiles of a layer's or else a pose's finite numbers."""
+        layer = self._laid_over(name)
+        return scalar_range(pose.overview, name) if layer is None else layer.range
+
+    def _laid_over(self, name: str) -> LaidOver | None:
         layer = self.layers.scalars.get(name)
-        return pose.scalar_range(name) if layer is None else self.kind.scanned.layer(layer).range
+        return None if layer is None else laid_over(self.kind.scanned, layer)
 
     def scalar_texels(self, name: str) -> gl.BufferTexture:
         """The numbers of each row, of a layer or the scan, relative to `value_zero`."""
-        layer = self.layers.scalars.get(name)
-        if layer is None:
-            return self.kind.scalar_texels(name)
-        return self.kind.layer_texels(layer, self.scalar_range(name, self.kind.pose)[0])
+        layer, zero = self.layers.scalars.get(name), self.scalar_range(name, self.kind.pose)[0]
+        return self.kind.scalar_texels(name, zero) if layer is None else self.kind.layer_texels(layer, zero)
 
     @property
     def height_axis(self) -> tuple[float, float, float]:

@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gpu import gl
+from ..gpu.arrays import as_float32
 from ..gpu.chunks import Chunks
 from ..gpu.pose import GpuPose
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
 from ..view import View
 from .counts import Counted, cloud_counted, samples_counted
+from .laid_over import laid_over
 
 Find = Callable[[NDArray], NDArray]  # values (n, ...) of rows (n,)
 
@@ -68,17 +70,24 @@ class PointRows:
         """Whether shaders compute the attribute `color` or `normal` of a row from other data."""
         return False
 
-    def scalar_texels(self, name: str) -> gl.BufferTexture:
-        """A scalar of the scan with a texel for each row."""
-        return self.pose.array(f"scalar:{name}")
+    def scalar_texels(self, name: str, zero: float) -> gl.BufferTexture:
+        """A scalar of the scan, relative to zero, with a texel for each row."""
+        return self.pose.packed(_scalar, name, zero)
 
     def layer_texels(self, values: NDArray, zero: float) -> gl.BufferTexture:
-        """Numbers of a layer, relative to zero, with a texel for each row."""
-        return self.pose.layer_texels(values, zero)
+        """Numbers of a layer, relative to zero, with a texel for each row. The first call uploads them."""
+        arrays = laid_over(self.pose, values).arrays
+        if type(self) not in arrays:
+            arrays[type(self)] = self.pose.new_array(lambda: self._by_row(values, zero))
+        return arrays[type(self)].texels
+
+    def _by_row(self, values: NDArray, zero: float) -> NDArray[np.float32]:
+        """Numbers of the scan's points, (N,), relative to zero, in the order of the rows."""
+        return as_float32(values, zero)
 
     def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
-        """The height along an axis with a texel for each row."""
-        return self.pose.heights(axis)
+        """The height along an axis, relative to the origin, with a texel for each row."""
+        return self.pose.packed(_heights, axis, only=True)
 
     # --- on the CPU -------------------------------------------------------------------
 
@@ -122,8 +131,8 @@ class OctantRows(PointRows):
         super().__init__(pose)
         self.scanned, self._stand_for, self.octants = scanned, stand_for, octants
 
-    def layer_texels(self, values: NDArray, zero: float) -> gl.BufferTexture:
-        return self.pose.layer_texels(values, zero, self._stand_for)
+    def _by_row(self, values: NDArray, zero: float) -> NDArray[np.float32]:
+        return as_float32(values[self._stand_for], zero)
 
     def points(self, rows: NDArray) -> NDArray:
         return self._stand_for[rows]
@@ -143,7 +152,7 @@ class SampleRows(PointRows):
     def __init__(self, pose: GpuPose) -> None:
         """Raises InputError if the pose has no range views."""
         super().__init__(pose)
-        self._samples: RangePoints = pose.range_points
+        self._samples: RangePoints = pose.pose.range_points
 
     @property
     def count(self) -> int:
@@ -171,14 +180,14 @@ class SampleRows(PointRows):
     def fetches(self, name: str) -> bool:
         return name == "normal" or self.pose.overview.colors is not None
 
-    def scalar_texels(self, name: str) -> gl.BufferTexture:
-        return self.pose.array(f"sample:{name}")
+    def scalar_texels(self, name: str, zero: float) -> gl.BufferTexture:
+        return self.pose.packed(_sample_scalar, name, zero, of=self._samples)
 
-    def layer_texels(self, values: NDArray, zero: float) -> gl.BufferTexture:
-        return self.pose.layer_texels(values, zero, by_sample=True)
+    def _by_row(self, values: NDArray, zero: float) -> NDArray[np.float32]:
+        return self._samples.by_sample(as_float32(values, zero))
 
     def heights(self, axis: tuple[float, ...]) -> gl.BufferTexture:
-        return self.pose.heights(axis, by_sample=True)
+        return self.pose.samples.heights(axis, self.pose.origin)
 
     def of(self, name: str) -> Find | None:
         scalar = name.partition("scalar:")[2]
@@ -201,3 +210,15 @@ class SampleRows(PointRows):
     def file_points(self, rows: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         away = self._samples.overview.origin - view.origin
         return rows, self._samples.of_samples("positions", rows) + away
+
+
+def _scalar(cloud: PointCloud, name: str, zero: float) -> NDArray[np.float32]:
+    return as_float32(cloud.scalars[name], zero)
+
+
+def _sample_scalar(samples: RangePoints, name: str, zero: float) -> NDArray[np.float32]:
+    return as_float32(samples.all_samples(name), zero)
+
+
+def _heights(cloud: PointCloud, axis: tuple[float, ...]) -> NDArray[np.float32]:
+    return cloud.positions @ np.array(axis, np.float32)

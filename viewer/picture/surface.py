@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import up_vector
+from ..gpu.arrays import as_float32
 from ..gpu.constants import EMPTY, NOTHING
 from ..gpu.context import Gpu
-from ..gpu.pose import as_float32
 from ..look import Look, rgba
 from ..scan.points import PointCloud
 from ..srgb import linear_from_bytes

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bounds import Bounds
+from ..camera import Camera
+from ..errors import InputError
 from .points import PointCloud, strided
 from .range_points import RangePoints
 from .range_view import RangeView
@@ -15,6 +17,8 @@ from .spacing import ENOUGH, roughness, typical_spacing
 from .upright import Upright, guess_up
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
+
+_TELEPHOTO = 0.5  # degrees from bottom to top, below which rays may be as good as parallel
 
 
 class Life:
@@ -62,6 +66,13 @@ class Pose:
         return () if isinstance(self.points, PointCloud) else self.points.views
 
     @property
+    def range_points(self) -> RangePoints:
+        """The points of the range views. Raises InputError if there are none."""
+        if isinstance(self.points, PointCloud):
+            raise InputError("the scan has no range views")
+        return self.points
+
+    @property
     def upright(self) -> Upright:
         """Guess of what is up, see `guess_up`; found once, in some milliseconds."""
         return self.overview.remember(guess_up, views=self.views)
@@ -92,6 +103,15 @@ class Pose:
         """The box around the body of the points, see `PointCloud.bounds`; of the `overview`. Raises
         InputError where there is no point."""
         return self.overview.bounds()
+
+    def drawn_bounds(self, camera: Camera | None = None) -> Bounds:
+        """The robust bounds; a box of two units if there is no point. Through a telephoto lens, the bounds of
+        all points and their splats: there, no point may be drawn at another depth than its own."""
+        if not len(self.overview):
+            return Bounds(self.origin - 1, self.origin + 1)
+        if camera is None or camera.fov_y > _TELEPHOTO or not isinstance(self.points, PointCloud):
+            return self.bounds
+        return self.points.whole_bounds().grown(self.points.longest_reach())
 
     @property
     def sample(self) -> NDArray[np.float64]:

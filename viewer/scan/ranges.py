@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from ..geometry import up_vector
 from ..look import Look, drawable, value_source
 from .layers import NO_LAYERS, Layers
-from .points import strided
+from .points import PointCloud, strided
 from .pose import Pose
 from .timeline import Timeline
 
@@ -25,6 +25,18 @@ def robust_range(values: NDArray) -> tuple[float, float]:
     value; (0, 1) where there is none."""
     spread = _spread(values)
     return (0.0, 1.0) if spread is None else _union([spread])
+
+
+def scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:
+    """The 2 % and 98 % quantiles of a scalar's finite values. Found once. Raises InputError that lists the
+    scalars."""
+    if name not in cloud.scalars:
+        raise unknown_name("scalar", name, list(cloud.scalars))
+    return cloud.remember(_scalar_range, name)
+
+
+def _scalar_range(cloud: PointCloud, name: str) -> tuple[float, float]:
+    return robust_range(strided(cloud.scalars[name]))
 
 
 def _spread(values: NDArray) -> _Spread | None:

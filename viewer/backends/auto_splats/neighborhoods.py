@@ -410,7 +410,7 @@ class Neighborhoods:
         program = self._gpu.compute(name, {**views, **defines}, params=self._grids)
         pose.array("positions").bind(Texture.POSITIONS)
         if search.by_scanner:
-            pose.packed(_scanners, pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
+            pose.packed(_scanners, pose.pose.range_points, texel_format=gl.RGBA32F).bind(Texture.RANGE_VIEWS)
         self["slots"].bind(Texture.SLOTS)
         self._searched.texels.bind(Texture.LISTED)
         self._bins.starts.bind(Texture.STARTS)

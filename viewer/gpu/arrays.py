@@ -1,0 +1,67 @@
+"""An array on the GPU: uploaded in slices, shared by poses, deleted when nothing holds it."""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections import deque
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import gl
+from .context import Gpu
+
+if TYPE_CHECKING:
+    from .pose import GpuPose
+
+_SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
+
+
+class GpuArray:
+    """An array as texels.
+
+    values: what it is made of, for as long as others may look for it. holders: the poses that have it.
+    """
+
+    values: NDArray | None
+
+    def __init__(self, gpu: Gpu, values: NDArray, texel_format: int) -> None:
+        self._gpu, self.values = gpu, values
+        # OpenGL allows no buffer of no bytes; an empty array has one texel that nothing reads.
+        data = values if values.size else np.zeros(4, np.float32)
+        words = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
+        self.nbytes = len(words)
+        self._slices = deque((first, words[first : first + _SLICE]) for first in range(0, len(words), _SLICE))
+        self.texels = gl.BufferTexture(gpu.buffer(reserve=self.nbytes), texel_format)
+        self.holders: weakref.WeakSet[GpuPose] = weakref.WeakSet()
+
+    def write(self, end: float = np.inf) -> bool:
+        """Upload slices until that time of the performance counter, at least one; whether all is there."""
+        while self._slices:
+            first, words = self._slices.popleft()
+            self.texels.buffer.write(words, offset=first)
+            if time.perf_counter() > end:
+                break
+        return not self._slices
+
+    def __del__(self) -> None:
+        if hasattr(self, "texels"):  # there may have been no memory for them
+            self._gpu.discard(self.texels)
+
+
+def shared_arrays(gpu: Gpu) -> weakref.WeakValueDictionary[tuple[str, int], GpuArray]:
+    """The arrays that poses may have in common, by name and `id` of their values: what is equal in frames of
+    a scan becomes one object when it is read (`PointCloud.sharing`)."""
+    return gpu.cached(_no_arrays)
+
+
+def _no_arrays(_: Gpu) -> weakref.WeakValueDictionary[tuple[str, int], GpuArray]:
+    return weakref.WeakValueDictionary()
+
+
+def as_float32(values: NDArray, zero: float = 0.0) -> NDArray[np.float32]:
+    """Numbers relative to `zero` as the GPU holds them; those beyond its range are infinite there."""
+    with np.errstate(over="ignore"):
+        return (values - zero).astype(np.float32)
