@@ -8,7 +8,7 @@ TYPE_CHECKING = False  # as `typing` has it, which takes its time to import
 if TYPE_CHECKING:
     from typing import Any
 
-    from .analysis.visible_normals import VisibleNormals, estimate_normals
+    from .analysis.visible_normals import NormalSearch, VisibleNormals, estimate_normals
     from .camera import Camera
     from .errors import Scan4DError
     from .look import Look
@@ -22,14 +22,15 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 __all__ = [
-    "Camera", "Layers", "Look", "PointCloud", "Pose", "RangeView", "Rigid", "Scan4DError", "VisibleNormals",
-    "estimate_normals", "open_scan", "render",
+    "Camera", "Layers", "Look", "NormalSearch", "PointCloud", "Pose", "RangeView", "Rigid", "Scan4DError",
+    "VisibleNormals", "estimate_normals", "open_scan", "render",
 ]  # fmt: skip
 
 _HOMES = {
     "Camera": "camera",
     "Layers": "scan.layers",
     "Look": "look",
+    "NormalSearch": "analysis.visible_normals",
     "PointCloud": "scan.points",
     "Pose": "scan.pose",
     "RangeView": "scan.range_view",

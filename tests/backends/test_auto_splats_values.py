@@ -69,7 +69,12 @@ def test_splats_close_the_surface_where_points_hide_each_other(
 ) -> None:
     """Some points to a pixel: neighborhoods have hidden ones, too, which have no splats."""
     dense = sphere(100_000)
-    found = viewer.estimate_normals(dense, CAMERA, size=SIZE, hidden_neighbors=hidden_neighbors, growth=100)
+    found = viewer.estimate_normals(
+        dense,
+        CAMERA,
+        size=SIZE,
+        search=viewer.NormalSearch(hidden_neighbors=hidden_neighbors, growth=100),
+    )
     tree = cKDTree(dense.positions[found.neighbors].astype(np.float64))
     near = found.neighbors[tree.query(dense.positions[found.rows].astype(np.float64), k=10)[1]]
     shown = np.isin(near, found.rows).sum(axis=1)

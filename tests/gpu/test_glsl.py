@@ -127,38 +127,48 @@ def draw_all(renderer: Renderer, whole: bool) -> None:
 
     rich, *others = clouds()
     for cloud in (rich, *others) if whole else (rich,):
-        for name, setting in settings():
-            if name in DRAWS_POINTS:
-                draw(cloud, name, **setting)
-        for look in LOOKS:
-            draw(cloud, "points", look)
-            draw(cloud, filling.BACKEND, look)
-        for instancing, shape in product(("tiles", *FEEDS), ("discs", "cubes", "flat_cubes")):
-            draw(cloud, "voxels", instancing=instancing, shape=shape)
-        draw(cloud, "voxels", shape="cubes", least=1.4)  # of all sizes
-        draw(cloud, baselines.gl_points())
-        for one in (*backends().values(), finding.BACKEND):
-            for name in one.values:
-                draw(cloud, one, Look(color_by=name))
+        draw_points(draw, cloud)
         if whole:
             draw_pairs(draw, renderer, cloud)
     draw(others[-1], "surfels")  # whose radii are not known
     for pose in islice(range_poses(), 0 if whole else 1, None):
-        for name, setting in settings():
-            if name in ("pyramidal", "laplacian"):
-                draw(pose, name, **setting)
-        draw(pose, "laplacian", Look(light="flat"), detail=2.0)
-        if not whole:
-            continue
-        draw(pose, "pyramidal", Look(light="flat"), primitive="points", fill=False, hide=False)
-        draw(pose, "pyramidal", projection="orthographic", primitive="points", cull_back=True)
-        for mode, kernel in product(("table", "analytic"), ("3x3", "5x5")):
-            draw(pose, "pyramidal", primitive="points", antialias=mode, kernel=kernel)
+        draw_range_views(draw, pose, whole)
     draw(sphere(1500), "surfels", radius_scale=0.01)
     mesh = sphere_mesh(16)
     draw(mesh.points, baselines.mesh(mesh))
     draw(literal.colored(mesh.points), literal.paper_splats())
     Presenter(renderer.gpu).release()
+
+
+def draw_points(draw: Callable[..., None], cloud: PointCloud) -> None:
+    """Pictures of points, each with one setting other than the default."""
+    for name, setting in settings():
+        if name in DRAWS_POINTS:
+            draw(cloud, name, **setting)
+    for look in LOOKS:
+        draw(cloud, "points", look)
+        draw(cloud, filling.BACKEND, look)
+    for instancing, shape in product(("tiles", *FEEDS), ("discs", "cubes", "flat_cubes")):
+        draw(cloud, "voxels", instancing=instancing, shape=shape)
+    draw(cloud, "voxels", shape="cubes", least=1.4)  # of all sizes
+    draw(cloud, baselines.gl_points())
+    for one in (*backends().values(), finding.BACKEND):
+        for name in one.values:
+            draw(cloud, one, Look(color_by=name))
+
+
+def draw_range_views(draw: Callable[..., None], pose: Pose, whole: bool) -> None:
+    """Pictures of range views. whole: also with several settings other than the defaults."""
+    for name, setting in settings():
+        if name in ("pyramidal", "laplacian"):
+            draw(pose, name, **setting)
+    draw(pose, "laplacian", Look(light="flat"), detail=2.0)
+    if not whole:
+        return
+    draw(pose, "pyramidal", Look(light="flat"), primitive="points", fill=False, hide=False)
+    draw(pose, "pyramidal", projection="orthographic", primitive="points", cull_back=True)
+    for mode, kernel in product(("table", "analytic"), ("3x3", "5x5")):
+        draw(pose, "pyramidal", primitive="points", antialias=mode, kernel=kernel)
 
 
 def draw_pairs(draw: Callable[..., None], renderer: Renderer, cloud: PointCloud) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
@@ -252,23 +252,23 @@ def test_errors_of_a_drawn_sphere_are_of_its_spacing(draw: Callable[..., Surface
     assert coverage["spill_percent"] < 5
 
 
+class Bounds(NamedTuple):
+    """Bounds of the errors of a backend."""
+
+    backend: str
+    wrong_layers: float  # percent, at most
+    holes: float  # percent, at most
+    psnr: tuple[float, float]
+    least_ssim: float
+
+
 @pytest.mark.parametrize(
-    ("backend", "wrong_layers", "holes", "psnr", "least_ssim"),
-    [
-        ("points", 40, 60, (0, 20), 0.0),
-        ("surfels", 2, 1, (25, 100), 0.5),
-    ],  # the far side shows between points
-    ids=["points", "surfels"],
-)
+    "bounds",
+    [Bounds("points", 40, 60, (0, 20), 0.0), Bounds("surfels", 2, 1, (25, 100), 0.5)],
+    ids=lambda bounds: bounds.backend,
+)  # the far side shows between points
 def test_errors_of_the_bunny_are_sane(
-    data_dir: Path,
-    renderer: Renderer,
-    draw: Callable[..., Surface],
-    backend: str,
-    wrong_layers: float,
-    holes: float,
-    psnr: tuple[float, float],
-    least_ssim: float,
+    data_dir: Path, renderer: Renderer, draw: Callable[..., Surface], bounds: Bounds
 ) -> None:
     stored = read_mesh(data_dir / "models" / "stanford_bunny_35947.ply")
     spacing = typical_spacing(stored.points)
@@ -283,22 +283,22 @@ def test_errors_of_the_bunny_are_sane(
     mesh = Mesh(cloud, faces.reshape(-1, 3).astype(stored.faces.dtype))
     camera, size = Camera.orbit(mesh.bounds, 20, 10), (320, 240)
     picture, look = trace(mesh, camera, size), Look(light="head")
-    drawn = draw(cloud, camera, size, backend, look=look)
+    drawn = draw(cloud, camera, size, bounds.backend, look=look)
     seen = visible(mesh, cloud.positions, camera)
     assert 0.3 < seen.mean() < 0.6
     depth = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), spacing)
     assert depth["depth_median"] < spacing
-    assert depth["wrong_layer_percent"] < wrong_layers
+    assert depth["wrong_layer_percent"] < bounds.wrong_layers
     coverage = metrics.coverage(drawn.coverage > 0, picture.covered)
-    assert coverage["hole_percent"] < holes
+    assert coverage["hole_percent"] < bounds.holes
     assert coverage["spill_percent"] < 5
     normals = metrics.normals(drawn.normal, picture.normal)
     assert normals["normal_median"] < 10
     assert normals["normal_signed_median"] == pytest.approx(normals["normal_median"], rel=0.01)
     image, true = drawn.image(), reference_surface(picture, renderer.gpu, look).image()
     color = metrics.color(image, true, picture.covered)
-    assert psnr[0] < color["psnr"] < psnr[1]
-    assert color["ssim"] > least_ssim
+    assert bounds.psnr[0] < color["psnr"] < bounds.psnr[1]
+    assert color["ssim"] > bounds.least_ssim
 
 
 def test_a_sequence_keeps_its_faces_in_a_file_of_their_own(data_dir: Path) -> None:

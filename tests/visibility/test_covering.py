@@ -21,7 +21,7 @@ from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.spacing import typical_spacing
 from viewer.visibility.calibration import EyeCalibration, body_of, calibrate
-from viewer.visibility.covering import CLEAR, REACH, STEEP, Covering
+from viewer.visibility.covering import CLEAR, REACH, STEEP, Covering, SpacedPoints
 from viewer.visibility.exact import SeenPoints, exact_visible_points, flipping, hull_rows
 from viewer.visibility.search import calibrated, visible_points
 from viewer.visibility.sectors import Sectors
@@ -104,8 +104,7 @@ class Watched:
         """finer: than they usually are, the cells."""
         covering = Covering(self.pose.gpu, len(self.pose.cloud))
         covering.find(
-            self.pose.array("positions"),
-            self.pose.cached(Spacings).texels,
+            SpacedPoints(self.pose.array("positions"), self.pose.cached(Spacings).texels),
             self.found.sectors,
             self.found.spacing / self.found.sectors.edge / finer,
             front=front,

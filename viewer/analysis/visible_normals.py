@@ -52,16 +52,35 @@ class VisibleNormals:
     hidden: NDArray[np.bool_]
 
 
+@dataclass(frozen=True)
+class NormalSearch:
+    """Rules for normals from neighborhoods. Raises InputError for values outside their range.
+
+    k: points of a neighborhood, the point itself among them. adaptive: whether planes go through as few of
+    the nearest points as noise allows. hidden_neighbors: whether hidden points that are at most some
+    neighborhoods away take part. expansions: of a neighborhood without another point, until its point is an
+    outlier; None: there are no outliers. growth: of the area within which another point must follow.
+    """
+
+    k: int = 10
+    adaptive: bool = True
+    hidden_neighbors: bool = True
+    expansions: int | None = 3
+    growth: float = 4.0
+
+    def __post_init__(self) -> None:
+        if not 3 <= self.k <= MOST_NEIGHBORS:
+            raise InputError(f"a neighbourhood must have 3 to {MOST_NEIGHBORS} points, not {self.k}")
+        if not self.growth >= 1:
+            raise InputError(f"growth must be at least 1, not {self.growth:g}")
+
+
 def estimate_normals(
     pose: Pose | PointCloud,
     camera: Camera | None = None,
     *,
     size: tuple[int, int] = (1760, 900),
-    k: int = 10,
-    adaptive: bool = True,
-    hidden_neighbors: bool = True,
-    expansions: int | None = 3,
-    growth: float = 4.0,
+    search: NormalSearch = NormalSearch(),
 ) -> VisibleNormals:
     """Normals of the points that a picture of this size shows (Preiner 2012, 4 to 6).
 
@@ -71,17 +90,11 @@ def estimate_normals(
     max(d_j, u) is the count. Where neighbors are thrice as far as is typical for the picture or more, points
     are outliers too that lie off all others: d_2^2 > 0.7 d_count^2.
 
-    The normal is that of the plane through the neighborhood; adaptive: through as few of the nearest as tell
-    it in spite of noise, so that neither their residuals nor some more of them turn it by much.
+    The normal is that of the plane through the neighborhood. An adaptive search takes so few of the nearest
+    points that neither their residuals nor some more points turn the plane by much.
 
-    camera: None fits the pose from the front. hidden_neighbors: whether points that another hides take part
-    which is at most some neighborhoods nearer. expansions: None: there are no outliers. Raises InputError,
-    NoOpenGLError.
+    camera: None fits the pose from the front. Raises InputError, NoOpenGLError.
     """
-    if not 3 <= k <= MOST_NEIGHBORS:
-        raise InputError(f"a neighbourhood must have 3 to {MOST_NEIGHBORS} points, not {k}")
-    if not growth >= 1:
-        raise InputError(f"growth must be at least 1, not {growth:g}")
     if isinstance(pose, PointCloud):
         pose = Pose(0, 0.0, "points", pose)
     renderer = shared_renderer()
@@ -92,8 +105,9 @@ def estimate_normals(
     view = View.of(camera, size, resident.origin, bounds)
     surface.start(resident, view)
     found = surface.cached(Neighborhoods)
-    alone = UNKNOWN if expansions is None else 2.0**expansions
-    found.find(resident, surface, view, Search(k, hidden_neighbors, False, growth, alone, adaptive=adaptive))
+    alone = UNKNOWN if search.expansions is None else 2.0**search.expansions
+    rules = Search(search.k, search.hidden_neighbors, False, search.growth, alone, adaptive=search.adaptive)
+    found.find(resident, surface, view, rules)
     return _read(resident.cloud, found)
 
 

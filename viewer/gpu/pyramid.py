@@ -137,12 +137,12 @@ def sizes(size: tuple[int, int], levels: int | None = None) -> list[tuple[int, i
 def reduce(gpu: Gpu, fine: Image, coarse: Image, how: Filter, guide: Image | None = None) -> None:
     """Make a level of the next finer one. guide: an image of the fine one's size, whose weights count and
     which, with `Filter.front`, tells which samples are in front; None: the fine one itself."""
-    _step(gpu, "reduce", fine, coarse, how, {"NEAREST": int(how.nearest)}, guide=guide)
+    _Step("reduce", fine, coarse, how, {"NEAREST": int(how.nearest)}, guide=guide).run(gpu)
 
 
 def expand(gpu: Gpu, coarse: Image, fine: Image, how: Filter) -> None:
     """Make a level of the next coarser one."""
-    _step(gpu, "expand", coarse, fine, how, {"SIGN": 0})
+    _Step("expand", coarse, fine, how, {"SIGN": 0}).run(gpu)
 
 
 def fill(
@@ -158,7 +158,7 @@ def fill(
     which they count, as in `reduce`; None: these themselves."""
     its_guide, known = guides or (coarse, fine)
     defines = {"SIGN": 0, "FILLS": 1}
-    _step(gpu, "expand", coarse, fine, how, defines, guide=its_guide, known=known, enough=enough)
+    _Step("expand", coarse, fine, how, defines, guide=its_guide, known=known, enough=enough).run(gpu)
 
 
 def subtract_expanded(gpu: Gpu, image: Image, coarse: Image, detail: Image, how: Filter) -> None:
@@ -167,50 +167,56 @@ def subtract_expanded(gpu: Gpu, image: Image, coarse: Image, detail: Image, how:
     It is a level of a Laplacian pyramid, with the image's weights; `add_expanded` gives the image again, but
     for the rounding of float32.
     """
-    _step(gpu, "expand", coarse, detail, how, {"SIGN": -1}, image)
+    _Step("expand", coarse, detail, how, {"SIGN": -1}, image).run(gpu)
 
 
 def add_expanded(gpu: Gpu, detail: Image, coarse: Image, image: Image, how: Filter) -> None:
     """Make an image of its detail and of the next coarser level, expanded. It has the detail's weights."""
-    _step(gpu, "expand", coarse, image, how, {"SIGN": 1}, detail)
+    _Step("expand", coarse, image, how, {"SIGN": 1}, detail).run(gpu)
 
 
-def _step(
-    gpu: Gpu,
-    name: str,
-    source: Image,
-    result: Image,
-    how: Filter,
-    defines: Mapping[str, int],
-    detail: Image | None = None,
-    guide: Image | None = None,
-    known: Image | None = None,
-    enough: float = 0.0,
-) -> None:
-    """Run shaders/pyramid/NAME.comp for each sample of the result. guide: has the weights that count in place
-    of the source's; known: in place of the result's."""
-    guide = guide or source
-    _check(name, source, result, detail)
-    _check(name, guide, known or result, channels=False)
-    taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
-    taken = {"CHANNELS": f"{result.channels}u", "FIRST": how.first, "COUNT": len(how.taps)}
-    given = {"FRONT": int(how.front), "FILLS": 0, **defines, **taken, "TAPS": f"float[]({taps})"}
-    program = gpu.compute(f"pyramid/{name}.comp", given)
-    source.samples.bind(Texture.SAMPLES)
-    guide.weights.bind(Texture.WEIGHTS)
-    if how.front:
-        guide.samples.bind(Texture.GUIDE)
-    if known is not None:
-        known.weights.bind(Texture.DETAIL_WEIGHTS)
-        gpu.set(program, enough=enough)
-    if detail is not None:
-        detail.samples.bind(Texture.DETAIL)
-        detail.weights.bind(Texture.DETAIL_WEIGHTS)
-    result.samples.buffer.bind_to_storage_buffer(Storage.SAMPLES)
-    result.weights.buffer.bind_to_storage_buffer(Storage.WEIGHTS)
-    gpu.set(program, size=source.size, out_size=result.size)
-    with gpu.timers.measure(name):
-        gpu.dispatch(program, result.size[0] * result.size[1])
+@dataclass(frozen=True)
+class _Step:
+    """A run of shaders/pyramid/NAME.comp for each sample of the result.
+
+    guide: the image whose weights count in place of the source's; known: in place of the result's. enough:
+    the weight from which on samples fill those of the result that are not there.
+    """
+
+    name: str
+    source: Image
+    result: Image
+    how: Filter
+    defines: Mapping[str, int]
+    detail: Image | None = None
+    guide: Image | None = None
+    known: Image | None = None
+    enough: float = 0.0
+
+    def run(self, gpu: Gpu) -> None:
+        source, result, how, detail = self.source, self.result, self.how, self.detail
+        guide = self.guide or source
+        _check(self.name, source, result, detail)
+        _check(self.name, guide, self.known or result, channels=False)
+        taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
+        taken = {"CHANNELS": f"{result.channels}u", "FIRST": how.first, "COUNT": len(how.taps)}
+        given = {"FRONT": int(how.front), "FILLS": 0, **self.defines, **taken, "TAPS": f"float[]({taps})"}
+        program = gpu.compute(f"pyramid/{self.name}.comp", given)
+        source.samples.bind(Texture.SAMPLES)
+        guide.weights.bind(Texture.WEIGHTS)
+        if how.front:
+            guide.samples.bind(Texture.GUIDE)
+        if self.known is not None:
+            self.known.weights.bind(Texture.DETAIL_WEIGHTS)
+            gpu.set(program, enough=self.enough)
+        if detail is not None:
+            detail.samples.bind(Texture.DETAIL)
+            detail.weights.bind(Texture.DETAIL_WEIGHTS)
+        result.samples.buffer.bind_to_storage_buffer(Storage.SAMPLES)
+        result.weights.buffer.bind_to_storage_buffer(Storage.WEIGHTS)
+        gpu.set(program, size=source.size, out_size=result.size)
+        with gpu.timers.measure(self.name):
+            gpu.dispatch(program, result.size[0] * result.size[1])
 
 
 def _check(

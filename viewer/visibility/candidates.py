@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,14 @@ _EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones
 # The same among visible points, half of all: where 12 of them usually lie in a cell, chance leaves none
 # inside empty, however unevenly they lie. Where 2 do, it leaves one in eight.
 _EMPTY_AMONG_VISIBLE = 1 / 24
+
+
+class Sample(NamedTuple):
+    """Rows that are looked at in place of all."""
+
+    rows: gl.BufferTexture  # R32UI
+    length: int
+    share: float = 1.0  # of all points
 
 
 class Candidates:
@@ -93,15 +102,15 @@ class Candidates:
         steps: int,
         stride: int = 1,
         *,
-        sample: tuple[gl.BufferTexture, int] | None = None,
+        sample: Sample | None = None,
         among: gl.BufferTexture | None = None,
         clip: Planes = EVERYWHERE,
     ) -> None:
         """Find the candidates of sectors, and which points are visible.
 
         positions: RGB32F, a texel a point, relative to the origin of the sectors. steps: of propagation at
-        most. stride: sectors between those whose candidates a point is compared with. sample: rows that are
-        looked at in place of all, R32UI, and how many. among: R32UI, a texel a point, leaves out those where
+        most. stride: sectors between those whose candidates a point is compared with. sample: None: all
+        rows are looked at. among: R32UI, a texel a point, leaves out those where
         it is 0; `visible` is then left as it is. clip: planes, points below one of which are left out, and
         not visible.
         """
@@ -118,11 +127,11 @@ class Candidates:
             if among is not None:
                 among.bind(Texture.VISIBLE)
             if sample is not None:
-                sample[0].bind(Texture.DRAWN_ROWS)
+                sample.rows.bind(Texture.DRAWN_ROWS)
             if "cell_shift" in program:  # the first pass alone has it
                 gpu.set(program, clip=clip[0], sides=tuple(chain.from_iterable(clip[1:])), cell_shift=shift)
 
-        self.looked_at = self.points if sample is None else sample[1]
+        self.looked_at = self.points if sample is None else sample.length
         sampled = {"SAMPLED": int(sample is not None)}
         defines = {"FILTERED": int(among is not None), "CELLS": 1, **sampled, **self.defines}
         visits = Visits("hpr/candidates.glsl", self.looked_at, bind, defines, sectors)

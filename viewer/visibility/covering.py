@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from ..gpu.constants import NO_DEPTH
 from ..gpu.context import Gpu, Program
 from ..gpu.scatter import Visits, take_keys
 from ..scan.points import NOTHING
+from .candidates import Sample
 from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 
@@ -40,7 +42,13 @@ _BLOCK = 8  # of these cells
 _RUN = 8  # points that an invocation of hpr/near_front.comp looks at
 _FACE_BITS = 3
 
-Sample = tuple[gl.BufferTexture, int]  # rows that are looked at in place of all, and how many
+
+class SpacedPoints(NamedTuple):
+    """Points on the GPU, with a texel for each row."""
+
+    positions: gl.BufferTexture  # RGB32F, relative to the origin of the sectors
+    spacings: gl.BufferTexture  # R32F, distance between the points around, scan units
+    repeated: gl.BufferTexture | None = None  # R32UI, `copies_in` of the pose
 
 
 class Covering:
@@ -76,38 +84,32 @@ class Covering:
 
     def find(
         self,
-        positions: gl.BufferTexture,
-        spacings: gl.BufferTexture,
+        points: SpacedPoints,
         sectors: Sectors,
         spacing: float,
         clear: float = CLEAR,
         *,
-        repeated: gl.BufferTexture | None = None,
         sample: Sample | None = None,
-        share: float = 1.0,
         clip: Planes = EVERYWHERE,
         front: bool = True,
     ) -> None:
         """Find which points are visible.
 
-        positions: RGB32F, a texel a point, relative to the origin of the sectors. spacings: R32F, how far
-        apart points lie around each, scan units. sectors: say how directions are divided, by any number.
-        spacing: usual distance between visible points, as a share of a face of the sectors. clear: behind
-        discs, in their reach. repeated: `copies_in` of the pose. sample: rows that are looked at in place
-        of all, R32UI, and how many. share: of all points, that the sample is of. clip: planes, points
-        below one of which are left out, and not visible.
-        front: points that lie far behind others are left out first.
+        sectors: say how directions are divided, by any number. spacing: usual distance between visible
+        points, as a share of a face of the sectors. clear: behind discs, in their reach. sample: None: all
+        points are looked at. clip: planes; points below one of them are left out, and not visible. front:
+        whether points far behind others are left out first.
         """
         self.state = object()
-        self.looked_at = self.points if sample is None else sample[1]
+        self.looked_at = self.points if sample is None else sample.length
         near_cells = sectors.divided(max(round(1 / (_CELL * spacing)), 1))
         sampled = {"SAMPLED": int(sample is not None), "CUBE": int(sectors.mapping == "cube")}
         with self._gpu.timers.measure("front"):
-            self._find_front(positions, sectors, spacing, sampled, sample, clip, front)
+            self._find_front(points.positions, sectors, spacing, sampled, sample, clip, front)
         with self._gpu.timers.measure("near"):
-            near = self._list_near(near_cells, sampled, repeated, sample, share)
+            near = self._list_near(near_cells, sampled, points.repeated, sample)
         with self._gpu.timers.measure("discs"):
-            self._list_discs(near, near_cells, sampled, spacings)
+            self._list_discs(near, near_cells, sampled, points.spacings)
         with self._gpu.timers.measure("cover"):
             self._cover(near, near_cells, sampled, clear)
 
@@ -153,8 +155,8 @@ class Covering:
         sampled: dict[str, int],
         repeated: gl.BufferTexture | None,
         sample: Sample | None,
-        share: float,
     ) -> IndexList:
+        share = 1.0 if sample is None else sample.share
         gpu, faces = self._gpu, 3 if sampled["CUBE"] else 1
         near = self._list("near", faces * self.points)
         defines = {"COPIES": int(repeated is not None), "FARTHEST": _FARTHEST, **sampled}
@@ -248,4 +250,4 @@ class Covering:
 
 def _bind_sample(sample: Sample | None) -> None:
     if sample is not None:
-        sample[0].bind(Texture.DRAWN_ROWS)
+        sample.rows.bind(Texture.DRAWN_ROWS)

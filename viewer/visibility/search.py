@@ -20,9 +20,9 @@ from ..scan.points import PointCloud, checked_viewpoint
 from ..scan.pose import Pose
 from ..view import View
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
-from .candidates import Candidates
+from .candidates import Candidates, Sample
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
-from .covering import CLEAR, CLEAR_OF_NOISE, Covering, Sample
+from .covering import CLEAR, CLEAR_OF_NOISE, Covering, SpacedPoints
 from .exact import SeenPoints, as_cloud, flipping
 from .noise import noise_of
 from .sectors import Sectors
@@ -87,23 +87,19 @@ class _Search:
         pose: GpuPose,
         found: EyeCalibration,
         sample: Sample | None = None,
-        share: float = 1.0,
         clip: Planes = EVERYWHERE,
     ) -> Covering:
-        """Find the points that no others cover. share: of all points, that the sample is of."""
+        """Find the points that no others cover."""
         if self._covering is None or self._covering.points != len(pose.cloud):
             self._gpu.discard(self._covering)
             self._covering = None
             self._covering = Covering(self._gpu, len(pose.cloud))
         self._covering.find(
-            steady_points(pose),
-            pose.cached(Spacings).texels,
+            SpacedPoints(steady_points(pose), pose.cached(Spacings).texels, copies_in(pose)),
             found.sectors,
             found.spacing / found.sectors.edge,
             _clearance(pose),
-            repeated=copies_in(pose),
             sample=sample,
-            share=share,
             clip=clip,
         )
         return self._covering
@@ -167,9 +163,9 @@ class SeenPicture(_Search):
         drawn = count / len(pose.cloud)
         found = calibrate(pose.stored, directions, pose.origin, settings.depth, radius, drawn)
         self.calibration = found
-        only = None if rows is None else (rows, count)
+        only = None if rows is None else Sample(rows, count, share)
         if settings.mode != HULL:
-            self._found, self._chosen = self.uncovered(pose, found, only, share, clip), {}
+            self._found, self._chosen = self.uncovered(pose, found, only, clip), {}
             return
         quality = settings.quality * (_MOVING if is_moving else 1.0)
         search = chosen_search(found, settings.sectors, settings.steps, quality)

@@ -21,7 +21,7 @@ from viewer.analysis.landmarks.files import (
     read_landmarks,
     write_landmarks,
 )
-from viewer.analysis.landmarks.landmark_set import LandmarkSet
+from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
 from viewer.analysis.track import Known
 from viewer.errors import InputError
 from viewer.scan.formats import known_suffixes
@@ -155,7 +155,9 @@ def test_c3d_tells_what_it_rounds(tmp_path: Path) -> None:
     assert np.ptp(np.diff(read_landmarks(tmp_path / "m.c3d").times)) == pytest.approx(0, abs=1e-9)
     far = replace(few, positions=few.positions + 4e6)
     assert "rounded" in str(write_landmarks(tmp_path / "m.c3d", far))
-    later = LandmarkSet.of(["a"], np.ones((2, 1, 3)), frames=[10, 13], times=np.array([0.5, 0.65]), unit="mm")
+    later = LandmarkSet.of(
+        ["a"], np.ones((2, 1, 3)), frames=[10, 13], times=np.array([0.5, 0.65]), stated=Stated("mm")
+    )
     assert write_landmarks(tmp_path / "m.c3d", later) is None
     found = read_landmarks(tmp_path / "m.c3d")
     np.testing.assert_array_equal(found.frames, [10, 11, 12, 13])
@@ -205,7 +207,10 @@ def test_a_series_with_a_file_that_is_gone(tmp_path: Path) -> None:
 
 def test_previews_stay_previews(tmp_path: Path) -> None:
     wanted = LandmarkSet.of(
-        ["seen", "guessed"], np.ones((1, 2, 3)), known=np.array([[Known.PLACED, Known.PENDING]]), unit="mm"
+        ["seen", "guessed"],
+        np.ones((1, 2, 3)),
+        known=np.array([[Known.PLACED, Known.PENDING]]),
+        stated=Stated("mm"),
     )
     for name in ("m.mrk.json", "m.csv"):
         write_landmarks(tmp_path / name, wanted)

@@ -22,7 +22,7 @@ from plain_neighborhoods import (
 from scenes import rarely
 
 import viewer
-from viewer.analysis.visible_normals import VisibleNormals
+from viewer.analysis.visible_normals import NormalSearch, VisibleNormals
 from viewer.bench.metrics import angles_between
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
@@ -48,9 +48,8 @@ DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from
 
 
 def estimated(scene: BareScene, **params: Any) -> VisibleNormals:
-    return viewer.estimate_normals(
-        pose_of(scene), scene.camera, size=scene.size, **{"k": K, "adaptive": False, **params}
-    )
+    search = NormalSearch(**{"k": K, "adaptive": False, **params})
+    return viewer.estimate_normals(pose_of(scene), scene.camera, size=scene.size, search=search)
 
 
 def pose_of(scene: BareScene) -> Pose:
@@ -279,12 +278,15 @@ def test_points_without_ids_of_their_own_keep_those_of_the_file() -> None:
     np.testing.assert_array_equal(found.ids, scene.cloud.ids[found.rows])
 
 
-@pytest.mark.parametrize(
-    "values", [{"k": 2}, {"k": 33}, {"growth": 0.5}, {"growth": np.nan}, {"size": (0, 9)}]
-)
-def test_what_cannot_be_searched_is_told(values: dict[str, Any]) -> None:
+@pytest.mark.parametrize("values", [{"k": 2}, {"k": 33}, {"growth": 0.5}, {"growth": np.nan}])
+def test_searches_outside_their_range_are_refused(values: dict[str, Any]) -> None:
     with pytest.raises(InputError):
-        viewer.estimate_normals(SCENES["sphere"]().cloud, **values)
+        NormalSearch(**values)
+
+
+def test_a_picture_without_pixels_is_refused() -> None:
+    with pytest.raises(InputError):
+        viewer.estimate_normals(SCENES["sphere"]().cloud, size=(0, 9))
 
 
 # --- real scans -----------------------------------------------------------------------------

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import product
 
 import numpy as np
 import pytest
@@ -48,6 +49,20 @@ def kept(scene: Scene, splats: SectorSplats, longest: float) -> list[tuple[int, 
     ]
 
 
+def pixels_inside(corners: NDArray, size: tuple[int, int]) -> Iterator[tuple[int, int, NDArray]]:
+    """The pixels of a picture whose centres a triangle contains, corners (3, 2), and their shares of its
+    corners, (3,). None for a triangle without an area."""
+    edges = np.column_stack([corners, np.ones(3)])
+    if abs(np.linalg.det(edges)) < 1e-9:
+        return
+    low = np.maximum(np.ceil(corners.min(axis=0) - 0.5).astype(int), 0)
+    high = np.minimum(np.floor(corners.max(axis=0) - 0.5).astype(int), np.array(size) - 1)
+    for y, x in product(range(low[1], high[1] + 1), range(low[0], high[0] + 1)):
+        shares = np.linalg.solve(edges.T, [x + 0.5, y + 0.5, 1])
+        if (shares >= -1e-9).all():
+            yield y, x, shares
+
+
 def plain_picture(
     scene: Scene, faces: list[tuple[int, ...]]
 ) -> tuple[Depths, dict[tuple[int, int], set[int]]]:
@@ -67,19 +82,10 @@ def plain_picture(
 
     for face in faces:
         corners = list(face)
-        at, inverse = pixels[corners], 1 / depths[corners]
         if (depths[corners] < view.near).any():
             continue
-        edges = np.column_stack([at, np.ones(3)])
-        if abs(np.linalg.det(edges)) < 1e-9:
-            continue
-        low = np.maximum(np.ceil(at.min(axis=0) - 0.5).astype(int), 0)
-        high = np.minimum(np.floor(at.max(axis=0) - 0.5).astype(int), [width - 1, height - 1])
-        for y in range(low[1], high[1] + 1):
-            for x in range(low[0], high[0] + 1):
-                shares = np.linalg.solve(edges.T, [x + 0.5, y + 0.5, 1])
-                if (shares >= -1e-9).all():
-                    show(y, x, 1 / (shares @ inverse), set(corners))
+        for y, x, shares in pixels_inside(pixels[corners], (width, height)):
+            show(y, x, 1 / (shares @ (1 / depths[corners])), set(corners))
     corners_of_any = {row for face in faces for row in face}
     seen = set(np.unique(scene.rows).tolist()) - {NOTHING}
     for rows in (seen - corners_of_any, seen & corners_of_any):

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from experiments.suite import row_of
 from experiments.tables import Row
-from viewer.analysis.visible_normals import VisibleNormals, estimate_normals
+from viewer.analysis.visible_normals import NormalSearch, VisibleNormals, estimate_normals
 from viewer.bench.metrics import angles_between
 from viewer.bench.plan import Group
 from viewer.bench.run import Bench, BenchSettings
@@ -100,14 +100,16 @@ def fit_errors(cloud: PointCloud, mesh: Mesh, settings: BenchSettings, params: d
     views, size = settings.views, settings.size
     for number in range(views):
         camera = Camera.orbit(mesh.bounds, 360 * number / views, _ELEVATION, aspect=size[0] / size[1])
-        found = estimate_normals(pose, camera, size=size, **params)
+        found = estimate_normals(pose, camera, size=size, search=NormalSearch(**params))
         seen = visible(mesh, cloud.positions[found.rows], camera, 0.25 * tolerance)
         rows = found.rows[seen]
         reference = trace(mesh, camera, size)
         pooled.found.append(_off(found.normals[seen], cloud.normals[rows]))
         pooled.reference.append(_off(_open3d(cloud, found, params["k"])[seen], cloud.normals[rows]))
         pooled.in_band.append(at_silhouettes(reference, cloud, rows, tolerance))
-        aside = estimate_normals(pose, camera.orbited(ORBIT_STEP, 0), size=size, **params)
+        aside = estimate_normals(
+            pose, camera.orbited(ORBIT_STEP, 0), size=size, search=NormalSearch(**params)
+        )
         turned, grown = changes(found, aside)
         pooled.turned.append(turned)
         pooled.grown.append(grown)

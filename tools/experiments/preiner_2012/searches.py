@@ -17,7 +17,7 @@ import numpy as np
 from experiments.preiner_2012.fits import bare
 from experiments.suite import row_of
 from experiments.tables import Row
-from viewer.analysis.visible_normals import estimate_normals
+from viewer.analysis.visible_normals import NormalSearch, estimate_normals
 from viewer.backends import backend
 from viewer.bench.plan import Group
 from viewer.bench.run import LOOK, Bench, undisturbed
@@ -104,7 +104,7 @@ def measure_searches(bench: Bench) -> Iterator[Row]:
 
 def search_rows(bench: Bench, pose: Pose, camera: Camera, searched: Searched) -> Iterator[Row]:
     """Rows of one scene: the paper's number of neighbours with and without culling beside trees; others."""
-    found = estimate_normals(pose, camera, size=bench.settings.size, k=K)
+    found = estimate_normals(pose, camera, size=bench.settings.size, search=NormalSearch(K))
     rows = found.rows
     settings = [{"k": K, "cull": cull} for cull in (False, True)]
     settings += [{"k": k, "cull": True} for k in KS[1:]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,18 @@ _ALL = 0.8  # of the landmarks, for which a reason is given
 _WIDE = (
     0.2  # of a scan's radius, that landmarks span at least: shrunk enough, any lie in a box about the origin
 )
+
+
+class Stated(NamedTuple):
+    """What a file states of its landmarks beside numbers: see `LandmarkSet`. unit: any text."""
+
+    unit: str | None = None
+    about: Sequence[str] = ()
+    axes: str | None = None
+    remarks: Sequence[str] = ()
+
+
+NOTHING_STATED = Stated()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +71,12 @@ class LandmarkSet:
         sigmas: NDArray[np.float64] | None = None,
         times: NDArray[np.float64] | None = None,
         frames: Sequence[int] | NDArray[np.int64] | None = None,
-        unit: str | None = None,
-        about: Sequence[str] = (),
-        axes: str | None = None,
-        remarks: Sequence[str] = (),
+        stated: Stated = NOTHING_STATED,
     ) -> LandmarkSet:
-        """A set of what a file tells. Names that are empty, long or there twice are made usable; positions
-        that are not finite are not defined, the others PLACED where nothing else is said. A unit may be any
-        text; `remarks` says so where it is no unit. Raises InputError where there is no landmark."""
+        """The set of the landmarks in a file. Names that are empty, long or repeated are made usable.
+        Positions that are not finite are not defined; `known` None makes the others PLACED. If the unit is
+        not a known one, `remarks` says so. Raises InputError if there is no landmark."""
+        unit, about, axes, remarks = stated
         if not len(names):
             raise InputError("holds no landmarks")
         positions = np.array(positions, np.float64).reshape(-1, len(names), 3)
@@ -108,8 +119,7 @@ class LandmarkSet:
             sigmas=np.stack([track.sigmas for track in held], axis=1),
             times=times,
             frames=np.arange(len(times)),
-            unit=unit,
-            about=[(about or {}).get(name, "") for name in tracks],
+            stated=Stated(unit, [(about or {}).get(name, "") for name in tracks]),
         )
 
     def __len__(self) -> int:

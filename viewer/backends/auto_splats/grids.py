@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,9 +46,9 @@ class Grids:
     alone: float
     drops: bool
     unit: float
-    typical: float
-    typical_in_space: float
-    widest: float
+    typical: float = 1.0
+    typical_in_space: float = 0.0
+    widest: float = 0.0
 
     @classmethod
     def of(
@@ -56,30 +56,25 @@ class Grids:
         size: tuple[int, int],
         coarse_shift: int,
         search: Search,
-        unit: float,
+        unit: float = 1.0,
         border: int = 0,
-        typical: float = 1.0,
-        typical_in_space: float = 0.0,
-        widest: float = 0.0,
     ) -> Grids:
-        """The grids over a picture of a size, pixels, with its border. unit and what is typical: as above."""
-        fine_shift = min(max(round(math.log2(_FINE * typical)), 0), _COARSEST_FINE)
+        """The grids over a picture of a size, pixels, with its border, before anything typical is known."""
         margin = 1 << coarse_shift
-        return cls(
-            _cells(size, margin, fine_shift),
-            _cells(size, margin, coarse_shift),
-            fine_shift,
-            coarse_shift,
-            margin,
-            border,
-            search.culls,
-            search.growth,
-            search.alone,
-            search.drops,
-            unit,
-            typical,
-            typical_in_space,
-            widest,
+        fine, coarse = _cells(size, margin, 0), _cells(size, margin, coarse_shift)
+        rules = search.culls, search.growth, search.alone, search.drops
+        return cls(fine, coarse, 0, coarse_shift, margin, border, *rules, unit)
+
+    def refined(self, size: tuple[int, int], typical: float, in_space: float, widest: float) -> Grids:
+        """The grids with fine cells for typical neighborhoods. typical, in_space, widest: as above."""
+        shift = min(max(round(math.log2(_FINE * typical)), 0), _COARSEST_FINE)
+        return replace(
+            self,
+            fine_size=_cells(size, self.margin, shift),
+            fine_shift=shift,
+            typical=typical,
+            typical_in_space=in_space,
+            widest=widest,
         )
 
     @property

@@ -103,7 +103,7 @@ class Neighborhoods:
         self._texels: dict[str, gl.BufferTexture] = {}
         self._totals = gpu.buffer(reserve=8)
         self._bins = Bins(gpu, 1)
-        self._grids = Grids.of(size, FINEST_COARSE, Search(), 1.0)
+        self._grids = Grids.of(size, FINEST_COARSE, Search())
         self.participants = 0
         self.count = 0  # of those searched
         self.is_whole = False  # whether none that is seen is left to be searched
@@ -260,9 +260,7 @@ class Neighborhoods:
                 break
             shift = wanted
         in_space = _typical_radius(pose, search.k)
-        self._grids = grids = Grids.of(
-            self._size, shift, search, _unit(pose), border, radius, in_space, _widest_radius(pose, search.k)
-        )
+        self._grids = grids = grids.refined(self._size, radius, in_space, _widest_radius(pose, search.k))
         for name in ("near to", "farthest"):
             self._reserve(name, 4 * grids.coarse_cells, gl.R32F)
         with self._gpu.timers.measure("planes"):

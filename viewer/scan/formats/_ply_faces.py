@@ -105,7 +105,7 @@ def _unlike(data: bytes, element: Element, corners: int, endian: str, most: int)
     packed = np.empty(len(data), np.uint8)
     sizes = np.empty(min(most, len(data) // layout.least), np.uint32)
     rows, size, filled, is_negative = pack_rows(
-        np.frombuffer(data, np.uint8), *layout, endian == ">", corners, packed, sizes
+        np.frombuffer(data, np.uint8), layout, endian == ">", corners, packed, sizes
     )
     if is_negative and not rows:
         raise negative_list("a face")

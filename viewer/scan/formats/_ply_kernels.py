@@ -6,14 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
+from ._ply_header import Layout
 
 
 @compiled
 def pack_rows(
     data: NDArray[np.uint8],
-    sizes: NDArray[np.int64],
-    lengths: NDArray[np.int64],
-    signed: NDArray[np.bool_],
+    layout: Layout,
     big_endian: bool,
     kept: int,
     packed: NDArray[np.uint8],
@@ -24,11 +23,10 @@ def pack_rows(
     Returns how many rows were whole, their bytes, the bytes copied, and whether the next row has a list of a
     negative length.
 
-    data: (B,), from the first row on. sizes: (P,), bytes of each property, or of an item of its list.
-    lengths: (P,), bytes of the length in front of the list, 0: no list. signed: (P,), whether
-    that length may be negative. kept: the number of the list, or -1. packed: bytes enough. counts: (N,) for
-    as many rows as are wanted; gets the length of the list that is kept.
+    data: (B,), from the first row on. layout: of a row. kept: the number of the list, or -1. packed:
+    bytes enough. counts: (N,) for as many rows as are wanted; gets the length of the list that is kept.
     """
+    sizes, lengths, signed = layout
     at, filled = 0, 0
     for row in range(len(counts)):
         here, end = at, filled

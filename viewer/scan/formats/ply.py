@@ -245,7 +245,7 @@ def _walk_bytes(stream: BinaryIO, element: Element, encoding: str) -> NDArray[np
     packed = np.empty(element.count * layout.width, np.uint8)
     lengths = np.empty(element.count, np.uint32)
     is_big = encoding == "binary_big_endian"
-    rows, size, _, is_negative = pack_rows(data, *layout, is_big, -1, packed, lengths)
+    rows, size, _, is_negative = pack_rows(data, layout, is_big, -1, packed, lengths)
     if is_negative:
         raise negative_list(f"row {rows} of {element.name}")
     if rows < element.count:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....errors import InputError
 from ...track import Known
-from ..landmark_set import LandmarkSet, check_cells
+from ..landmark_set import LandmarkSet, Stated, check_cells
 from ._text import read_bytes, without_states
 
 if TYPE_CHECKING:
@@ -68,9 +68,11 @@ def read(path: Path) -> LandmarkSet:
         known=np.where(there, Known.PLACED, Known.GAP),
         times=numbers / rate if rate > 0 and np.isfinite(rate) else None,
         frames=numbers,
-        unit=_unit(reader),
-        about=_texts(reader, "DESCRIPTIONS", count),
-        remarks=[] if labels else ["Its points have no names: Scan4D numbers them"],
+        stated=Stated(
+            _unit(reader),
+            _texts(reader, "DESCRIPTIONS", count),
+            remarks=[] if labels else ["Its points have no names: Scan4D numbers them"],
+        ),
     )
 
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError
-from ..landmark_set import LandmarkSet
+from ..landmark_set import LandmarkSet, Stated
 from ._text import (
     at_line,
     count_of,
@@ -124,8 +124,7 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
         positions,
         times=np.array([own_number(specimen.own, "time") for specimen in specimens]),
         frames=own_frames([own_number(specimen.own, "frame") for specimen in specimens]),
-        unit=own_unit(own),
-        remarks=remarks,
+        stated=Stated(own_unit(own), remarks=remarks),
     )
 
 
