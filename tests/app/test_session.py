@@ -15,8 +15,8 @@ from viewer.app.scene.rendering import Rendering
 from viewer.app.session import Session, SessionSettings, edit_name
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.choice.configurations import Configuration
 from viewer.choice.goal import Goal
-from viewer.choice.ways import DrawingWay
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
 from viewer.document.schema import usable
@@ -181,14 +181,14 @@ def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> No
     assert session.document == document, "it comes back where the renderer is there"
 
 
-ONE_PASS = DrawingWay("surfels", {"passes": "one"})
+ONE_PASS = Configuration("surfels", {"passes": "one"})
 
 
 def test_what_is_chosen_automatically_stands_in_for_what_the_user_chose() -> None:
     own = Document(camera=Camera(), backend="points").with_params("points", LARGE)
     document = replace(own, goal=Goal("time", 50.0))
     assert document.chosen(BARE) == own.chosen(BARE), "until one is chosen"
-    document = replace(document, way=ONE_PASS)
+    document = replace(document, configuration=ONE_PASS)
     assert document.chosen(BARE) == ("surfels", backend("surfels").params({"passes": "one"}))
     assert document.defaults(BARE) == ("surfels", backend("surfels").params())
     assert document.drawn_by("points").chosen(BARE) == own.chosen(BARE)
@@ -196,7 +196,7 @@ def test_what_is_chosen_automatically_stands_in_for_what_the_user_chose() -> Non
 
 
 def test_a_scan_begins_with_the_goal_of_the_one_before_and_chooses_anew() -> None:
-    session = Session("one", Document(camera=Camera(), goal=Goal("time", 50.0), way=ONE_PASS))
+    session = Session("one", Document(camera=Camera(), goal=Goal("time", 50.0), configuration=ONE_PASS))
     session.turn_to("two")
     assert session.document == Document(goal=Goal("time", 50.0))
 
@@ -210,7 +210,7 @@ def test_the_automatic_choice_ends_with_what_is_done_by_hand_and_comes_back_by_u
         playback.pose = timeline.pose(0)
         rendering = Rendering(session, playback, str)
         rendering.aim(Goal("time", 50.0))
-        session.amend(way=ONE_PASS)
+        session.amend(configuration=ONE_PASS)
         aimed = session.document
         two = backend("surfels").params({"passes": "two"})
         {

@@ -16,7 +16,7 @@ def bound(app: RunningApp, most: float) -> str:
     app.act(PANEL, ("item_input_value", "##most", most))
     state = app.settle()
     assert state.document["goal"]["bound"] == most
-    assert state.backend == state.document["way"]["backend"]
+    assert state.backend == state.document["configuration"]["backend"]
     return str(state.backend)
 
 
@@ -50,7 +50,11 @@ def test_the_renderer_is_chosen_for_a_bound_until_a_hand_chooses(screen: Screen,
         assert (state.document["goal"], state.backend) == (automatic["goal"], "points")
         app.act(PANEL, ("item_click", "##automatic"))
         state = app.settle()
-        assert (state.document["goal"], state.document["way"], state.backend) == (None, None, "surfels")
+        assert (state.document["goal"], state.document["configuration"], state.backend) == (
+            None,
+            None,
+            "surfels",
+        )
         app.screen.do("key", "ctrl+z")
         app.settle()
         app.screen.do("key", "ctrl+q")

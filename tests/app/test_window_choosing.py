@@ -19,10 +19,10 @@ from viewer.app.scene.viewport import Viewport
 from viewer.app.session import Session
 from viewer.camera import Camera
 from viewer.choice import known
-from viewer.choice.choose import choose_way
+from viewer.choice.choose import choose_configuration
+from viewer.choice.configurations import Configuration
 from viewer.choice.goal import Goal
 from viewer.choice.model import ERROR_TERMS, TIME_TERMS, Law
-from viewer.choice.ways import DrawingWay
 from viewer.document.document import Document
 from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import view_of
@@ -81,7 +81,7 @@ class Shown:
         self.is_at_rest = at_rest
         return self.choosing.advance(time.monotonic() + LATER)
 
-    def settle(self) -> DrawingWay | None:
+    def settle(self) -> Configuration | None:
         self.draw()
         self.advance()
         while self.choosing.waits:
@@ -89,7 +89,7 @@ class Shown:
             self.advance()
         assert not self.choosing.is_due
         assert not self.advance(), "nothing else comes of the same"
-        return self.session.document.way
+        return self.session.document.configuration
 
 
 @pytest.fixture
@@ -127,23 +127,23 @@ def test_undo_of_what_was_done_before_a_choice_keeps_the_choice(shown: Shown) ->
     shown.session.change("Choose automatically", goal=Goal("time", 25.0))
     shown.session.change("Change light", look=Look(light="flat"))
     way = shown.settle()
-    assert way == DrawingWay("surfels", {"passes": "one"})
+    assert way == Configuration("surfels", {"passes": "one"})
     shown.session.history.undo()
-    assert shown.session.document.way is None
+    assert shown.session.document.configuration is None
     shown.draw()
     assert shown.advance()
-    assert shown.session.document.way == way
+    assert shown.session.document.configuration == way
 
 
 def test_an_error_is_bounded_in_pixels_and_in_the_unit_of_the_scan(shown: Shown) -> None:
     shown.session.change("Name unit", unit="mm", goal=Goal("error", 1.2, "px"))
-    assert shown.settle() == DrawingWay("surfels", {"passes": "one"})
+    assert shown.settle() == Configuration("surfels", {"passes": "one"})
     comparison = shown.choosing.comparison
     assert comparison is not None
     for unit, factor in (("mm", 1.0), ("cm", 0.1)):
         bound = 0.6 * comparison.footprint * factor
         shown.session.change("Change bound", goal=Goal("error", bound, unit))
-        assert shown.settle() == DrawingWay("surfels"), unit
+        assert shown.settle() == Configuration("surfels"), unit
     shown.session.change("Name unit", unit="units")
     shown.settle()
     assert "cannot be converted to the scan's 'units'" in shown.choosing.problem
@@ -174,9 +174,9 @@ def test_it_is_what_a_command_chooses_for_the_same_picture(shown: Shown) -> None
     shown.settle()
     request = shown.viewport.request
     assert request is not None
-    expected = choose_way(POSE, view_of(request, SIZE), Goal("time", 25.0), MODEL, (1.0,))
+    expected = choose_configuration(POSE, view_of(request, SIZE), Goal("time", 25.0), MODEL, (1.0,))
     assert expected is not None
-    assert way == expected.way
+    assert way == expected.configuration
     assert shown.choosing.choice_of(request) == expected
     assert shown.choosing.choice_of(replace(request, backend="points", params=None)) is None
 

@@ -19,8 +19,8 @@ from viewer.bench.run import Bench, BenchSettings
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
 from viewer.choice import known
+from viewer.choice.configurations import SCALES
 from viewer.choice.model import CAP
-from viewer.choice.ways import SCALES
 from viewer.drawing.frame import scaled_size
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request

@@ -21,8 +21,8 @@ from hostile_values import variants
 from viewer.analysis.surface_point import SurfacePoint
 from viewer.backends import backend
 from viewer.camera import Camera
+from viewer.choice.configurations import Configuration
 from viewer.choice.goal import Goal
-from viewer.choice.ways import DrawingWay
 from viewer.document import saved_session
 from viewer.document.document import Bookmark, Document
 from viewer.document.landmarks import Landmarks
@@ -42,7 +42,7 @@ ENDS = (
 FULL = Document(
     camera=CAMERA, pivot=(1.0, 2.0, 3.0), look=Look(color_by="height", low=1e-17), backend="points",
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
-    goal=Goal("time", 1 / 3), way=DrawingWay("surfels", {"passes": "one"}),
+    goal=Goal("time", 1 / 3), configuration=Configuration("surfels", {"passes": "one"}),
     unit="mm", shown_unit="cm", front=-30.0, span=(2, 7), fps=30.0, times_by_names=True,
     bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
     parts={"landmarks": Landmarks().with_distance(*ENDS).with_distance(*ENDS[::-1])},
@@ -168,8 +168,8 @@ UNREADABLE = [
     (("params",), [1], "params"),
     (("goal", "bound"), 0, "goal"),
     (("goal", "kind"), "speed", "goal"),
-    (("way", "backend"), "gone", "way"),
-    (("way", "values"), {"passes": "nine"}, "way"),
+    (("configuration", "backend"), "gone", "configuration"),
+    (("configuration", "values"), {"passes": "nine"}, "configuration"),
     (("unit",), " ", "unit"),
     (("bookmarks", 1, "name"), 3, "bookmarks"),
     (("bookmarks", 0, "colour"), "#ffffff", "bookmarks"),

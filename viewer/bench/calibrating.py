@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
+from ..choice.configurations import SCALES, Configuration, configurations
 from ..choice.model import CAP, Law, Measured, fit
 from ..choice.seen import ScanInView
-from ..choice.ways import SCALES, DrawingWay, ways
 from ..drawing.frame import scaled_size
 from ..drawing.request import Request, view_of
 from ..drawing.timing import draw, undisturbed_ms
@@ -125,14 +125,14 @@ def _measured(bench: Bench, moment: Moment, camera: Camera, size: tuple[int, int
     seen = ScanInView.of(pose, view_of(Request(pose, camera), size))
     for scale in SCALES:
         surface = Surface(renderer.gpu, scaled_size(size, scale), size)
-        for way in ways(pose, (scale,)):
-            request = Request(pose, camera, way.backend, way.params, Look(quality="fast"))
+        for one in configurations(pose, (scale,)):
+            request = Request(pose, camera, one.backend, one.params, Look(quality="fast"))
             with undisturbed():
                 if scale == SCALES[0]:
                     draw(renderer, request, surface)  # what is prepared at the first one, no number holds
                 ms = undisturbed_ms(renderer, request, surface, bench.settings.repeat)
             yield {
-                "key": way.key, "backend": way.backend, "values": dict(way.values), "scale": scale,
+                "key": one.key, "backend": one.backend, "values": dict(one.values), "scale": scale,
                 "ms": round(ms, 3), "error": round(truth.error(surface), 5), "seen": asdict(seen),
             }  # fmt: skip
         surface.release()
@@ -144,9 +144,9 @@ def measured_of(row: Row) -> Measured:
     return Measured(seen, row["scale"], row["ms"], row["error"])
 
 
-def configuration_of(row: Row) -> DrawingWay:
+def configuration_of(row: Row) -> Configuration:
     """The configuration of a row."""
-    return DrawingWay(row["backend"], row["values"], row["scale"])
+    return Configuration(row["backend"], row["values"], row["scale"])
 
 
 def laws_of(rows: Sequence[Row]) -> dict[str, Law]:

@@ -1,4 +1,4 @@
-"""The choice itself: of all ways that draw a scan, the one that keeps a bound and is best otherwise."""
+"""The choice: of all configurations that draw a scan, the one that meets a bound and is best otherwise."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from ..scan.pose import Pose
 from ..view import View
+from .configurations import SCALES, Configuration, configurations
 from .goal import PIXELS, Goal
 from .model import Expected, Law, Model
 from .seen import ScanInView
-from .ways import SCALES, DrawingWay, ways
 
 _CLEARLY = 1.2  # times as good: what is expected is off by 10 to 25 % of what a picture takes
-_ROOM = 0.9  # of the bound, which a way keeps that takes the place of one that keeps it too
+_ROOM = 0.9  # share of the bound; a configuration within it replaces one that also meets the bound
 
 
 @dataclass(frozen=True)
@@ -32,19 +32,19 @@ class Automatic:
 
 @dataclass(frozen=True)
 class Choice:
-    """The way that was chosen for a goal, and what it is expected to take. footprint: the edge of a pixel
-    where the scan is, scan units. keeps: whether it is expected to keep the bound; if not, nothing does, and
+    """The configuration chosen for a goal, and what it is expected to take. footprint: the edge of a pixel
+    where the scan is, scan units. meets_limit: whether it probably meets the bound; if not, none does, and
     it comes nearest."""
 
     goal: Goal
-    way: DrawingWay
+    configuration: Configuration
     expected: Expected
     footprint: float
-    keeps: bool
+    meets_limit: bool
 
     @property
-    def told(self) -> Automatic:
-        """Reason and expectation, as pictures and statistics tell them."""
+    def report(self) -> Automatic:
+        """Reason and expectation, for pictures and statistics."""
         goal, expected = self.goal, self.expected
         return Automatic(goal.kind, goal.bound, goal.unit, round(expected.ms, 2), round(expected.error, 4))
 
@@ -54,10 +54,10 @@ class Choice:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A way that may draw a view, and what it is expected to take. bounded: the number that the goal bounds,
+    """A configuration that may draw a view, and its expected time. bounded: the number that the goal bounds,
     as large as it may be expected to become; other: the one that it does not, where less is better."""
 
-    way: DrawingWay
+    configuration: Configuration
     expected: Expected
     bounded: float
     other: float
@@ -65,7 +65,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Comparison:
-    """All ways that may draw a view, at least one, beside a goal, whose unit is the scan's where it is a
+    """All configurations that may draw a view, at least one, and a goal, whose unit is the scan's if it is a
     length. footprint: as of `Choice`."""
 
     goal: Goal
@@ -73,69 +73,74 @@ class Comparison:
     candidates: tuple[Candidate, ...]
 
     @classmethod
-    def of(cls, known: Iterable[DrawingWay], seen: ScanInView, goal: Goal, model: Model) -> Comparison:
-        """The comparison of some ways, all of which the model knows."""
+    def of(cls, known: Iterable[Configuration], seen: ScanInView, goal: Goal, model: Model) -> Comparison:
+        """The comparison of some configurations, all of which the model knows."""
         candidates = []
-        for way in known:
-            law = model[way.key]
-            expected = law.expect(seen.of_share(way.share), way.scale)
+        for one in known:
+            law = model[one.key]
+            expected = law.expect(seen.of_share(one.share), one.scale)
             other = expected.error if goal.kind == "time" else expected.ms
-            candidates.append(Candidate(way, expected, _bounded(expected, law, goal, seen), other))
+            candidates.append(Candidate(one, expected, _bounded(expected, law, goal, seen), other))
         return cls(goal, seen.footprint, tuple(candidates))
 
     def best(self) -> Choice:
-        """The choice of the best one: see `choose_way`."""
+        """The choice of the best one: see `choose_configuration`."""
         return self._choice(min(self.candidates, key=self._rank))
 
-    def settled(self, present: DrawingWay | None) -> Choice:
+    def settled(self, present: Configuration | None) -> Choice:
         """The choice where one is drawn with already: that stays, unless it misses the bound or another one
-        is clearly better and keeps the bound with room to spare; where none keeps it, unless another one is
+        is clearly better and meets the bound with room to spare; where none meets it, unless another one is
         clearly nearer. So a view that moves to and fro is not drawn now so, now so."""
-        now = next((each for each in self.candidates if each.way == present), None)
+        now = next((each for each in self.candidates if each.configuration == present), None)
         if now is None:
             return self.best()
         best = min(self.candidates, key=self._rank)
-        if self._keeps(now):
+        if self._meets_limit(now):
             roomy = [each for each in self.candidates if each.bounded <= _ROOM * self.goal.bound]
             best = min(roomy, key=self._rank, default=now)
             is_clear = now.other > _CLEARLY * best.other
         else:
-            is_clear = self._keeps(best) or now.bounded > _CLEARLY * best.bounded
+            is_clear = self._meets_limit(best) or now.bounded > _CLEARLY * best.bounded
         return self._choice(best if is_clear else now)
 
-    def _keeps(self, candidate: Candidate) -> bool:
+    def _meets_limit(self, candidate: Candidate) -> bool:
         return candidate.bounded <= self.goal.bound
 
     def _rank(self, candidate: Candidate) -> tuple[float, ...]:
-        missed = not self._keeps(candidate)
+        missed = not self._meets_limit(candidate)
         first = candidate.bounded if missed else candidate.other
         return missed, first, candidate.other, candidate.bounded
 
     def _choice(self, candidate: Candidate) -> Choice:
-        keeps = self._keeps(candidate)
-        return Choice(self.goal, candidate.way, candidate.expected, self.footprint, keeps)
+        return Choice(
+            self.goal,
+            candidate.configuration,
+            candidate.expected,
+            self.footprint,
+            self._meets_limit(candidate),
+        )
 
 
-def choose_way(
+def choose_configuration(
     pose: Pose, view: View, goal: Goal, model: Model, scales: tuple[float, ...] = SCALES
 ) -> Choice | None:
-    """The way to draw a pose in a view; None where the model knows no way that can.
+    """The configuration to draw a pose with in a view; None if the model knows none that can.
 
     Within a time: the least error, of those that are late in few pictures; within an error: the least time,
-    likewise. Where none keeps the bound, the one that comes nearest.
+    likewise. Where none meets the bound, the one that comes nearest.
     """
-    known = known_ways(pose, model, scales)
+    known = known_configurations(pose, model, scales)
     return Comparison.of(known, ScanInView.of(pose, view), goal, model).best() if known else None
 
 
-def known_ways(pose: Pose, model: Model, scales: tuple[float, ...] = SCALES) -> list[DrawingWay]:
-    """The ways of drawing a pose that a model knows."""
-    return [way for way in ways(pose, scales) if way.key in model]
+def known_configurations(pose: Pose, model: Model, scales: tuple[float, ...] = SCALES) -> list[Configuration]:
+    """The configurations for a pose that a model knows."""
+    return [one for one in configurations(pose, scales) if one.key in model]
 
 
-def best(known: Iterable[DrawingWay], seen: ScanInView, goal: Goal, model: Model) -> Choice:
-    """The best of some ways, at least one, all of which the model knows. A goal in a unit of length is in the
-    scan's."""
+def best(known: Iterable[Configuration], seen: ScanInView, goal: Goal, model: Model) -> Choice:
+    """The best of some configurations, at least one, all of which the model knows. A goal in a unit of length
+    is in the scan's."""
     return Comparison.of(known, seen, goal, model).best()
 
 

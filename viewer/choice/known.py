@@ -51,7 +51,7 @@ def read_models(file: Path) -> dict[str, Model]:
         return {}
     if not isinstance(data, dict) or data.get("format") != FORMAT or not isinstance(data.get("models"), dict):
         return {}
-    models = {device: _model(told) for device, told in data["models"].items()}
+    models = {device: _model(stored) for device, stored in data["models"].items()}
     return {device: model for device, model in models.items() if model}
 
 
@@ -68,16 +68,16 @@ def _key(gpu: Gpu) -> str:
     return f"{gpu.device}, {gpu.driver}"
 
 
-def _model(told: Any) -> Model:
+def _model(stored: Any) -> Model:
     """The laws of JSON data, less those that are none."""
-    laws = {key: _law(law) for key, law in told.items()} if isinstance(told, dict) else {}
+    laws = {key: _law(law) for key, law in stored.items()} if isinstance(stored, dict) else {}
     return {key: law for key, law in laws.items() if law is not None}
 
 
-def _law(told: Any) -> Law | None:
+def _law(stored: Any) -> Law | None:
     try:
-        time, error = (tuple(float(factor) for factor in told[name]) for name in ("time", "error"))
-        law = Law(time, error, float(told["late"]), float(told["wrong"]))
+        time, error = (tuple(float(factor) for factor in stored[name]) for name in ("time", "error"))
+        law = Law(time, error, float(stored["late"]), float(stored["wrong"]))
     except (KeyError, TypeError, ValueError, OverflowError):
         return None
     numbers = np.array([*time, *error, law.late, law.wrong])

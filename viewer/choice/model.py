@@ -1,4 +1,4 @@
-"""What a way of drawing takes, and how wrong it is: sums of simple terms, fitted to measurements.
+"""What a configuration takes, and how wrong it is: sums of simple terms, fitted to measurements.
 
 Time: a base, so much for each point and each pixel, and for what splats overlap. Error: what holes, coarse
 pixels and edges cost, each growing as points lie farther apart or pixels are larger. No term is negative,
@@ -31,7 +31,7 @@ _SMALL = 0.5  # pixels, from which on errors count as large
 
 @dataclass(frozen=True)
 class Law:
-    """Time and error of one way of drawing, for any view. time, error: factors of the terms (`time_terms`,
+    """Time and error of one configuration, for any view. time, error: factors of the terms (`time_terms`,
     `error_terms`). late: how many times as long as expected nine of ten pictures take at most. wrong: by how
     much they are farther off, pixels, see `most_error`."""
 
@@ -83,7 +83,7 @@ class Measured:
     error: float
 
 
-Model = Mapping[str, Law]  # of each way of drawing, by its key
+Model = Mapping[str, Law]  # of each configuration, by its key
 
 
 def time_terms(seen: ScanInView, scale: float) -> NDArray[np.float64]:
@@ -133,7 +133,7 @@ def _saturated(length: float, half: float) -> float:
 
 
 def fit(rows: Sequence[Measured]) -> Law:
-    """The law of pictures by one way: non-negative least squares of relative differences. Needs scipy."""
+    """The law of one configuration: non-negative least squares of relative differences. Needs scipy."""
     times = np.array([row.ms for row in rows])
     errors = np.maximum([row.error for row in rows], _LEAST_ERROR)
     time = _factors(np.array([time_terms(row.seen, row.scale) for row in rows]), times)
@@ -141,10 +141,10 @@ def fit(rows: Sequence[Measured]) -> Law:
     law = Law(time, error, 1.0, 0.0)
     expected = [law.expect(row.seen, row.scale) for row in rows]
     late = times / [each.ms for each in expected]
-    told = np.maximum([each.off for each in expected], _LEAST_ERROR)
+    predicted = np.maximum([each.off for each in expected], _LEAST_ERROR)
     coarse = np.array([each.coarse for each in expected])
     off = np.sqrt(np.maximum(errors**2 - coarse**2, 0))
-    wrong = (off / told - 1) * (told + _SMALL)
+    wrong = (off / predicted - 1) * (predicted + _SMALL)
     return Law(
         time, error, max(float(np.quantile(late, _SURE)), 1.0), max(float(np.quantile(wrong, _SURE)), 0.0)
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace, _ArgumentGroup
 
 from ..camera import Camera
-from ..choice.choose import Choice, choose_way
+from ..choice.choose import Choice, choose_configuration
 from ..choice.goal import Goal, error_goal, in_unit, time_goal
 from ..choice.known import model_of
 from ..drawing.request import Request, view_of
@@ -61,11 +61,11 @@ def choice_of(
     InputError where nothing is known of the device, or no renderer can be chosen for the scan."""
     model = model_of(drawing.renderer(device).gpu)
     view = view_of(Request(pose, camera), size)
-    choice = choose_way(pose, view, in_unit(goal, unit), model)
+    choice = choose_configuration(pose, view, in_unit(goal, unit), model)
     if choice is None:
         raise InputError(
             "no renderer can be chosen automatically for this scan", hint="Name one with --backend"
         )
-    if not choice.keeps:
+    if not choice.meets_limit:
         warn(f"no renderer is expected to meet {goal}; Scan4D uses the one that comes closest: {choice}")
     return choice

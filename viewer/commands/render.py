@@ -249,7 +249,7 @@ def _requests(
         if chosen is None and goal is not None:
             first = next(shot for shot in shots if shot.pose == pose.index)
             choice = choice_of(pose, camera_of(first), size, goal, timeline.unit, args.device)
-            chosen = choice.way.backend, choice.way.params
+            chosen = choice.configuration.backend, choice.configuration.params
         chosen = chosen or backend_for(pose, backend, values)
         own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
         if own is not look:

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..backends import backend, backends
 from ..camera import Camera
+from ..choice.configurations import Configuration
 from ..choice.goal import Goal
-from ..choice.ways import DrawingWay
 from ..drawing.request import Request, backend_for, colorable
 from ..errors import InputError, shortened
 from ..geometry import UP, Vector, up_vector
@@ -96,7 +96,7 @@ def _read_goal(data: Any) -> Goal | None:
     raise InputError(f"is not a limit on time or error but {shortened(data)}", hint=DAMAGED)
 
 
-def _read_way(data: Any) -> DrawingWay | None:
+def _read_configuration(data: Any) -> Configuration | None:
     if data is None:
         return None
     stated = structured(Values, data)
@@ -105,7 +105,7 @@ def _read_way(data: Any) -> DrawingWay | None:
         structured(Values, stated.get("values", {})),
     )
     backend(name).params(values)
-    return DrawingWay(name, values)
+    return Configuration(name, values)
 
 
 KeptGoal = Annotated[Goal | None, ReadBy(_read_goal)]
@@ -119,9 +119,9 @@ class Document:
     the camera's target. It is not made the target, as that would shift or turn the picture; the target moves
     along the view axis to its depth, so that zoom and pan hold on to it too. backend: None for the scan's
     default, which also stands in for one that is not there. params: backend's name -> its `Params`, kept when
-    another backend is chosen. goal: what a way of drawing is chosen for automatically, None where the user
-    says which. way: that was chosen for it, None until one is; it stands in for backend and params, which
-    stay. unit: what the user calls the scan's unit of length, None where the scan tells or nobody does.
+    another backend is chosen. goal: what a configuration is chosen for automatically, None where the user
+    says which. configuration: chosen for the goal, None until one is; it replaces backend and params,
+    which stay. unit: what the user calls the scan's unit of length, None where the scan tells or nobody does.
     shown_unit: of displayed lengths, None for the scan's own. front: degrees that the front of the scan
     is turned about what is up. span: the first and the last frame that playing keeps to, None for all. fps:
     frames a second as the user says, None as the scan does. times_by_names: whether the names of the frames
@@ -140,7 +140,7 @@ class Document:
     backend: Word | None = None
     params: Annotated[Mapping[str, Any], ReadBy(_read_params)] = field(default_factory=dict)
     goal: KeptGoal = None
-    way: Annotated[DrawingWay | None, ReadBy(_read_way)] = None
+    configuration: Annotated[Configuration | None, ReadBy(_read_configuration)] = None
     unit: Unit | None = None
     shown_unit: Unit | None = None
     front: float = 0.0
@@ -207,7 +207,7 @@ class Document:
 
     def drawn_by(self, backend: str | None) -> Document:
         """The document that a backend draws, None for the scan's default, however it was chosen before."""
-        return replace(self, backend=backend, goal=None, way=None)
+        return replace(self, backend=backend, goal=None, configuration=None)
 
     def with_params(self, backend: str, params: Any) -> Document:
         """The document with other parameters of a backend."""
@@ -243,9 +243,9 @@ class Document:
         return replace(usual.renderer_alone, look=look)
 
     @property
-    def _automatic(self) -> DrawingWay | None:
+    def _automatic(self) -> Configuration | None:
         """The way that was chosen, None where the backend is the user's or the scan's."""
-        return None if self.goal is None else self.way
+        return None if self.goal is None else self.configuration
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:
         """The backend that draws this pose, by name, and the parameters that it begins with; the pose's

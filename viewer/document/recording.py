@@ -163,8 +163,8 @@ class Entry:
             scan, hash, request.pose.index, float(request.pose.time), size,
             request.camera, str(request.backend), request.params, request.look, marks, unit,
             place=matrix_of(layers.world_from_pose),
-            scale=1.0 if choice is None else choice.way.scale,
-            automatic=None if choice is None else choice.told,
+            scale=1.0 if choice is None else choice.configuration.scale,
+            automatic=None if choice is None else choice.report,
         )  # fmt: skip
 
     def with_notes(self, notes: tuple[Note, ...]) -> Entry:

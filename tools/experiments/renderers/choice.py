@@ -78,7 +78,7 @@ def with_choices(rows: Sequence[Row], model: Model) -> list[Row]:
     """The rows of one view, with the names of the goals that each configuration is chosen for."""
     seen = ScanInView(**rows[0]["seen"])
     known = [configuration_of(row) for row in rows if row["key"] in model]
-    chosen = {str(goal): best(known, seen, goal, model).way for goal in GOALS} if known else {}
+    chosen = {str(goal): best(known, seen, goal, model).configuration for goal in GOALS} if known else {}
     return [
         {**row, "chosen": [name for name, taken in chosen.items() if taken == configuration_of(row)]}
         for row in rows

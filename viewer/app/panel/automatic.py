@@ -1,4 +1,4 @@
-"""The panel's rows on the automatic choice of the renderer: its bound, what was chosen, all other ways."""
+"""The panel's rows on the automatic choice of the renderer: its bound, the choice, all configurations."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..scene.rendering import FIRST_GOAL
 
 if TYPE_CHECKING:
     from ...choice.choose import Candidate, Choice, Comparison
-    from ...choice.ways import DrawingWay
+    from ...choice.configurations import Configuration
     from ...scan.units import Scale
     from ..scene.choosing import Choosing
     from ..scene.rendering import Rendering
@@ -86,24 +86,26 @@ def _draw_choice(choosing: Choosing) -> None:
     choice, comparison, measured = choosing.choice, choosing.comparison, choosing.measured_ms
     if choice is None or comparison is None:
         return
-    widgets.fact("Using", way_in_words(choice.way))
+    widgets.fact("Using", configuration_in_words(choice.configuration))
     widgets.fact("Expected", _expected(choice))
-    bounded = next(each.bounded for each in comparison.candidates if each.way == choice.way)
+    bounded = next(
+        each.bounded for each in comparison.candidates if each.configuration == choice.configuration
+    )
     widgets.fact("90 % within", f"{bounded:.2g} {comparison.goal.unit}")
     widgets.tooltip("Nine of ten pictures stay within this value, which Scan4D compares with the limit")
     if measured is not None:
         widgets.fact("Last picture", f"{measured:.3g} ms")
     if choosing.overrun:
         widgets.faint(choosing.overrun)
-    if not choice.keeps:
+    if not choice.meets_limit:
         widgets.faint("No renderer is sure to stay within the limit. Scan4D uses the closest one.")
     _draw_curve(comparison, choice)
 
 
-def way_in_words(way: DrawingWay) -> str:
-    """A way of drawing as a user reads it, such as "Surfels, passes one"."""
-    values = (f"{name.replace('_', ' ')} {value}" for name, value in way.values.items())
-    return ", ".join([backend(way.backend).title, *values])
+def configuration_in_words(configuration: Configuration) -> str:
+    """A configuration as a user reads it, such as "Surfels, passes one"."""
+    values = (f"{name.replace('_', ' ')} {value}" for name, value in configuration.values.items())
+    return ", ".join([backend(configuration.backend).title, *values])
 
 
 def _expected(choice: Choice) -> str:
@@ -113,13 +115,13 @@ def _expected(choice: Choice) -> str:
 
 
 def _draw_curve(comparison: Comparison, choice: Choice) -> None:
-    """Plot the error of all ways over their time, the bound as a line; the mouse tells which is which."""
+    """Plot the error of all configurations over their time, and the bound as a line. A tooltip names each."""
     candidates = sorted(comparison.candidates, key=lambda each: each.expected.ms)
     times, errors = (np.array(row) for row in zip(*map(_position, candidates), strict=True))
     goal, em = comparison.goal, imgui.get_font_size()
     text = imgui.get_style_color_vec4(imgui.Col_.text)
     accent = imgui.get_style_color_vec4(imgui.Col_.check_mark)
-    if not implot.begin_plot("##ways", ImVec2(-1, _HEIGHT * em), _PLOT):
+    if not implot.begin_plot("##configurations", ImVec2(-1, _HEIGHT * em), _PLOT):
         return
     is_time = goal.kind == "time"
     bound = goal.bound if goal.unit in ("ms", PIXELS) else goal.bound / comparison.footprint
@@ -136,13 +138,15 @@ def _draw_curve(comparison: Comparison, choice: Choice) -> None:
     faint = imgui.get_style_color_vec4(imgui.Col_.text_disabled)
     implot.plot_line("##bound", x, y, implot.Spec(line_color=faint))
     implot.plot_scatter("##all", times, errors, _dot(text, _DOT * em))
-    chosen = [number for number, each in enumerate(candidates) if each.way == choice.way]
+    chosen = [number for number, each in enumerate(candidates) if each.configuration == choice.configuration]
     implot.plot_scatter("##chosen", times[chosen], errors[chosen], _dot(accent, _CHOSEN * em))
     pointed = _pointed(candidates, _REACH * em) if imgui.is_window_hovered() else None
     implot.end_plot()
     if pointed is not None:
         time, error = _position(pointed)
-        imgui.set_tooltip(f"{way_in_words(pointed.way)}\n{time:.3g} ms, error {error:.2g} px")
+        imgui.set_tooltip(
+            f"{configuration_in_words(pointed.configuration)}\n{time:.3g} ms, error {error:.2g} px"
+        )
 
 
 def _position(candidate: Candidate) -> tuple[float, float]:

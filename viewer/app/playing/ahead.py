@@ -92,4 +92,4 @@ class Ahead(WindowPart):
 
 def _how(document: Document) -> tuple[Any, ...]:
     """The fields of a document that decide what is prepared."""
-    return document.backend, document.params, document.way, document.look
+    return document.backend, document.params, document.configuration, document.look

@@ -10,7 +10,7 @@ from functools import cached_property
 from statistics import median
 from typing import Any
 
-from ...choice.choose import Choice, Comparison, known_ways
+from ...choice.choose import Choice, Comparison, known_configurations
 from ...choice.goal import Goal, in_unit
 from ...choice.known import model_of
 from ...choice.model import Model
@@ -27,16 +27,16 @@ from .rendering import Rendering
 from .viewport import Viewport
 
 _REST = 0.2  # seconds after the last picture
-_LAST = 5  # pictures of one way whose times are kept
+_LAST = 5  # pictures of one configuration whose times are kept
 _OVER = 1.5  # times the limit: what pictures take from then on is reported
 _SCALES = (1.0,)  # pictures at rest have all their pixels, and in motion those that there is time for
 
 
 @dataclass(eq=False)
 class Choosing(WindowPart):
-    """Chooses the way that the scan is drawn in, as long as the document has a goal.
+    """Chooses the configuration that the scan is drawn in, as long as the document has a goal.
 
-    comparison: of all ways in the view that is shown, or was at rest last; choice: of one of them; both None
+    comparison: of all configurations in the view that is shown, or was at rest last; choice: one; both None
     while there is no goal, and before the first. problem: why nothing is chosen, empty where something is.
     overrun: words on pictures that take far longer than the limit, empty where they do not.
     """
@@ -64,7 +64,7 @@ class Choosing(WindowPart):
         self._seen: ScanInView | None = None
         self._compared: Any = None
         self._timed = 0  # the number of the last picture whose time was taken
-        self._times: dict[str, deque[float]] = {}  # ms, of pictures in full, by the key of the way
+        self._times: dict[str, deque[float]] = {}  # ms, of pictures in full, by the key of the configuration
 
     @cached_property
     def _model(self) -> Model | str:
@@ -129,11 +129,11 @@ class Choosing(WindowPart):
         """Choose by what is known of the view, unless that was done."""
         unit, seen = self.playback.unit, self._seen
         if (asked := (goal, unit, seen)) == self._compared:
-            return self._apply()  # undo may bring back a document that another way draws
+            return self._apply()  # undo may bring back a document that another configuration draws
         is_same_goal = self._compared is None or self._compared[:2] == asked[:2]
         self._compared = asked
         assert self._request is not None and seen is not None and not isinstance(self._model, str)
-        known = known_ways(self._request.pose, self._model, _SCALES)
+        known = known_configurations(self._request.pose, self._model, _SCALES)
         self.comparison = self.choice = None
         try:
             if not known:
@@ -143,30 +143,33 @@ class Choosing(WindowPart):
             self.problem = error.what
             return True
         self.problem = ""
-        present = self.session.document.way if is_same_goal else None
+        present = self.session.document.configuration if is_same_goal else None
         self.choice = self.comparison.settled(present)
         self._apply()
         return True
 
     def _apply(self) -> bool:
         """Have the document drawn as it was chosen; whether it is drawn otherwise so far."""
-        if self.choice is None or self.choice.way == self.session.document.way:
+        if self.choice is None or self.choice.configuration == self.session.document.configuration:
             return False
-        self.session.amend(way=self.choice.way)
+        self.session.amend(configuration=self.choice.configuration)
         return True
 
     def _note_time(self) -> None:
-        """Take down what the last picture took, where it was drawn in full by a way."""
-        viewport, way = self.viewport, self.session.document.way
+        """Take down what the last picture took, where it was drawn in full by a configuration."""
+        viewport, chosen = self.viewport, self.session.document.configuration
         surface, request = viewport.surface, viewport.request
-        if viewport.number == self._timed or way is None or surface is None or request is None:
+        if viewport.number == self._timed or chosen is None or surface is None or request is None:
             return
         self._timed = viewport.number
         is_in_full = viewport.is_complete and not viewport.is_preview and "draw" not in surface.stats.skipped
-        if is_in_full and (request.backend.name, request.params) == (way.backend, way.params):
-            times = self._times.get(way.key)
+        if is_in_full and (request.backend.name, request.params) == (
+            chosen.backend,
+            chosen.params,
+        ):
+            times = self._times.get(chosen.key)
             if times is None:  # the first one takes what is made once
-                self._times[way.key] = deque(maxlen=_LAST)
+                self._times[chosen.key] = deque(maxlen=_LAST)
             else:
                 times.append(surface.stats.cpu_ms - surface.stats.upload_ms)
 
@@ -183,7 +186,7 @@ class Choosing(WindowPart):
     def measured_ms(self) -> float | None:
         """The time of pictures drawn as it was chosen, ms: the median of the last ones; None before there
         are any."""
-        times = self._times.get(self.choice.way.key) if self.choice is not None else None
+        times = self._times.get(self.choice.configuration.key) if self.choice is not None else None
         return median(times) if times else None
 
     def choice_of(self, request: Request) -> Choice | None:
@@ -191,8 +194,10 @@ class Choosing(WindowPart):
         a user or the scan says how it is drawn."""
         if self.choice is None or self.session.document.goal is None or not self._has_looked:
             return None
-        way = self.choice.way
-        return self.choice if (request.backend.name, request.params) == (way.backend, way.params) else None
+        chosen = self.choice.configuration
+        return (
+            self.choice if (request.backend.name, request.params) == (chosen.backend, chosen.params) else None
+        )
 
     COMMANDS = (
         Command(

@@ -1,4 +1,4 @@
-"""Ways of drawing a scan, from which one is chosen: what backends offer, at several resolutions."""
+"""Configurations that may draw a scan: what backends offer, at several resolutions."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SCALES = (1.0, 0.71, 0.5, 0.35)  # of width and height
 
 
 @dataclass(frozen=True)
-class DrawingWay:
+class Configuration:
     """A backend, values in place of its defaults, and the scale of width and height that it draws at."""
 
     backend: str
@@ -24,8 +24,8 @@ class DrawingWay:
     @property
     def key(self) -> str:
         """Name in models, which hold at every scale and level of detail: 'surfels passes=one'."""
-        told = [f"{name}={value}" for name, value in sorted(self.values.items()) if name != _SHARE]
-        return " ".join([self.backend, *told])
+        values = [f"{name}={value}" for name, value in sorted(self.values.items()) if name != _SHARE]
+        return " ".join([self.backend, *values])
 
     @property
     def share(self) -> float:
@@ -38,9 +38,9 @@ class DrawingWay:
         return backend(self.backend).params(self.values)
 
 
-def ways(pose: Pose, scales: tuple[float, ...] = SCALES) -> Iterator[DrawingWay]:
-    """Every way of drawing a pose for which nothing has to be prepared."""
+def configurations(pose: Pose, scales: tuple[float, ...] = SCALES) -> Iterator[Configuration]:
+    """Every configuration for a pose for which nothing has to be prepared."""
     for name, one in backends().items():
         for values in one.offers(pose):
             for scale in scales:
-                yield DrawingWay(name, values, scale)
+                yield Configuration(name, values, scale)
