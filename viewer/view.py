@@ -49,12 +49,12 @@ class View:
         size: tuple[int, int],
         origin: NDArray[np.float64],
         bounds: Bounds,
-        place: Rigid = STILL,
+        world_from_pose: Rigid = STILL,
     ) -> View:
-        """Combine camera, origin and the place that a pose is moved to in float64, so that the GPU sees only
+        """Combine camera, origin and the motion of the pose in float64, so that the GPU sees only
         small numbers. bounds: of the pose, where it is not moved."""
         to_view = camera.rotation()
-        rotation = to_view if place.is_identity else to_view @ place.rotation
+        rotation = to_view if world_from_pose.is_identity else to_view @ world_from_pose.rotation
         perspective = camera.projection == "perspective"
         extent = 2 * math.tan(math.radians(camera.fov_y) / 2) if perspective else camera.view_height
         near, far = camera.clip_range()
@@ -62,11 +62,11 @@ class View:
             size=size,
             origin=origin,
             rotation=rotation,
-            translation=to_view @ (place.points(origin) - np.array(camera.eye)),
+            translation=to_view @ (world_from_pose.points(origin) - np.array(camera.eye)),
             scale=size[1] / extent,
             near=near,
             far=far,
-            reach=min(far, camera.reach(place.bounds(bounds))),
+            reach=min(far, camera.reach(world_from_pose.bounds(bounds))),
             perspective=perspective,
         )
 
@@ -124,7 +124,7 @@ class View:
         return (np.column_stack([offsets, -depth]) - self.translation) @ self.rotation
 
     def along(self, pixel: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The step (3,) on the ray through a place of the picture, (2,), by which depth grows by one."""
+        """The step (3,) on the ray through a position in the picture, (2,), by which depth grows by one."""
         ends = self.unproject(np.stack([pixel, pixel]), np.array([1.0, 2.0]))
         return ends[1] - ends[0]
 
@@ -180,7 +180,7 @@ class View:
 
 
 def origin_near(
-    camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], place: Rigid = STILL
+    camera: Camera, size: tuple[int, int], origin: NDArray[np.float64], world_from_pose: Rigid = STILL
 ) -> NDArray[np.float64]:
     """The origin, (3,), to count a pose's positions from, so that float32 offsets of what is seen are right
     to 1/1024 pixel: the pose's own, unless the camera looks so closely at something far from it.
@@ -191,5 +191,5 @@ def origin_near(
     """
     pixel = camera.view_height / size[1]
     grid = 4.0 ** math.ceil(math.log(pixel * _FAR, 4))
-    away = place.inverse.points(np.array(camera.target)) - origin
+    away = world_from_pose.inverse.points(np.array(camera.target)) - origin
     return origin + np.round(away / grid) * grid

@@ -19,7 +19,7 @@ FULL = 0b111000_111000_111000_111000  # all eight columns
 
 
 def same(a: CodePicture, b: CodePicture) -> bool:
-    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("image", "keys", "places"))
+    return all(np.array_equal(getattr(a, name), getattr(b, name)) for name in ("image", "keys", "indices"))
 
 
 def stream_of(
@@ -77,7 +77,7 @@ def test_the_nearest_word_is_seen_and_ties_go_to_the_lowest_id_then_to_the_first
         (3, {**scans, "z": 5, "material": 0}),
     ]
     picture = draw_words(stream_of((8, 8), words, [9, 8, 7, 7, 7]))
-    assert picture.places[:, 0].tolist() == [0, 1, 1, 1, 1, 2, 3, NO_WORD]
+    assert picture.indices[:, 0].tolist() == [0, 1, 1, 1, 1, 2, 3, NO_WORD]
     assert picture.keys[:, 0].tolist() == [5, 4, 4, 4, 4, 5, 5, NO_KEY]
 
 

@@ -29,7 +29,7 @@ def ball(**changes: object) -> Pose:
 
 def view_of_pose(pose: Pose, layers: Layers | None = None) -> View:
     camera = Camera.orbit(pose.bounds, 20, 10, aspect=SIZE[0] / SIZE[1])
-    place = {} if layers is None else {"place": layers.world_from_pose}
+    place = {} if layers is None else {"world_from_pose": layers.world_from_pose}
     return View.of(camera, SIZE, pose.origin, pose.bounds, **place)
 
 

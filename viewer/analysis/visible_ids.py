@@ -20,11 +20,11 @@ def visible_ids(request: Request, size: tuple[int, int]) -> NDArray[np.uint32]:
     also where several lie in one pixel. size: of the picture, pixels; it says what lies in it, and nothing
     else. Backend, parameters and look of the request do not matter. Raises InputError, NoOpenGLError.
     """
-    pose, place, cloud = request.pose, request.layers.world_from_pose, request.pose.cloud
+    pose, motion, cloud = request.pose, request.layers.world_from_pose, request.pose.cloud
     if not len(cloud):
         return np.empty(0, np.uint32)
     bounds = pose.drawn_bounds(request.camera)
-    view = View.of(request.camera, size, pose.origin, bounds, place)
+    view = View.of(request.camera, size, pose.origin, bounds, motion)
     offsets = cloud.positions + (cloud.origin - view.origin)
     if view.perspective:
         eye = view.origin - view.rotation.T @ view.translation

@@ -104,7 +104,7 @@ class Derived(Protocol):
 
 
 class Derives(Enum):
-    """Place where a window, which does not wait, runs a backend's `derive`."""
+    """Where a window, which does not wait, runs a backend's `derive`."""
 
     NEVER = "never"  # the backend prepares nothing
     IN_PROCESS = "in a process"  # several poses at once

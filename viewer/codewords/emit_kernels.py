@@ -81,7 +81,7 @@ def emit(
         elif shape[SIZE] >= len(entries):
             top, bottom = _computed_rows(shape, steps, width, spans)
         else:
-            entry = entries[shape[SIZE], _place(shape[NORMAL_I], shape[NORMAL_J], steps)]
+            entry = entries[shape[SIZE], _shape_index(shape[NORMAL_I], shape[NORMAL_J], steps)]
             if entry < _LARGE and x >= 4 and y >= 4 and x - 4 < width and y - 4 < height:
                 strip = (x - 4) // stride
                 word = (
@@ -145,8 +145,8 @@ def _put(
 
 
 @inlined
-def _place(i: int, j: int, steps: NDArray[np.int64]) -> int:
-    """See `tables.shape_place`."""
+def _shape_index(i: int, j: int, steps: NDArray[np.int64]) -> int:
+    """See `tables.shape_index`."""
     normals = 2 * steps[1] + 1
     at = (j + steps[1]) * normals + i + steps[1]
     return min(at, normals * normals - 1 - at)

@@ -6,8 +6,8 @@ eight rows, any window of eight lines or more gives the same picture.
 
 The rule: of the words that cover a pixel, that with the least depth is seen; of those the one with the
 lowest id; of these the first in the stream. Depth is Z, or, where the stream has finer ones, depth + x right
-+ y down at the pixel's place (x, y) in the word's bitmap. What lies right of a strip or below the picture is
-cut off.
++ y down at the pixel's position (x, y) in the word's bitmap. What lies right of a strip or below the picture
+is cut off.
 """
 
 from __future__ import annotations
@@ -37,13 +37,13 @@ class CodePicture:
     """Picture that an engine draws, row 0 at the top.
 
     image: (H, W, 4) uint8 sRGB and alpha. keys: (H, W) int32, depths as the stream counts them, NO_KEY for
-    nothing. places: (H, W) uint32, of the words that are seen, in the stream, NO_WORD for none.
+    nothing. indices: (H, W) uint32, of the words that are seen, in the stream, NO_WORD for none.
     """
 
     stream: WordStream
     image: NDArray[np.uint8]
     keys: NDArray[np.int32]
-    places: NDArray[np.uint32]
+    indices: NDArray[np.uint32]
 
     @property
     def covered(self) -> NDArray[np.bool_]:
@@ -57,7 +57,7 @@ class CodePicture:
     def ids(self) -> NDArray[np.uint32]:
         """(H, W): of the points that are seen, NO_WORD for none."""
         ids = np.append(self.stream.ids, np.uint32(NO_WORD))
-        return ids[np.minimum(self.places, len(self.stream))]
+        return ids[np.minimum(self.indices, len(self.stream))]
 
 
 def draw_words(
@@ -84,7 +84,7 @@ def draw_words(
             window,
             coefficients,
             LIGHT_BYTES,
-            PictureArrays(picture.image, picture.keys, picture.places),
+            PictureArrays(picture.image, picture.keys, picture.indices),
         )
 
     together(_PIXELS * len(stream), [partial(drawn, *part) for part in _parts(stream)])
@@ -113,31 +113,31 @@ def draw_words_plainly(
         left = strip * stream.stride
         columns = min(stream.stride, width - left)
         keys = np.full((window, columns), NO_KEY, np.int64)
-        places = np.full((window, columns), NO_WORD, np.int64)
+        indices = np.full((window, columns), NO_WORD, np.int64)
         for y in range(height):
             line = strip * height + y
-            for place in range(int(stream.line_starts[line]), int(stream.line_starts[line + 1])):
-                x = int(fields["x"][place])
-                for row, (first, last) in enumerate(row_spans(int(stream.words[place]))):
+            for index in range(int(stream.line_starts[line]), int(stream.line_starts[line + 1])):
+                x = int(fields["x"][index])
+                for row, (first, last) in enumerate(row_spans(int(stream.words[index]))):
                     for column in range(first, min(last, columns - 1 - x) + 1):
                         at = (y + row) % window, x + column  # below the picture it is never flushed
-                        key = int(fields["z"][place])
+                        key = int(fields["z"][index])
                         if stream.finer is not None:
-                            key = int(stream.finer[place] @ np.array([1, column, row]))
-                        rank = key, int(stream.ids[place]), place
-                        if rank < (keys[at], _id(stream, places[at]), places[at]):
-                            keys[at], places[at] = key, place
+                            key = int(stream.finer[index] @ np.array([1, column, row]))
+                        rank = key, int(stream.ids[index]), index
+                        if rank < (keys[at], _id(stream, indices[at]), indices[at]):
+                            keys[at], indices[at] = key, index
             seen = keys[y % window] != NO_KEY
             part = slice(left, left + columns)
-            picture.image[y, part][seen, :3] = colors[places[y % window][seen]]
+            picture.image[y, part][seen, :3] = colors[indices[y % window][seen]]
             picture.image[y, part][seen, 3] = 255
-            picture.keys[y, part], picture.places[y, part] = keys[y % window], places[y % window]
-            keys[y % window], places[y % window] = NO_KEY, NO_WORD
+            picture.keys[y, part], picture.indices[y, part] = keys[y % window], indices[y % window]
+            keys[y % window], indices[y % window] = NO_KEY, NO_WORD
     return picture
 
 
-def _id(stream: WordStream, place: int) -> int:
-    return NO_WORD if place == NO_WORD else int(stream.ids[place])
+def _id(stream: WordStream, index: int) -> int:
+    return NO_WORD if index == NO_WORD else int(stream.ids[index])
 
 
 def begun(stream: WordStream, window: int, background: NDArray[np.uint8] | None) -> CodePicture:

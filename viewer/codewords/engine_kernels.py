@@ -38,7 +38,7 @@ class PictureArrays(NamedTuple):
 
     image: NDArray[np.uint8]
     keys: NDArray[np.int32]
-    places: NDArray[np.uint32]
+    indices: NDArray[np.uint32]
 
 
 @compiled
@@ -53,23 +53,23 @@ def slide(
     """Slide a window of some lines down a part of a strip. materials: (3, M, 3), I_0, k_d and k_s."""
     left, columns, top, bottom = part
     line_starts, words, ids, finer = stream
-    image, keys, places = picture
+    image, keys, indices = picture
     height = len(line_starts) - 1
     has_finer = len(finer) > 0
     most = len(light_bytes) - 1
     window_keys = np.full((window, columns), _NO_KEY, np.int32)
-    window_places = np.full((window, columns), _NO_WORD, np.uint32)
+    window_indices = np.full((window, columns), _NO_WORD, np.uint32)
     for y in range(max(top - BITMAP + 1, 0), bottom):
-        for place in range(line_starts[y], line_starts[y + 1]):
-            low = np.uint32(words[place] & np.uint64((1 << 32) - 1))
-            high = np.uint32(words[place] >> np.uint64(32))
+        for index in range(line_starts[y], line_starts[y + 1]):
+            low = np.uint32(words[index] & np.uint64((1 << 32) - 1))
+            high = np.uint32(words[index] >> np.uint64(32))
             scans = np.int32(low >> np.uint32(1)) & 0xFFFFFF
             x = np.int32(high >> np.uint32(14)) & 511
             key = np.int32(high >> np.uint32(23))
             is_tile = low & np.uint32(1) != 0
             right = grown_down = np.int32(0)
             if has_finer:
-                key, right, grown_down = finer[place, 0], finer[place, 1], finer[place, 2]
+                key, right, grown_down = finer[index, 0], finer[index, 1], finer[index, 2]
             for row in range(min(4 if is_tile else 8, height - y)):
                 span = scans >> (6 * (row if row < 4 else 7 - row))
                 first, last = span & 7, span >> 3 & 7
@@ -80,25 +80,25 @@ def slide(
                     here = np.int32(key + column * right + row * grown_down)
                     before = window_keys[slot, x + column]
                     if here < before or (
-                        here == before and ids[place] < ids[window_places[slot, x + column]]
+                        here == before and ids[index] < ids[window_indices[slot, x + column]]
                     ):
                         window_keys[slot, x + column] = here
-                        window_places[slot, x + column] = place
+                        window_indices[slot, x + column] = index
         slot = y % window
         for column in range(columns):
-            place = window_places[slot, column]
-            window_places[slot, column] = _NO_WORD
-            if place == _NO_WORD:
+            index = window_indices[slot, column]
+            window_indices[slot, column] = _NO_WORD
+            if index == _NO_WORD:
                 continue
             key, window_keys[slot, column] = window_keys[slot, column], _NO_KEY
             if y < top:
                 continue
             at = left + column
             keys[y, at] = key
-            places[y, at] = place
-            diffuse = np.int32(words[place] >> np.uint64(25)) & 127
-            specular = np.int32(words[place] >> np.uint64(32)) & 127
-            material = np.int32(words[place] >> np.uint64(39)) & 127
+            indices[y, at] = index
+            diffuse = np.int32(words[index] >> np.uint64(25)) & 127
+            specular = np.int32(words[index] >> np.uint64(32)) & 127
+            material = np.int32(words[index] >> np.uint64(39)) & 127
             diffuse += diffuse >> 6
             specular += specular >> 6
             for channel in range(3):

@@ -2,10 +2,10 @@
 
 A row of `planes` (float64) has of a disc the depth at its centre, or its inverse in perspective; that at the
 corner of pixels that its centre is rounded to, how much it grows a pixel to the right and down; and the form
-of its outline, six numbers: a place (x, y) off the corner is inside where
+of its outline, six numbers: a position (x, y) off the corner is inside where
 a x^2 + 2 b x y + c y^2 + 2 d x + 2 e y + f <= 0. Then the least and the largest y of the outline, infinite
 for a disc that reaches the plane of the eye, whose outline is a branch of a hyperbola; and what the near
-plane leaves of it, three numbers: places where g + h x + i y <= 0.
+plane leaves of it, three numbers: positions where g + h x + i y <= 0.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from ..errors import InputError
 
 BITMAP = 8  # pixels along an edge of the bitmap that a word stands for
 EMPTY_ROW = 0b000111  # first column 7, last column 0: no pixel
-LARGE = 1 << 31  # in an entry of a table: the rest is the place of its rows
+LARGE = 1 << 31  # in an entry of a table: the rest is the index of its rows
 _HALF = BITMAP // 2
 _NEVER = (1, 0)  # first and last pixel of an empty row
 _MOST_RADIUS = 64  # pixels, of the sizes of a table; rows of larger shapes are found one by one
@@ -74,12 +74,12 @@ class ShapeTable:
     """Shapes by size and normal, packed.
 
     entries: (sizes, half_count) uint32. Below `LARGE` it is the SCANS field itself of a word in mode 0: a
-    shape that fits into one bitmap. Else what is left without that bit is the place in `rows` of the first of
+    shape that fits into one bitmap. Else what is left without that bit is the index in `rows` of the first of
     the shape's `reach` rows below the middle, downwards; those above are the same turned by half.
     rows: (R,) uint16, each the first column, in the lower 8 bits, and the last one, both counted from the
     middle and offset by `reach`; first > last: empty. reach: pixels from the middle to the farthest row.
 
-    See `shape_place` for where a normal stands.
+    See `shape_index` for where a normal stands.
     """
 
     steps: Steps
@@ -105,7 +105,7 @@ class ShapeTable:
     def spans(self, size: int, i: int, j: int) -> NDArray[np.int32]:
         """First and last column of all rows of a shape, (2 reach, 2), from the middle; the first row is that
         `reach` above the middle. An empty one has its first behind its last."""
-        entry = int(self.entries[size, shape_place(self.steps, i, j)])
+        entry = int(self.entries[size, shape_index(self.steps, i, j)])
         below = np.tile(np.array(_NEVER, np.int32), (self.reach, 1))
         if entry < LARGE:
             for row in range(_HALF):  # of the bitmap, from its top
@@ -121,8 +121,8 @@ class ShapeTable:
         return np.concatenate([above, below])
 
 
-def shape_place(steps: Steps, i: int, j: int) -> int:
-    """The place of a normal among those of a table: opposite ones share one."""
+def shape_index(steps: Steps, i: int, j: int) -> int:
+    """The index of a normal among those of a table: opposite ones share one."""
     at = (j + steps.steepest) * steps.normals + i + steps.steepest
     return min(at, steps.normals * steps.normals - 1 - at)
 
@@ -153,9 +153,9 @@ def shape_table(steps: Steps = PAPER) -> ShapeTable:
 
 def _lower_halves(steps: Steps, reach: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """First and last columns of the rows below the middle, by the rule, (sizes, half_count, reach) each."""
-    place = np.arange(steps.half_count)
-    i = (place % steps.normals - steps.steepest)[:, None]
-    j = (place // steps.normals - steps.steepest)[:, None]
+    index = np.arange(steps.half_count)
+    i = (index % steps.normals - steps.steepest)[:, None]
+    j = (index // steps.normals - steps.steepest)[:, None]
     x = np.arange(-reach, reach)
     u = 2 * x + 1
     first = np.empty((steps.sizes, steps.half_count, reach), np.int32)

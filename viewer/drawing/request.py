@@ -101,10 +101,10 @@ def colorable(request: Request) -> Request:
 
 def view_of(request: Request, size: tuple[int, int]) -> View:
     """The view that a request shows its pose by, in a picture of this size, pixels."""
-    pose, camera, place = request.pose, request.camera, request.layers.world_from_pose
-    origin = origin_near(camera, size, pose.origin, place)
+    pose, camera, motion = request.pose, request.camera, request.layers.world_from_pose
+    origin = origin_near(camera, size, pose.origin, motion)
     bounds = pose.drawn_bounds(camera)
-    return View.of(camera, size, origin, bounds, place).straightened(bounds)
+    return View.of(camera, size, origin, bounds, motion).straightened(bounds)
 
 
 def _unlit(look: Look) -> Look:

@@ -57,7 +57,7 @@ class Texture(IntEnum):
     DETAIL_WEIGHTS = auto()
     GUIDE = auto()  # that tells which samples are in front
     # Tiles of splats.
-    PLACES = auto()
+    CENTERS = auto()
     FORMS = auto()
     REACH = auto()
     WORK = auto()
@@ -93,7 +93,7 @@ class Texture(IntEnum):
     HOMES = auto()  # sector and key of each row
     OCCUPIED = auto()  # cells of sectors that points fall into
     VISIBLE = auto()  # rows that are
-    COPIES = auto()  # rows in whose place a lower one is
+    COPIES = auto()  # rows for which a lower one stands
     LIMITS = auto()  # of cells, beyond which points are hidden
     WINDOWS = auto()  # of blocks of cells: how many cells aside discs lie that reach into them
     SIGHTS = auto()  # of listed points, and how far each covers what lies behind
@@ -141,7 +141,7 @@ class Storage(IntEnum):
     CONES = 1
     REACHES = 4
     ARRANGED = 0
-    DRAWN_PLACES = 0
+    DRAWN_INDICES = 0
     SEEN = 4
     # Bins, beside what says which cells are visited, which has those from 2 on.
     CURSORS = 0
@@ -167,7 +167,7 @@ class Storage(IntEnum):
     # Tiles of splats, beside bins, prefix sums and a Surface's depths, rows and lists.
     STARTS = 0
     WORK = 1
-    PLACES = 2
+    CENTERS = 2
     FORMS = 3
     NOTED = 3
     REACH = 4

@@ -15,7 +15,7 @@ from .bindings import UniformBlock
 Vec4 = tuple[float, float, float, float]
 Mat4 = tuple[Vec4, Vec4, Vec4, Vec4]  # columns
 _INT, _UINT, _FLOAT = ctypes.c_int32, ctypes.c_uint32, ctypes.c_float
-# Annotation of a field -> its GLSL type, what a word of it is, how many, what its place is a multiple of.
+# Annotation of a field -> its GLSL type, what a word of it is, how many, what its offset is a multiple of.
 _KINDS: dict[Any, tuple[str, Any, int, int]] = {
     bool: ("bool", _UINT, 1, 1),
     int: ("int", _INT, 1, 1),

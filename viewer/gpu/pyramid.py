@@ -33,8 +33,8 @@ class Filter:
 
     Coarse sample i is the mean of the fine samples 2 i + first and those that follow, weighted by taps. Fine
     sample j is the mean of the coarse samples that it is part of, weighted by the same taps. With an even
-    number of taps a coarse pixel covers two fine ones: a place x, pixel centres at +0.5, is 2 x in the finer
-    image. With an odd number a coarse pixel lies at every other fine one: there it is 2 x - 0.5.
+    number of taps a coarse pixel covers two fine ones: a position x, pixel centres at +0.5, is 2 x in the
+    finer image. With an odd number a coarse pixel lies at every other fine one: there it is 2 x - 0.5.
 
     nearest: a coarse sample is not the mean, but that one of the fine samples in reach whose first channel is
     least, whatever the taps, so that depths on either side of an outline are not mixed.
@@ -154,7 +154,7 @@ def fill(
     enough: float = 0.0,
 ) -> None:
     """Give the samples of a level that are not there what the next coarser level, expanded, has in their
-    places, where its weight is enough. guides: images of the sizes of both, coarse and fine, in the place of
+    pixels, where its weight is enough. guides: images of the sizes of both, coarse and fine, in the place of
     which they count, as in `reduce`; None: these themselves."""
     its_guide, known = guides or (coarse, fine)
     defines = {"SIGN": 0, "FILLS": 1}

@@ -1,12 +1,12 @@
 """Range samples: all pixels of a pose's range views on the GPU, as they were measured, in pyramids.
 
-A sample is a pixel of a range view. Its depth stays a float32 as it was read, and its place in the picture
-comes from its place in the buffers, so that neither positions nor indices are kept: 8 bytes a sample, and a
-third for the coarser levels. shaders/range/samples.glsl reads them.
+A sample is a pixel of a range view. Its depth stays a float32 as it was read. Its position follows from its
+index in the buffers, so neither is stored: 8 bytes a sample, and a third for the coarser levels.
+shaders/range/samples.glsl reads them.
 
 Coarser levels are made here, by the filters of viewer/gpu/pyramid.py, of samples that are there and of one
 surface: those within `STEEPEST` times their lateral spacing of the nearest in reach. Depths, colours (in
-linear light) and measured places are means weighted by taps and alphas, alpha is the mean of all, there or
+linear light) and measured positions are means weighted by taps and alphas, alpha is the mean of all, there or
 not. A coarse sample counts as lying in the middle of its reach (`level_to_pixel` in samples.glsl); where only
 some of that is there, it is off by up to half a coarse sample along its surface.
 
@@ -439,7 +439,7 @@ def _lens_steps(view: RangeView) -> int:
 
 
 def _view_levels(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:
-    """The places of all levels, how many samples there are with what is left free between, and tiles."""
+    """Where all levels are, how many samples there are with what is left free between, and tiles."""
     view_levels, samples, tiles = [], 0, 0
     for pod in pods:
         own = []

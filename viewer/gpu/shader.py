@@ -16,7 +16,7 @@ from .view import ViewBlock
 
 _INCLUDE = re.compile(r'\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 # "0:12(3): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (AMD, Intel)
-_PLACE = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
+_LOCATION = re.compile(r"\b\d+(?::(\d+)(?:\(\d+\))?|\((\d+)\))(?=\s*:)")
 # Lines of a file: the number of a line says the file too, since Mesa tells 0 for the number of most files.
 _LINES = 100_000
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
@@ -97,13 +97,13 @@ class Source:
         return "\n".join(lines) + "\n"
 
     def explain(self, log: str) -> str:
-        """A compiler's log with file names in the place of file numbers."""
+        """A compiler's log with file names instead of file numbers."""
 
         def location(match: re.Match[str]) -> str:
             index, line = divmod(int(match[1] or match[2]), _LINES)
             return f"{self.files[index]}:{line}" if index < len(self.files) else match[0]
 
-        return _PLACE.sub(location, log)
+        return _LOCATION.sub(location, log)
 
 
 def _beside(name: str, included: str) -> str:

@@ -25,7 +25,7 @@ def is_sampled(rows: NDArray[np.uint32], share: float) -> NDArray[np.bool_]:
 
 
 def lots(rows: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """The place of each row, (N,), in the shuffled order of all there can be: (N,)."""
+    """The index of each row, (N,), in the shuffled order of all there can be: (N,)."""
     return _scrambled(_reversed_bits(rows))
 
 

@@ -3,7 +3,7 @@
 The radius of a point reaches to the farthest corner of its cell in the Voronoi diagram of its tangent plane:
 smaller discs leave that corner open, larger ones show beside the outline. It goes by the points around
 alone, so that it follows the density of the scan, and is found without a tree: points are listed by the cells
-of a grid, and each looks at those of the 27 cells around. Where a scan is much sparser than in most places,
+of a grid, and each looks at those of the 27 cells around. Where a scan is much sparser than elsewhere,
 the search goes on with larger cells.
 
 Radii that a scan stores are held to this at a sample of its points. Where they leave gaps, they are enlarged.
@@ -301,7 +301,7 @@ def _sample(positions: NDArray[np.float32]) -> NDArray[np.uint32]:
 
 
 def _distinct(positions: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The first row of each place, (M,), and which of these places each row has, (N,)."""
+    """The first row of each position, (M,), and which of these positions each row has, (N,)."""
     order = np.lexsort(positions.T)
     ordered = positions[order]
     first = np.ones(len(order), bool)

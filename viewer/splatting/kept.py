@@ -1,9 +1,9 @@
 """Kept: the points that a picture shows are drawn again in the next one that moves, with some others in turn.
 
 Schütz, Mandlburger, Otepka and Wimmer 2020, "Progressive Real-Time Rendering of One Billion Points Without
-Hierarchical Acceleration Structures": what was seen is drawn at its exact new place, and what comes into view
-is found by a part of all points that is another one each time. Where the camera rests, the picture is the one
-of all points, to the bit, once each was in its turn, but for gaps that are closed.
+Hierarchical Acceleration Structures": what was seen is drawn at its exact new position, and what comes into
+view is found by a part of all points that is another one each time. Where the camera rests, the picture is
+the one of all points, to the bit, once each was in its turn, but for gaps that are closed.
 """
 
 from __future__ import annotations

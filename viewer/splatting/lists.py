@@ -159,7 +159,7 @@ class TileLists:
             bins.items.bind(Texture.LISTED)
             if purpose.looks:
                 looks_of(points).bind(Texture.LOOKS)
-            self._bind_storage("places", "forms", "disc_looks")
+            self._bind_storage("centers", "forms", "disc_looks")
 
         if purpose.numbered:
             gl.clear_words(self._buffer("numbers"), NOTHING, points.count)
@@ -206,7 +206,7 @@ class TileLists:
         work: on which tiles: "work", those that discs of the last filling reach; "rest", those that discs of
         the first alone do, where a pixel shows nothing; "again", those that are to be shown again.
         """
-        for name in ("places", "forms", "disc_looks"):
+        for name in ("centers", "forms", "disc_looks"):
             self._textures[name].bind(Texture[name.upper()])
         self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
@@ -255,7 +255,7 @@ class TileLists:
         if count <= self._room <= _SPARE * count:
             return
         self._room = count
-        self._replace("places", DISC_BYTES * count, gl.RGBA32F)
+        self._replace("centers", DISC_BYTES * count, gl.RGBA32F)
         self._replace("forms", DISC_BYTES * count, gl.RGBA32F)
         self._replace("disc_looks", DISC_BYTES * count, gl.RGBA32UI)
         self._replace("numbers", 4 * count, gl.R32UI)

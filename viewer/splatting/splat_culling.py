@@ -225,7 +225,7 @@ class SplatChunks:
             rows.buffer.bind_to_storage_buffer(Storage.DRAWN_ROWS)
             if self._arranged is not None:
                 rows.order_indices, rows.arranged = gpu.cached(_Places).reserve(count), self._arranged
-                rows.order_indices.buffer.bind_to_storage_buffer(Storage.DRAWN_PLACES)
+                rows.order_indices.buffer.bind_to_storage_buffer(Storage.DRAWN_INDICES)
             gpu.dispatch(program, count)
         if boxes.rows is not None:
             rows.ascending = self._ascending.rows_of(surface.cached(SeenChunks).of(boxes), bit)
@@ -263,7 +263,7 @@ class _Rows:
 
 
 class _Places(_Rows):
-    """Room for their places."""
+    """Room for their indices."""
 
 
 class _Ascending:

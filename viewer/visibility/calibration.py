@@ -47,12 +47,12 @@ def _body(cloud: PointCloud) -> Body:
     center = points.mean(axis=0, dtype=np.float64)
     away = points - center.astype(np.float32)
     radius = math.sqrt(float(np.einsum("ij,ij->i", away, away).max()))
-    least = float(np.abs(points).max()) * 1e-6 or 1.0  # of all points in one place
+    least = float(np.abs(points).max()) * 1e-6 or 1.0  # of points that all coincide
     return Body(center + cloud.origin, max(radius, least) * _ROOM, _distinct(cloud.positions))
 
 
 def copies(cloud: PointCloud) -> NDArray[np.uint32]:
-    """The first of `lots` of the points of lower rows in each point's place, (N,); NOTHING: it has none.
+    """The first of `lots` of the points of lower rows at each point's position, (N,); NOTHING: it has none.
 
     So that it is told whether a sample has one: where that lot is below the sample's share of 2^32.
     """
@@ -60,7 +60,7 @@ def copies(cloud: PointCloud) -> NDArray[np.uint32]:
     order = words.argsort(kind="stable")
     again = words[order[1:]] == words[order[:-1]]
     group = np.concatenate(([0], np.cumsum(~again)))
-    # Places of higher numbers have less in the upper half: there the least begins anew.
+    # Positions of higher numbers have less in the upper half: there the least begins anew.
     lot = np.minimum(lots(order.astype(np.uint32)), NOTHING - 1) | (group[-1] - group).astype(np.uint64) << 32
     least = np.minimum.accumulate(lot).astype(np.uint32)
     found = np.full(len(words), NOTHING, np.uint32)
@@ -75,7 +75,7 @@ def _distinct(positions: NDArray[np.float32]) -> int:
 
 
 def _words(positions: NDArray[np.float32]) -> NDArray[np.uint64]:
-    """A word for each point, the same for those in one place and for next to no others."""
+    """A word for each point, the same for points that coincide and for next to no others."""
     words = (positions + np.float32(0)).view(np.uint32).astype(np.uint64)  # + 0: no negative zero
     mixed = words[:, 0] * np.uint64(0x9E3779B97F4A7C15)
     mixed = (mixed ^ mixed >> np.uint64(29)) + words[:, 1] * np.uint64(0xBF58476D1CE4E5B9)

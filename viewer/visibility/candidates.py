@@ -75,7 +75,7 @@ class Candidates:
         self._near = IndexList(gpu, max(points, 1))
         self.steps, self.looked_at = 0, points
         self.state = object()
-        self.distinct = points  # places that points have, as far as that is known
+        self.distinct = points  # positions that points have, as far as that is known
 
     @property
     def nbytes(self) -> int:

@@ -57,7 +57,7 @@ class SeenPoints:
 
     @classmethod
     def of(cls, cloud: PointCloud, eye: ArrayLike) -> SeenPoints:
-        """The points of a cloud from an eye (3,), absolute. Raises InputError for what is no place."""
+        """The points of a cloud from an eye, (3,), absolute. Raises InputError for one that is not finite."""
         at = np.asarray(eye, np.float64)
         if at.shape != (3,) or not np.isfinite(at).all():
             raise InputError(f"the eye must have three finite coordinates, not {eye!r}")
@@ -84,8 +84,8 @@ def exact_visible_points(points: Pose | PointCloud | ArrayLike, eye: ArrayLike, 
 
     points: a pose, a cloud, or (N, 3) absolute; ids count the points that it came with, also those that are
     left out because a coordinate is not finite. eye: (3,), absolute. radius: of the sphere around the eye
-    that points are flipped at, scan units, not less than the distance to the farthest point. Of points in one
-    place one is visible, and so is a point in the eye itself. Raises InputError.
+    that points are flipped at, scan units, not less than the distance to the farthest point. Of points at one
+    position one is visible, and so is a point in the eye itself. Raises InputError.
     """
     cloud = as_cloud(points)
     seen = SeenPoints.of(cloud, eye)
@@ -161,8 +161,8 @@ class LowerSide:
 
 
 def gnomonic(seen: SeenPoints) -> Floats | None:
-    """Places (N, 2) of points in a picture at distance 1 whose middle is theirs; None where they are not all
-    ahead of the eye."""
+    """Positions (N, 2) of points in a picture at distance 1 whose middle is theirs; None if some are
+    not ahead of the eye."""
     middle = float(np.linalg.norm(seen.middle))
     if middle == 0:
         return None

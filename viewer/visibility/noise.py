@@ -18,7 +18,7 @@ from ..scan.spacing import nearest_rows
 from .calibration import body_of, copies
 
 _LOOKED_AT = 8_000_000  # distances from point to point that tell of noise
-_PLACES = (8, 64)  # at least and at most, where it is looked for
+_POSITIONS = (8, 64)  # at least and at most, where it is looked for
 _NEAREST = (16, 64, 256, 1024, 4096)  # points there, of which the fewest that reach far enough are taken
 _NEAR = 0.25  # of how far they reach: the most noise that they tell
 _TERMS = 6  # of a quadric
@@ -45,7 +45,7 @@ class Noise:
 
 
 def noise_of(cloud: PointCloud) -> Noise:
-    """The noise of a cloud, the median at some places; none where there are few points. Found once."""
+    """The noise of a cloud, the median at some positions; none where there are few points. Found once."""
     return cloud.remember(_noise)
 
 
@@ -55,7 +55,7 @@ def _noise(cloud: PointCloud) -> Noise:
         return noise
     if body_of(cloud).count < len(cloud):
         cloud = PointCloud(positions=cloud.positions[copies(cloud) == NOTHING], origin=cloud.origin)
-    count = min(max(_LOOKED_AT // len(cloud), _PLACES[0]), _PLACES[1])
+    count = min(max(_LOOKED_AT // len(cloud), _POSITIONS[0]), _POSITIONS[1])
     rows = np.linspace(0, len(cloud) - 1, count).astype(int).tolist()
     for nearest in _NEAREST:
         if 2 * nearest > len(cloud):

@@ -34,7 +34,7 @@ DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, i
 QUALITY = 0.5
 MOST_SECTORS = 1 << 24
 _MOVING = 0.5  # of the quality while the picture moves
-_EYE_BITS = 36  # of its place
+_EYE_BITS = 36  # of its position
 
 
 @dataclass(frozen=True)
@@ -255,10 +255,10 @@ def visible_points(
     left out because a coordinate is not finite. eye: (3,), absolute. radius: R of the flip, scan units, not
     less than the distance to the farthest point; sectors: how many, k; steps: of propagation at most; None:
     as `calibrated` says; the hull alone goes by these. mode: "hull" takes the points on the hull of the
-    flipped ones, as the sectors find it; "combined" those that no others cover (`Covering`). Of points in one
-    place one is visible, and so is a point in the eye itself. gpu: None takes a context of its own, which is
-    kept. What was found of a pose is kept until another is asked for, so that further eyes take less. Raises
-    InputError, NoOpenGLError.
+    flipped ones, as the sectors find it; "combined" those that no others cover (`Covering`). Of points at one
+    position one is visible, and so is a point in the eye itself. gpu: None takes a context of its own, which
+    is kept. What was found of a pose is kept until another is asked for, so that further eyes take less.
+    Raises InputError, NoOpenGLError.
     """
     if mode not in MODES:
         raise unknown_name("mode", mode, MODES)

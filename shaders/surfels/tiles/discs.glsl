@@ -6,7 +6,7 @@
 
 layout(binding = TEXTURE_REACH) uniform usamplerBuffer reach;
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;
-layout(std430, binding = STORAGE_PLACES) writeonly buffer Places { vec4 places[]; };
+layout(std430, binding = STORAGE_CENTERS) writeonly buffer Centers { vec4 centers[]; };
 layout(std430, binding = STORAGE_FORMS) writeonly buffer Forms { vec4 forms[]; };
 #if LOOKS
 #include "surfels/passes/look.glsl"
@@ -26,7 +26,7 @@ void begin_parts(vec3 key, vec3 form) {
 
 // The parts of a tile that the disc may reach, a bit each: of those in its box, where the middle is near enough. A form is
 // the square of a norm, so that the triangle inequality holds.
-uint bits_of(ivec4 parts, ivec2 tile, vec2 place, vec3 key, vec3 form) {
+uint bits_of(ivec4 parts, ivec2 tile, vec2 center, vec3 key, vec3 form) {
     uint bits = 0u;
     for (int k = 0; k < ALL_PARTS; ++k) {
         ivec2 part = tile * PARTS + ivec2(k % COLUMNS, k / COLUMNS);
@@ -44,9 +44,9 @@ void scatter(uint at) {
     uint disc = first_disc + at, i = texelFetch(listed, int(first_home + at)).r;
     Point point = texel_point(drawn_row(int(i)));
     begin_disc(point);
-    vec2 place = to_pixel(disc_center);
+    vec2 center = to_pixel(disc_center);
     vec3 form, key = disc_key(form);
-    places[disc] = vec4(place, key.xy);
+    centers[disc] = vec4(center, key.xy);
     forms[disc] = vec4(key.z, form);
 #if LOOKS
     uvec2 look = texelFetch(looks, int(point.row)).xy;

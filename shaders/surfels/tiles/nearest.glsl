@@ -6,7 +6,7 @@
 // Mesa runs eight invocations at once that are neighbors along x.
 layout(local_size_x = ALL_PARTS, local_size_y = TILES) in;
 
-layout(binding = TEXTURE_PLACES) uniform samplerBuffer places;  // centre, pixels; key there; its step right
+layout(binding = TEXTURE_CENTERS) uniform samplerBuffer centers;  // centre, pixels; key there; its step right
 layout(binding = TEXTURE_FORMS) uniform samplerBuffer forms;   // the key's step down; a, b, c (surfels/disc.glsl)
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;  // of each tile's part of the list
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // discs, in any order; then their points
@@ -118,7 +118,7 @@ Disc disc;
 float column_key[PART_WIDTH], column_form[PART_WIDTH], column_skew[PART_WIDTH];  // along each column of pixels
 
 void begin_columns(uint number) {
-    vec4 a = texelFetch(places, int(number)), b = texelFetch(forms, int(number));
+    vec4 a = texelFetch(centers, int(number)), b = texelFetch(forms, int(number));
     disc = Disc(a.y, b.x, b.w);
     for (int k = 0; k < PART_WIDTH; ++k) {
         precise float x = float(pixel.x) + (0.5 + float(k)) - a.x;

@@ -20,7 +20,7 @@ from viewer.errors import InputError
 
 def assert_same(one: CodePicture, other: CodePicture) -> None:
     np.testing.assert_array_equal(one.keys, other.keys)
-    np.testing.assert_array_equal(one.places, other.places)
+    np.testing.assert_array_equal(one.indices, other.indices)
     np.testing.assert_array_equal(one.image, other.image)
 
 

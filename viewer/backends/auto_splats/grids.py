@@ -27,7 +27,7 @@ class Grids:
     """The grids, and what else their shaders read (shaders/auto_splats/place.glsl).
 
     Sizes are numbers of cells; a shift is the power of two that a cell has pixels along an edge. margin:
-    pixels round the picture whose points take part. unit: factor on places, a power of two.
+    pixels round the picture whose points take part. unit: factor on positions, a power of two.
     border: pixels round the picture shown that the picture of these grids has more, at each edge.
     typical: radius of neighborhoods as points are dense in the picture, pixels; typical_in_space: as they are
     over a body of the scan's size, a rough one, scan units; widest: from which on splats grow no more, scan

@@ -93,7 +93,7 @@ class Neighborhoods:
     "extents", the radius of the neighborhood in the last picture that found one, 0: none. Of the points
     whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan units,
     0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots": the
-    participants, places and rows.
+    participants, positions and rows.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
@@ -455,7 +455,7 @@ def _widest_radius(pose: GpuPose, k: int) -> float:
 
 
 def _scanners(cloud: PointCloud, points: RangePoints) -> NDArray[np.float32]:
-    """Place of each range view's eye, relative to the origin, and the bits of its first row, (V, 4)."""
+    """Position of each range view's eye, relative to the origin, and the bits of its first row, (V, 4)."""
     scanners = np.zeros((len(points.views), 4), np.float32)
     scanners[:, :3] = np.array([view.eye for view in points.views]) - cloud.origin
     first_rows = np.searchsorted(cast(NDArray, cloud.ids), points.firsts[:-1])

@@ -114,7 +114,7 @@ class WordBuffers:
             self._texels[name].bind(_BUFFERS[name][0])
 
     def take(self, stream: WordStream) -> Sheet:
-        """Upload any stream: ids may be those of several words at a pixel. Owners are places of words."""
+        """Upload any stream: ids may be those of several words at a pixel. Owners are indices of words."""
         order = np.argsort(stream.ids, kind="stable").astype(np.uint32)
         ranks = np.empty_like(order)
         ranks[order] = np.arange(len(order), dtype=np.uint32)
@@ -162,12 +162,12 @@ def draw_stream(
     picture = begun(stream, window, background)
     words = WordBuffers(gpu)
     sheet = words.take(stream)
-    keys, places = (gpu.buffer(reserve=picture.keys.nbytes) for _ in range(2))
+    keys, indices = (gpu.buffer(reserve=picture.keys.nbytes) for _ in range(2))
     image = gpu.buffer(picture.image)
-    draw_bands(words, sheet, window, keys, places, (image, stream.materials), is_surface=False)
-    for buffer, array in ((keys, picture.keys), (places, picture.places), (image, picture.image)):
+    draw_bands(words, sheet, window, keys, indices, (image, stream.materials), is_surface=False)
+    for buffer, array in ((keys, picture.keys), (indices, picture.indices), (image, picture.image)):
         array[:] = np.frombuffer(buffer.read(), array.dtype).reshape(array.shape)
-    gpu.discard(words, keys, places, image)
+    gpu.discard(words, keys, indices, image)
     return picture
 
 

@@ -3,8 +3,8 @@
 The method is Laplacian projection (Farooq 2013, chapter 6, and the GRAPP 2009 paper; Burt and Adelson 1983).
 The renderer draws a picture of the visible surface from each view. The multi-resolution spline splits these
 pictures into frequency bands and merges each band; the coarser the band, the wider is the transition between
-two views. At each place, the fine detail comes from a single view, so nothing appears twice. Differences in
-gain or colour fade over the width of the coarsest band.
+two views. Fine detail comes from a single view at each position, so nothing appears twice. Differences
+in gain or colour fade over the width of the coarsest band.
 """
 
 from __future__ import annotations

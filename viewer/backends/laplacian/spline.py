@@ -70,10 +70,10 @@ class Bands:
     """How views are merged.
 
     levels: bands. filter: of their pyramids. detail: gain of the finest. crisp: whether the view that sees a
-    place best alone has all bands but the coarsest, top_crisp: whether it has that, too; else all views
+    position best alone has all bands but the coarsest, top_crisp: whether it has that, too; else all views
     have their parts. logarithmic: whether bands are of the logarithm of light. captured: whether bands are of
-    the captured images rather than of pictures. fine: whether pixels look at four places of a level that is
-    finer than they are, else between two levels.
+    the captured images rather than of pictures. fine: whether pixels look at four samples of a level
+    that is finer than they are, else between two levels.
     """
 
     levels: int

@@ -365,7 +365,7 @@ def sight_of(view: View) -> Sight:
 
 
 def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:
-    """Factors from 1 to 1 + _UNLIKE, (n,), by the nodes' places: cubes that overlap would share the planes
+    """Factors from 1 to 1 + _UNLIKE, (n,), by the nodes' positions: cubes that overlap would share the planes
     of their faces, and rounding would say which of them is seen (in 7 % of the pixels of a scan that was
     moved by 1000 units; with them in less than 0.1 %). By those about the middle of the tree's cube, so that
     quarter turns and mirrors give the same."""
