@@ -47,7 +47,7 @@ _SLOT = 16  # bytes
 
 
 class GapRadii:
-    """The radii of a pose's points; see the module. Made with `GpuPose.keep`.
+    """The radii of a pose's points; see the module. Made with `GpuPose.cached`.
 
     texels: a radius for each row, scan units, once all are found; 0 where a point is far from all others: it
     is to be as large as usual. None where no point has any, where there are more points than the driver

@@ -50,7 +50,7 @@ class ClosedGaps:
 
 class KeptPoints:
     """The points of a pose that a picture showed, and whose turn it is of the others. Made with
-    `GpuPose.keep`."""
+    `GpuPose.cached`."""
 
     def __init__(self, pose: GpuPose) -> None:
         self._gpu = pose.gpu

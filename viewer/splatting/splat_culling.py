@@ -141,7 +141,7 @@ def _reason(boxes: ChunkBoxes, seen: NDArray[np.uint32]) -> str:
 
 class SplatChunks:
     """The chunks of a pose's splats: smaller ones than of points, as each splat takes longer. Made with
-    `GpuPose.keep`."""
+    `GpuPose.cached`."""
 
     def __init__(self, pose: GpuPose) -> None:
         self._gpu = gpu = pose.gpu

@@ -51,7 +51,7 @@ class Spacings:
     in a ball.
 
     texels: R32F, a texel a row, scan units. They lie in space, so that they are the same for all eyes; kept
-    with the pose (`GpuPose.keep`).
+    with the pose (`GpuPose.cached`).
     """
 
     def __init__(self, pose: GpuPose) -> None:

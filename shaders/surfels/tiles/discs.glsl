@@ -30,7 +30,7 @@ uint bits_of(ivec4 parts, ivec2 tile, vec2 center, vec3 key, vec3 form) {
     uint bits = 0u;
     for (int k = 0; k < ALL_PARTS; ++k) {
         ivec2 part = tile * PARTS + ivec2(k % COLUMNS, k / COLUMNS);
-        vec2 off = vec2(part * PART) + 0.5 * vec2(PART) - place;
+        vec2 off = vec2(part * PART) + 0.5 * vec2(PART) - center;
         float edge = (view_perspective ? key.x + dot(key.yz, off) : 1.0) + margin;
         float shape = form.x * off.x * off.x + off.y * (2.0 * form.y * off.x + form.z * off.y);
         bool is_in_box = all(greaterThanEqual(part, parts.xy)) && all(lessThan(part, parts.zw));
@@ -60,7 +60,7 @@ void scatter(uint at) {
     do {
         uint entry = disc;
 #if MASKED
-        entry |= bits_of(parts, tile, place, key, form) << DISC_BITS;
+        entry |= bits_of(parts, tile, center, key, form) << DISC_BITS;
 #endif
         visit(cell_of(tile), 0u, entry);
         tile = next_tile(tile, t);
