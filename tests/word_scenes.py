@@ -2,21 +2,40 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
+from numpy.typing import ArrayLike, NDArray
 
 from viewer.bounds import Bounds
 from viewer.camera import Camera
 from viewer.codewords.encode import Elements
 from viewer.codewords.lighting import Materials
 from viewer.codewords.stream import FINE_DEPTHS, WordStream
-from viewer.codewords.words import FIELDS, decode_scans, decode_words, encode_words
+from viewer.codewords.words import FIELDS, decode_scans, decode_words
 from viewer.view import View
 
 GREY = Materials.of_palette(np.array([[200, 190, 180], [90, 120, 150]], np.uint8), 0.2, 0.7, 0.3)
+
+
+def encode_words(fields: Mapping[str, ArrayLike]) -> NDArray[np.uint64]:
+    """Words of the values of all `FIELDS`, (N,) each, or one for all."""
+    words = np.zeros((), np.uint64)
+    for name, (at, bits) in FIELDS.items():
+        values = np.asarray(fields[name])
+        assert not values.size or 0 <= values.min() <= values.max() < 1 << bits, name
+        words = words | values.astype(np.uint64) << np.uint64(at)
+    return words
+
+
+def encode_scans(spans: ArrayLike) -> NDArray[np.uint32]:
+    """SCANS of four rows, (..., 4, 2): first and last column of each, 0 to 7."""
+    rows = np.asarray(spans, np.uint32)
+    fields = rows[..., 0] | rows[..., 1] << np.uint32(3)
+    return (fields << np.arange(0, 24, 6, dtype=np.uint32)).sum(axis=-1, dtype=np.uint32)
 
 
 def front_view(size: tuple[int, int], perspective: bool = False) -> View:

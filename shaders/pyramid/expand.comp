@@ -1,14 +1,8 @@
-// A level from the next coarser one. SIGN 0: that alone; -1, 1: what a level of the same size has, less it or
-// with it, where that level has something. FILLS: only what of this level is not there.
+// A level from the next coarser one. FILLS: only what of this level is not there.
 #include "pyramid/samples.glsl"
 
-#if SIGN
-layout(binding = TEXTURE_DETAIL) uniform samplerBuffer detail;
-#endif
-#if SIGN || FILLS
-layout(binding = TEXTURE_DETAIL_WEIGHTS) uniform samplerBuffer detail_weights;
-#endif
 #if FILLS
+layout(binding = TEXTURE_KNOWN_WEIGHTS) uniform samplerBuffer known_weights;
 uniform float enough;  // weight of the coarser level, whichever surface it is of
 #endif
 
@@ -18,7 +12,7 @@ void main() {
     ivec2 at = ivec2(int(i) % out_size.x, int(i) / out_size.x);
     ivec2 low = max((at - FIRST - COUNT + 2) >> 1, 0), high = min((at - FIRST) >> 1, size - 1);
 #if FILLS
-    if (is_there(texelFetch(detail_weights, int(i)).r)) return;
+    if (is_there(texelFetch(known_weights, int(i)).r)) return;
 #endif
     begin_sample();
 #if FRONT
@@ -34,12 +28,5 @@ void main() {
 #if FILLS
     if (present < enough * inside) return;
 #endif
-#if SIGN
-    float its_weight = texelFetch(detail_weights, int(i)).r;
-    bool there = is_there(its_weight);
-    value = texelFetch(detail, int(i)) + float(SIGN) * value;
-    store_sample(i, there ? value : vec4(0.0), there ? its_weight : 0.0);
-#else
     store_sample(i, value, weight / inside);
-#endif
 }

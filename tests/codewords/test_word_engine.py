@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from word_scenes import GREY, front_view, scattered, streams
+from word_scenes import GREY, encode_words, front_view, scattered, streams
 
 from viewer.codewords.encode import Encoding, encode_elements
 from viewer.codewords.engine import NO_KEY, NO_WORD, CodePicture, draw_words, draw_words_plainly
 from viewer.codewords.lighting import Materials
 from viewer.codewords.stream import WordStream
-from viewer.codewords.words import FIELDS, encode_words
+from viewer.codewords.words import FIELDS
 from viewer.errors import InputError
 
 FULL = 0b111000_111000_111000_111000  # all eight columns

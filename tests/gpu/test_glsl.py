@@ -35,7 +35,7 @@ from viewer.drawing.request import Request
 from viewer.gpu import chunks
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
-from viewer.gpu.pyramid import Image, add_expanded, expand, subtract_expanded
+from viewer.gpu.pyramid import Image, expand
 from viewer.gpu.shader import Source
 from viewer.look import Look
 from viewer.picture.present import Presenter
@@ -256,8 +256,6 @@ def use_primitives(gpu: Gpu) -> None:
         fine, coarse = levels.levels[:2]
         result = Image(gpu, fine.size, channels)
         expand(gpu, coarse, result, how)
-        subtract_expanded(gpu, fine, coarse, result, how)
-        add_expanded(gpu, fine, coarse, result, how)
         gpu.discard(levels, result)
     view, measured = stepped_view((7, 5)), stepped_view((7, 5), "height", True)
     bent = replace(stepped_view((7, 5), "range"), distortion=(-0.1, 0.0, 0.0, 0.0))

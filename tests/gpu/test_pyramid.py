@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -170,30 +168,6 @@ def test_places_in_levels_are_as_stated(renderer: Renderer, name: str) -> None:
     gpu.discard(levels, back)
 
 
-@pytest.mark.parametrize("size", SIZES)
-@pytest.mark.parametrize("name", FILTERS)
-def test_details_and_the_coarsest_level_give_the_image_again(
-    renderer: Renderer, name: str, size: tuple[int, int]
-) -> None:
-    gpu, how = renderer.gpu, FILTERS[name]
-    values, weights = picture(size, 3)
-    gaussian, laplacian, again = (Pyramid(gpu, size, 3) for _ in range(3))
-    gaussian.levels[0].write(values, weights)
-    gaussian.reduce(how)
-    for (fine, coarse), detail in zip(pairwise(gaussian.levels), laplacian.levels, strict=False):
-        pyramid.subtract_expanded(gpu, fine, coarse, detail, how)
-    again.levels[-1].write(*gaussian.levels[-1].read())
-    for k in range(len(again.levels) - 1, 0, -1):
-        pyramid.add_expanded(gpu, laplacian.levels[k - 1], again.levels[k], again.levels[k - 1], how)
-    samples, got = again.levels[0].read()
-    np.testing.assert_array_equal(got, weights)
-    there = weights > 0
-    np.testing.assert_allclose(samples[there], values[there], rtol=1e-6, atol=1e-6)
-    if len(gaussian.levels) > 1:
-        assert (samples[~there] == 0).all()
-    gpu.discard(gaussian, laplacian, again)
-
-
 @given(st.integers(1, 9), st.integers(1, 9), st.sampled_from(sorted(FILTERS)), st.integers(0, 1000))
 def test_any_small_image(renderer: Renderer, width: int, height: int, name: str, seed: int) -> None:
     gpu, how = renderer.gpu, FILTERS[name]
@@ -234,11 +208,11 @@ def test_a_weight_that_is_none_is_as_good_as_zero(renderer: Renderer, name: str,
     results = []
     for other in (0.0, absent):
         fine = image(gpu, values, np.where(weights > 0, weights, other))
-        coarse, detail = Image(gpu, (3, 2), 2), Image(gpu, size, 2)
+        coarse = Image(gpu, (3, 2), 2)
         pyramid.reduce(gpu, fine, coarse, how)
-        pyramid.subtract_expanded(gpu, fine, coarse, detail, how)
-        results.append([array.ravel() for each in (coarse, detail) for array in each.read()])
-        gpu.discard(fine, coarse, detail)
+        pyramid.fill(gpu, coarse, fine, how)
+        results.append([array.ravel() for each in (coarse, fine) for array in each.read()])
+        gpu.discard(fine, coarse)
     assert np.isfinite(np.concatenate(results[1])).all()
     for plain, got in zip(*results, strict=True):
         np.testing.assert_array_equal(got, plain)
@@ -253,15 +227,16 @@ def test_images_that_are_none_are_refused(renderer: Renderer) -> None:
 def test_levels_that_do_not_belong_together_are_refused(renderer: Renderer) -> None:
     gpu = renderer.gpu
     fine, coarse, other = Image(gpu, (6, 4), 1), Image(gpu, (3, 2), 1), Image(gpu, (3, 2), 2)
+    one = Image(gpu, (1, 1), 1)
     with pytest.raises(ValueError, match="follow"):
         pyramid.reduce(gpu, coarse, fine, BOX)
     with pytest.raises(ValueError, match="channels"):
         pyramid.reduce(gpu, fine, other, BOX)
     with pytest.raises(ValueError, match="in place"):
-        pyramid.add_expanded(gpu, fine, coarse, fine, BOX)
+        pyramid.expand(gpu, one, one, BOX)
     with pytest.raises(InputError, match="too large"):
         Image(gpu, (1 << 20, 1 << 20), 1)
-    gpu.discard(fine, coarse, other)
+    gpu.discard(fine, coarse, other, one)
 
 
 def in_front(depths: Array, weights: Array, reach: list[tuple[int, int]]) -> list[tuple[int, int]]:

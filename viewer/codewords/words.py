@@ -18,8 +18,6 @@ whose y differ by four. y is the line of the first row, and not in the word: wor
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -31,21 +29,6 @@ FIELDS = {
 COLUMNS = 1 << FIELDS["x"][1]  # that a strip may have
 DEPTHS = 1 << FIELDS["z"][1]
 MATERIALS = 1 << FIELDS["material"][1]
-SHADES = 1 << FIELDS["diffuse"][1]
-
-
-def encode_words(fields: Mapping[str, ArrayLike]) -> NDArray[np.uint64]:
-    """Words of the values of all `FIELDS`, (N,) each, or one for all. A value beyond its field raises
-    ValueError."""
-    if fields.keys() != FIELDS.keys():
-        raise ValueError(f"the fields of a word must be {', '.join(FIELDS)}")
-    words = np.zeros((), np.uint64)
-    for name, (at, bits) in FIELDS.items():
-        values = np.asarray(fields[name])
-        if values.size and (values.min() < 0 or values.max() >> bits):
-            raise ValueError(f"a value of {name} does not fit into {bits} bits")
-        words = words | values.astype(np.uint64) << np.uint64(at)
-    return words
 
 
 def decode_words(words: NDArray[np.uint64]) -> dict[str, NDArray[np.int32]]:
@@ -54,13 +37,6 @@ def decode_words(words: NDArray[np.uint64]) -> dict[str, NDArray[np.int32]]:
         name: (words >> np.uint64(at) & np.uint64((1 << bits) - 1)).astype(np.int32)
         for name, (at, bits) in FIELDS.items()
     }
-
-
-def encode_scans(spans: ArrayLike) -> NDArray[np.uint32]:
-    """SCANS of four rows, (..., 4, 2): first and last column of each, 0 to 7."""
-    rows = np.asarray(spans, np.uint32)
-    fields = rows[..., 0] | rows[..., 1] << np.uint32(3)
-    return (fields << np.arange(0, 24, 6, dtype=np.uint32)).sum(axis=-1, dtype=np.uint32)
 
 
 def decode_scans(scans: ArrayLike) -> NDArray[np.int32]:

@@ -50,11 +50,11 @@ class Texture(IntEnum):
     KERNELS = auto()  # point spread functions
     SUMS = auto()  # of such
     RANGE_NORMALS = auto()  # of samples of range views
-    # A level of a pyramid that is read, and one that is added to it.
+    # A level of a pyramid that is read, one beside it, and the weights of one that is filled.
     SAMPLES = auto()
     WEIGHTS = auto()
     DETAIL = auto()
-    DETAIL_WEIGHTS = auto()
+    KNOWN_WEIGHTS = auto()
     GUIDE = auto()  # that tells which samples are in front
     # Tiles of splats.
     CENTERS = auto()

@@ -142,7 +142,7 @@ def reduce(gpu: Gpu, fine: Image, coarse: Image, how: Filter, guide: Image | Non
 
 def expand(gpu: Gpu, coarse: Image, fine: Image, how: Filter) -> None:
     """Make a level of the next coarser one."""
-    _Step("expand", coarse, fine, how, {"SIGN": 0}).run(gpu)
+    _Step("expand", coarse, fine, how, {}).run(gpu)
 
 
 def fill(
@@ -157,22 +157,7 @@ def fill(
     pixels, where its weight is enough. guides: images of the sizes of both, coarse and fine, in the place of
     which they count, as in `reduce`; None: these themselves."""
     its_guide, known = guides or (coarse, fine)
-    defines = {"SIGN": 0, "FILLS": 1}
-    _Step("expand", coarse, fine, how, defines, guide=its_guide, known=known, enough=enough).run(gpu)
-
-
-def subtract_expanded(gpu: Gpu, image: Image, coarse: Image, detail: Image, how: Filter) -> None:
-    """Make `detail` what an image has beyond the next coarser level, expanded.
-
-    It is a level of a Laplacian pyramid, with the image's weights; `add_expanded` gives the image again, but
-    for the rounding of float32.
-    """
-    _Step("expand", coarse, detail, how, {"SIGN": -1}, image).run(gpu)
-
-
-def add_expanded(gpu: Gpu, detail: Image, coarse: Image, image: Image, how: Filter) -> None:
-    """Make an image of its detail and of the next coarser level, expanded. It has the detail's weights."""
-    _Step("expand", coarse, image, how, {"SIGN": 1}, detail).run(gpu)
+    _Step("expand", coarse, fine, how, {"FILLS": 1}, its_guide, known, enough).run(gpu)
 
 
 @dataclass(frozen=True)
@@ -188,15 +173,14 @@ class _Step:
     result: Image
     how: Filter
     defines: Mapping[str, int]
-    detail: Image | None = None
     guide: Image | None = None
     known: Image | None = None
     enough: float = 0.0
 
     def run(self, gpu: Gpu) -> None:
-        source, result, how, detail = self.source, self.result, self.how, self.detail
+        source, result, how = self.source, self.result, self.how
         guide = self.guide or source
-        _check(self.name, source, result, detail)
+        _check(self.name, source, result)
         _check(self.name, guide, self.known or result, channels=False)
         taps = ", ".join(str(np.float32(tap)) for tap in how.taps)
         taken = {"CHANNELS": f"{result.channels}u", "FIRST": how.first, "COUNT": len(how.taps)}
@@ -207,11 +191,8 @@ class _Step:
         if how.front:
             guide.samples.bind(Texture.GUIDE)
         if self.known is not None:
-            self.known.weights.bind(Texture.DETAIL_WEIGHTS)
+            self.known.weights.bind(Texture.KNOWN_WEIGHTS)
             gpu.set(program, enough=self.enough)
-        if detail is not None:
-            detail.samples.bind(Texture.DETAIL)
-            detail.weights.bind(Texture.DETAIL_WEIGHTS)
         result.samples.buffer.bind_to_storage_buffer(Storage.SAMPLES)
         result.weights.buffer.bind_to_storage_buffer(Storage.WEIGHTS)
         gpu.set(program, size=source.size, out_size=result.size)
@@ -219,15 +200,12 @@ class _Step:
             gpu.dispatch(program, result.size[0] * result.size[1])
 
 
-def _check(
-    name: str, source: Image, result: Image, detail: Image | None = None, channels: bool = True
-) -> None:
+def _check(name: str, source: Image, result: Image, channels: bool = True) -> None:
     """Raise ValueError where images do not belong together. channels: whether theirs must be as many."""
     fine, coarse = (source, result) if name == "reduce" else (result, source)
-    images = [image for image in (source, result, detail) if image is not None]
-    if coarse.size != sizes(fine.size, 2)[1] or (detail is not None and detail.size != fine.size):
-        raise ValueError(f"the levels do not follow one another: {[image.size for image in images]}")
-    if channels and len({image.channels for image in images}) > 1:
+    if coarse.size != sizes(fine.size, 2)[1]:
+        raise ValueError(f"the levels do not follow one another: {[source.size, result.size]}")
+    if channels and source.channels != result.channels:
         raise ValueError("the levels have different channels")
-    if result is detail or result is source:
-        raise ValueError("a level cannot be computed in place")
+    if result is source:
+        raise ValueError("a level cannot be made in place")

@@ -6,16 +6,34 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from scenes import rarely
 from word_scenes import GREY, front_view, scattered, streams
 
 from viewer.backends.codeword import engine
-from viewer.backends.codeword.engine import draw_stream
+from viewer.backends.codeword.engine import WordBuffers, draw_bands
 from viewer.codewords.encode import Elements, Encoding, encode_elements
-from viewer.codewords.engine import CodePicture, draw_words, draw_words_plainly
+from viewer.codewords.engine import WINDOW, CodePicture, begun, draw_words, draw_words_plainly
 from viewer.codewords.stream import WordStream
 from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
+from viewer.gpu.context import Gpu
+
+
+def draw_stream(
+    gpu: Gpu, stream: WordStream, window: int = WINDOW, background: NDArray[np.uint8] | None = None
+) -> CodePicture:
+    """Draw a stream as `draw_words` does, on the GPU. Raises InputError."""
+    picture = begun(stream, window, background)
+    words = WordBuffers(gpu)
+    sheet = words.take(stream)
+    keys, indices = (gpu.buffer(reserve=picture.keys.nbytes) for _ in range(2))
+    image = gpu.buffer(picture.image)
+    draw_bands(words, sheet, window, keys, indices, (image, stream.materials), is_surface=False)
+    for buffer, array in ((keys, picture.keys), (indices, picture.indices), (image, picture.image)):
+        array[:] = np.frombuffer(buffer.read(), array.dtype).reshape(array.shape)
+    gpu.discard(words, keys, indices, image)
+    return picture
 
 
 def assert_same(one: CodePicture, other: CodePicture) -> None:

@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codewords.engine import NO_KEY, WINDOW, CodePicture, begun
+from ...codewords.engine import NO_KEY
 from ...codewords.lighting import LIGHT_BYTES, Materials
 from ...codewords.stream import FINE_DEPTHS, WordStream
 from ...codewords.tables import BITMAP
@@ -153,22 +153,6 @@ class WordBuffers:
 def _heads(words: NDArray[np.uint64]) -> NDArray[np.uint32]:
     """Diffuse, specular and material of words, (N,)."""
     return (words >> np.uint64(FIELDS["diffuse"][0]) & np.uint64((1 << _HEAD_BITS) - 1)).astype(np.uint32)
-
-
-def draw_stream(
-    gpu: Gpu, stream: WordStream, window: int = WINDOW, background: NDArray[np.uint8] | None = None
-) -> CodePicture:
-    """Draw a stream as `draw_words` does, on the GPU. Raises InputError."""
-    picture = begun(stream, window, background)
-    words = WordBuffers(gpu)
-    sheet = words.take(stream)
-    keys, indices = (gpu.buffer(reserve=picture.keys.nbytes) for _ in range(2))
-    image = gpu.buffer(picture.image)
-    draw_bands(words, sheet, window, keys, indices, (image, stream.materials), is_surface=False)
-    for buffer, array in ((keys, picture.keys), (indices, picture.indices), (image, picture.image)):
-        array[:] = np.frombuffer(buffer.read(), array.dtype).reshape(array.shape)
-    gpu.discard(words, keys, indices, image)
-    return picture
 
 
 def draw_bands(
