@@ -117,7 +117,7 @@ def test_the_best_way_within_the_bound_is_chosen_and_no_step_of_the_history(show
         assert (way.key, way.scale) == (key, 1.0)
         choice = shown.choosing.choice
         assert choice is not None
-        assert choice.keeps == (bound > 1)
+        assert choice.meets_limit == (bound > 1)
         assert choice.expected.ms == MODEL[key].time[0]
     shown.session.history.undo()
     assert shown.session.document.goal == Goal("time", 6.0)
