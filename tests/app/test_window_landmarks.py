@@ -16,7 +16,7 @@ from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, State, running_a
 
 from viewer.analysis.landmarks import Landmark, Template
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet
 from viewer.analysis.landmarks.templates import read_template, save_template, templates
 from viewer.camera import Camera
 from viewer.document.landmarks import Landmarks
@@ -270,7 +270,9 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
     keys.mkdir(parents=True)
     (keys / "keys.toml").write_text('[keys]\nsave_landmarks = "Ctrl+L"\n')
     for name, far in (("here", 0.0), ("elsewhere", 1e4)):
-        found = LandmarkSet.of(("A", "B"), np.array([points[34], points[60]]) + far, stated=Stated("units"))
+        found = LandmarkSet.of(
+            ("A", "B"), np.array([points[34], points[60]]) + far, notes=LandmarkNotes("units")
+        )
         write_landmarks(tmp_path / f"{name}.mrk.json", found)
     with running_app(screen, tmp_path, scan) as app:
         app.drop(tmp_path / "elsewhere.mrk.json")

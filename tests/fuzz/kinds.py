@@ -20,7 +20,7 @@ from whole_files import TEXTS, write_scans
 from whole_folders import FOLDERS
 
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet
 from viewer.analysis.landmarks.templates import read_template, save_template, templates
 from viewer.analysis.surface_point import SurfacePoint
 from viewer.app import keys, settings
@@ -114,7 +114,9 @@ def _write_landmarks(folder: Path) -> None:
     places = np.random.default_rng(3).normal(size=(3, 4, 3))
     places[1, 2] = np.nan
     names = ("n", "chL", "chR", 'a "b", c')
-    landmarks = LandmarkSet.of(names, places, frames=range(3), times=np.arange(3) / 25, stated=Stated("mm"))
+    landmarks = LandmarkSet.of(
+        names, places, frames=range(3), times=np.arange(3) / 25, notes=LandmarkNotes("mm")
+    )
     for suffix in _LANDMARKS:
         write_landmarks(folder / f"landmarks.{suffix}", landmarks.at(0) if "json" in suffix else landmarks)
     save_template(folder / "template.json", templates()["lips"])

@@ -14,7 +14,7 @@ from viewer.errors import InputError
 from viewer.gpu import gl
 from viewer.gpu.context import Gpu
 from viewer.scan.points import NOTHING
-from viewer.visibility.candidates import UNLIMITED, Candidates, Sample
+from viewer.visibility.candidates import UNLIMITED, Candidates, RowSample
 from viewer.visibility.clipping import EVERYWHERE
 from viewer.visibility.sectors import Sectors
 
@@ -139,7 +139,7 @@ def test_some_rows_alone_may_take_part(find: Find, renderer: Renderer) -> None:
     alone = find(points[chosen], sectors, 2)
     flags = np.isin(np.arange(300), chosen).astype(np.uint32)
     flagged = find(points, sectors, 2, among=texels(renderer.gpu, flags, gl.R32UI))
-    listed = find(points, sectors, 2, sample=Sample(texels(renderer.gpu, chosen, gl.R32UI), len(chosen)))
+    listed = find(points, sectors, 2, sample=RowSample(texels(renderer.gpu, chosen, gl.R32UI), len(chosen)))
     for some in (flagged, listed):
         rows = rows_of(some)
         expected = np.where(rows_of(alone) == NOTHING, NOTHING, chosen[rows_of(alone) % 100])

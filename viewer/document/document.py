@@ -244,7 +244,7 @@ class Document:
 
     @property
     def _automatic(self) -> Configuration | None:
-        """The way that was chosen, None where the backend is the user's or the scan's."""
+        """The configuration that was chosen, None where the backend is the user's or the scan's."""
         return None if self.goal is None else self.configuration
 
     def defaults(self, pose: Pose) -> tuple[str, Any]:

@@ -31,7 +31,7 @@ _EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones
 _EMPTY_AMONG_VISIBLE = 1 / 24
 
 
-class Sample(NamedTuple):
+class RowSample(NamedTuple):
     """Rows that are looked at in place of all."""
 
     rows: gl.BufferTexture  # R32UI
@@ -102,7 +102,7 @@ class Candidates:
         steps: int,
         stride: int = 1,
         *,
-        sample: Sample | None = None,
+        sample: RowSample | None = None,
         among: gl.BufferTexture | None = None,
         clip: Planes = EVERYWHERE,
     ) -> None:

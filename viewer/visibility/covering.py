@@ -25,7 +25,7 @@ from ..gpu.constants import NO_DEPTH
 from ..gpu.context import Gpu, Program
 from ..gpu.scatter import Visits, take_keys
 from ..scan.points import NOTHING
-from .candidates import Sample
+from .candidates import RowSample
 from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 
@@ -89,7 +89,7 @@ class Covering:
         spacing: float,
         clear: float = CLEAR,
         *,
-        sample: Sample | None = None,
+        sample: RowSample | None = None,
         clip: Planes = EVERYWHERE,
         front: bool = True,
     ) -> None:
@@ -119,7 +119,7 @@ class Covering:
         sectors: Sectors,
         spacing: float,
         sampled: dict[str, int],
-        sample: Sample | None,
+        sample: RowSample | None,
         clip: Planes,
         front: bool,
     ) -> None:
@@ -154,7 +154,7 @@ class Covering:
         cells: Sectors,
         sampled: dict[str, int],
         repeated: gl.BufferTexture | None,
-        sample: Sample | None,
+        sample: RowSample | None,
     ) -> IndexList:
         share = 1.0 if sample is None else sample.share
         gpu, faces = self._gpu, 3 if sampled["CUBE"] else 1
@@ -248,6 +248,6 @@ class Covering:
             listed.release()
 
 
-def _bind_sample(sample: Sample | None) -> None:
+def _bind_sample(sample: RowSample | None) -> None:
     if sample is not None:
         sample.rows.bind(Texture.DRAWN_ROWS)

@@ -20,7 +20,7 @@ from ..scan.points import PointCloud, checked_viewpoint
 from ..scan.pose import Pose
 from ..view import View
 from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
-from .candidates import Candidates, Sample
+from .candidates import Candidates, RowSample
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
 from .covering import CLEAR, CLEAR_OF_NOISE, Covering, SpacedPoints
 from .exact import SeenPoints, as_cloud, flipping
@@ -71,7 +71,7 @@ class _Search:
         return sum(each.nbytes for each in (self._candidates, self._covering) if each)
 
     def hull(
-        self, pose: GpuPose, search: SectorSearch, sample: Sample | None = None, clip: Planes = EVERYWHERE
+        self, pose: GpuPose, search: SectorSearch, sample: RowSample | None = None, clip: Planes = EVERYWHERE
     ) -> Candidates:
         """Find the points on the hull of the flipped ones."""
         count = len(pose.cloud)
@@ -86,7 +86,7 @@ class _Search:
         self,
         pose: GpuPose,
         found: EyeCalibration,
-        sample: Sample | None = None,
+        sample: RowSample | None = None,
         clip: Planes = EVERYWHERE,
     ) -> Covering:
         """Find the points that no others cover."""
@@ -163,7 +163,7 @@ class SeenPicture(_Search):
         drawn = count / len(pose.cloud)
         found = calibrate(pose.stored, directions, pose.origin, settings.depth, radius, drawn)
         self.calibration = found
-        only = None if rows is None else Sample(rows, count, share)
+        only = None if rows is None else RowSample(rows, count, share)
         if settings.mode != HULL:
             self._found, self._chosen = self.uncovered(pose, found, only, clip), {}
             return

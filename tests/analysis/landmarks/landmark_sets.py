@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet
 from viewer.analysis.track import Known
 
 NAMES = ("prn", "chR", "chL", "鼻尖", 'a "b", c', "Ünter'lid", "x" * 90, "sn")
@@ -27,7 +27,7 @@ def moving(frames: int = 6, names: tuple[str, ...] = NAMES, seed: int = 4) -> La
         sigmas=sigmas,
         times=np.arange(frames) / 25,
         frames=np.arange(frames),
-        stated=Stated("mm", [f"where {name[:9]} is" for name in names]),
+        notes=LandmarkNotes("mm", [f"where {name[:9]} is" for name in names]),
     )
 
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from landmark_sets import moving
 
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet
 from viewer.errors import InputError
 
 NAMES = ("m.mrk.json", "m.tps", "m.morphologika", "m.csv", "m.wide.csv", "m.c3d")
@@ -182,7 +182,7 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs"]), min_size=0, max_size=3
 def test_any_name_and_number_comes_back(names: list[str], numbers: st.DataObject, tmp_path: Path) -> None:
     value = st.floats(-1e12, 1e12)
     values = numbers.draw(st.lists(value, min_size=3 * len(names), max_size=3 * len(names)))
-    wanted = LandmarkSet.of(names, np.array(values).reshape(1, -1, 3), frames=[0], stated=Stated("mm"))
+    wanted = LandmarkSet.of(names, np.array(values).reshape(1, -1, 3), frames=[0], notes=LandmarkNotes("mm"))
     for name in NAMES[:-1]:
         write_landmarks(tmp_path / name, wanted)
         found = read_landmarks(tmp_path / name)

@@ -21,7 +21,7 @@ from viewer.analysis.landmarks.files import (
     read_landmarks,
     write_landmarks,
 )
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet
 from viewer.analysis.track import Known
 from viewer.errors import InputError
 from viewer.scan.formats import known_suffixes
@@ -156,7 +156,7 @@ def test_c3d_tells_what_it_rounds(tmp_path: Path) -> None:
     far = replace(few, positions=few.positions + 4e6)
     assert "rounded" in str(write_landmarks(tmp_path / "m.c3d", far))
     later = LandmarkSet.of(
-        ["a"], np.ones((2, 1, 3)), frames=[10, 13], times=np.array([0.5, 0.65]), stated=Stated("mm")
+        ["a"], np.ones((2, 1, 3)), frames=[10, 13], times=np.array([0.5, 0.65]), notes=LandmarkNotes("mm")
     )
     assert write_landmarks(tmp_path / "m.c3d", later) is None
     found = read_landmarks(tmp_path / "m.c3d")
@@ -210,7 +210,7 @@ def test_previews_stay_previews(tmp_path: Path) -> None:
         ["seen", "guessed"],
         np.ones((1, 2, 3)),
         known=np.array([[Known.PLACED, Known.PENDING]]),
-        stated=Stated("mm"),
+        notes=LandmarkNotes("mm"),
     )
     for name in ("m.mrk.json", "m.csv"):
         write_landmarks(tmp_path / name, wanted)

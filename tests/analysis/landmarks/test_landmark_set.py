@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from landmark_sets import assert_same, moving
 
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated, why_apart
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet, why_apart
 from viewer.analysis.track import Known, Track
 from viewer.bounds import Bounds
 
@@ -61,7 +61,9 @@ BOX = Bounds(np.array([-90.0, 20, 500]), np.array([90.0, 240, 650]))
 def test_landmarks_of_another_scan_are_told(factor: float, words: str | None) -> None:
     rng = np.random.default_rng(2)
     points = BOX.low + rng.random((1, 9, 3)) * (BOX.high - BOX.low)
-    told = why_apart(LandmarkSet.of([f"{n}" for n in range(9)], points * factor, stated=Stated("mm")), BOX)
+    told = why_apart(
+        LandmarkSet.of([f"{n}" for n in range(9)], points * factor, notes=LandmarkNotes("mm")), BOX
+    )
     if words is None:
         assert told is None
     else:
@@ -74,7 +76,7 @@ def test_landmarks_that_any_unit_would_shrink_into_the_scan_tell_none() -> None:
     about_the_origin = Bounds(np.full(3, -50.0), np.full(3, 50.0))
     points = 1000.0 + 20 * np.random.default_rng(2).random((1, 9, 3))
     told = why_apart(
-        LandmarkSet.of([f"{n}" for n in range(9)], points, stated=Stated("mm")), about_the_origin
+        LandmarkSet.of([f"{n}" for n in range(9)], points, notes=LandmarkNotes("mm")), about_the_origin
     )
     assert told is not None
     assert told.endswith("they belong to another scan")
@@ -84,7 +86,7 @@ def test_one_place_that_is_off_is_told() -> None:
     points = np.full((1, 9, 3), 100.0) + np.array([0, 0, 450])
     points[0, 3] += 400
     points[0, 5] = np.nan
-    told = why_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, stated=Stated("mm")), BOX)
+    told = why_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, notes=LandmarkNotes("mm")), BOX)
     assert told is not None
     assert told.startswith("1 of 8 positions lie off the scan")
     assert why_apart(LandmarkSet.of(["a"], np.full((1, 1, 3), np.nan)), BOX) is None

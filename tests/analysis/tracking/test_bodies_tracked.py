@@ -12,7 +12,7 @@ from swinging_arms import LONG, SPACING, THICK, arms, on_arm
 
 from viewer.analysis.landmarks import Landmark
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
-from viewer.analysis.landmarks.landmark_set import LandmarkSet, Stated
+from viewer.analysis.landmarks.landmark_set import LandmarkNotes, LandmarkSet
 from viewer.analysis.landmarks.placed import landmarks_of
 from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known, Track
@@ -53,7 +53,7 @@ def keyed(sigma: float, scale: float = 1.0) -> list[Landmark]:
 
 def test_landmarks_of_a_file_without_deviations_are_tracked_on_a_moving_body(tmp_path: Path) -> None:
     file = tmp_path / "ends.mrk.json"
-    write_landmarks(file, LandmarkSet.of(["a", "b", "c", "d"], PATHS[:1], stated=Stated("mm")))
+    write_landmarks(file, LandmarkSet.of(["a", "b", "c", "d"], PATHS[:1], notes=LandmarkNotes("mm")))
     with timeline() as scan:
         found = list(landmarks_of(read_landmarks(file, "mm"), scan.visit, FRAMES, 0))
         tracks = tracks_of(found, scan)

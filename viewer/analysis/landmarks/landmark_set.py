@@ -25,7 +25,7 @@ _WIDE = (
 )
 
 
-class Stated(NamedTuple):
+class LandmarkNotes(NamedTuple):
     """What a file states of its landmarks beside numbers: see `LandmarkSet`. unit: any text."""
 
     unit: str | None = None
@@ -34,7 +34,7 @@ class Stated(NamedTuple):
     remarks: Sequence[str] = ()
 
 
-NOTHING_STATED = Stated()
+NO_NOTES = LandmarkNotes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +71,12 @@ class LandmarkSet:
         sigmas: NDArray[np.float64] | None = None,
         times: NDArray[np.float64] | None = None,
         frames: Sequence[int] | NDArray[np.int64] | None = None,
-        stated: Stated = NOTHING_STATED,
+        notes: LandmarkNotes = NO_NOTES,
     ) -> LandmarkSet:
         """The set of the landmarks in a file. Names that are empty, long or repeated are made usable.
         Positions that are not finite are not defined; `known` None makes the others PLACED. If the unit is
         not a known one, `remarks` says so. Raises InputError if there is no landmark."""
-        unit, about, axes, remarks = stated
+        unit, about, axes, remarks = notes
         if not len(names):
             raise InputError("holds no landmarks")
         positions = np.array(positions, np.float64).reshape(-1, len(names), 3)
@@ -119,7 +119,7 @@ class LandmarkSet:
             sigmas=np.stack([track.sigmas for track in held], axis=1),
             times=times,
             frames=np.arange(len(times)),
-            stated=Stated(unit, [(about or {}).get(name, "") for name in tracks]),
+            notes=LandmarkNotes(unit, [(about or {}).get(name, "") for name in tracks]),
         )
 
     def __len__(self) -> int:

@@ -16,7 +16,7 @@ from ....csv_text import text_of_cell
 from ....errors import InputError, shortened
 from ....scan.units import conversion, usable_unit
 from ...track import STATES, Known
-from ..landmark_set import LandmarkSet, Stated, check_cells
+from ..landmark_set import LandmarkNotes, LandmarkSet, check_cells
 from ._text import at_line, count_of, number_of, read_all
 
 LONG_COLUMNS = ("kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit")
@@ -153,7 +153,7 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
         sigmas=values[:, 3].reshape(shape),
         times=np.array([times.get(frame, math.nan) for frame in frames.tolist()]),
         frames=None if frame_at is None else frames,
-        stated=Stated(units.unit),
+        notes=LandmarkNotes(units.unit),
     )
 
 
@@ -210,7 +210,7 @@ def _wide(
         known=known,
         times=np.array(times),
         frames=None if frame_at is None else frames,
-        stated=Stated(units.unit),
+        notes=LandmarkNotes(units.unit),
     )
 
 

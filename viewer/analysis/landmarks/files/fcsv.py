@@ -12,7 +12,7 @@ import numpy as np
 
 from ....errors import shortened
 from ...track import Known
-from ..landmark_set import LandmarkSet, Stated
+from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import at_line, numbered_lines, three_numbers
 
 TITLE = "3D Slicer fiducials"
@@ -60,4 +60,4 @@ def read(path: Path) -> LandmarkSet:
         names.append(values.get("label", ""))
         about.append(values.get("desc", ""))
     grid = np.array(known, np.uint8)[np.newaxis]
-    return LandmarkSet.of(names, np.array([positions]), known=grid, stated=Stated("mm", about, axes))
+    return LandmarkSet.of(names, np.array([positions]), known=grid, notes=LandmarkNotes("mm", about, axes))

@@ -19,7 +19,7 @@ from ....errors import InputError, shortened
 from ....files import parsed_json
 from ....scan.units import conversion
 from ...track import STATES, Known
-from ..landmark_set import LandmarkSet, Stated
+from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import own_frames, own_number, read_all
 
 TITLE = "3D Slicer markups"
@@ -68,7 +68,7 @@ def read(path: Path) -> LandmarkSet:
         sigmas=np.concatenate([part["sigmas"] for part in parts])[np.newaxis],
         times=np.array([own_number(own, "time")]),
         frames=own_frames([own_number(own, "frame")]),
-        stated=Stated(
+        notes=LandmarkNotes(
             unit,
             [text for part in parts for text in part["about"]],
             parts[0]["axes"],

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError, shortened
-from ..landmark_set import LandmarkSet, Stated
+from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import (
     at_line,
     count_of,
@@ -96,7 +96,7 @@ def read(path: Path) -> LandmarkSet:
         np.array(positions).reshape(individuals, count, 3),
         times=_listed(own.get("times"), individuals),
         frames=None if frames is None else own_frames(frames.tolist()),
-        stated=Stated(own_unit(own), remarks=remarks),
+        notes=LandmarkNotes(own_unit(own), remarks=remarks),
     )
 
 

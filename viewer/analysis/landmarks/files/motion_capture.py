@@ -18,7 +18,7 @@ import numpy as np
 
 from ....errors import InputError
 from ...track import Known
-from ..landmark_set import LandmarkSet, Stated, check_cells
+from ..landmark_set import LandmarkNotes, LandmarkSet, check_cells
 from ._text import read_bytes, without_states
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def read(path: Path) -> LandmarkSet:
         known=np.where(there, Known.PLACED, Known.GAP),
         times=numbers / rate if rate > 0 and np.isfinite(rate) else None,
         frames=numbers,
-        stated=Stated(
+        notes=LandmarkNotes(
             _unit(reader),
             _texts(reader, "DESCRIPTIONS", count),
             remarks=[] if labels else ["Its points have no names: Scan4D numbers them"],

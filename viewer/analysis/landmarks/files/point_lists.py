@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ....errors import shortened
-from ..landmark_set import LandmarkSet, Stated
+from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import at_line, count_of, is_number, number_of, numbered_lines
 
 TITLE = "list of points"
@@ -78,7 +78,7 @@ def read(path: Path) -> LandmarkSet:
     flat = sum(len(row) == 2 for row in rows)
     remarks = [f"{flat} landmarks have two coordinates: Scan4D sets z to 0"] if flat else []
     places = [_place(row, has_flags) for row in rows]
-    return LandmarkSet.of(names, np.array([places]), stated=Stated(remarks=remarks))
+    return LandmarkSet.of(names, np.array([places]), notes=LandmarkNotes(remarks=remarks))
 
 
 def _place(row: list[float], has_flag: bool) -> list[float]:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ....errors import InputError
-from ..landmark_set import LandmarkSet, Stated
+from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import (
     at_line,
     count_of,
@@ -124,7 +124,7 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
         positions,
         times=np.array([own_number(specimen.own, "time") for specimen in specimens]),
         frames=own_frames([own_number(specimen.own, "frame") for specimen in specimens]),
-        stated=Stated(own_unit(own), remarks=remarks),
+        notes=LandmarkNotes(own_unit(own), remarks=remarks),
     )
 
 
