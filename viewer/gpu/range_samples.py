@@ -439,7 +439,7 @@ def _lens_steps(view: RangeView) -> int:
 
 
 def _view_levels(pods: Sequence[_Pod], levels: int) -> tuple[list[list[SampleLevel]], int, int]:
-    """Where all levels are, how many samples there are with what is left free between, and tiles."""
+    """All levels, the number of samples with the free room between levels, and the number of tiles."""
     view_levels, samples, tiles = [], 0, 0
     for pod in pods:
         own = []

@@ -26,7 +26,7 @@ _WIDE = (
 
 
 class LandmarkNotes(NamedTuple):
-    """What a file states of its landmarks beside numbers: see `LandmarkSet`. unit: any text."""
+    """Texts of a file of landmarks, see `LandmarkSet`. unit: any text."""
 
     unit: str | None = None
     about: Sequence[str] = ()
