@@ -104,7 +104,7 @@ class Derived(Protocol):
 
 
 class Derives(Enum):
-    """Where a window, which does not wait, runs a backend's `derive`."""
+    """The process that runs a backend's `derive` for a window, which does not wait."""
 
     NEVER = "never"  # the backend prepares nothing
     IN_PROCESS = "in a process"  # several poses at once
