@@ -113,7 +113,7 @@ def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, t
         )  # fmt: skip
         exporting.start()
         (told,) = app.told
-        assert "some frames are coloured by 'deviation'" in told
+        assert "some frames use the colours 'deviation'" in told
         assert exporting.task is None
 
 

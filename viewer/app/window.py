@@ -47,7 +47,7 @@ Area = tuple[int, int, int, int]  # left, top, width, height; screen coordinates
 _LEAST_SIDE = 160  # width and height that a window keeps
 _GRIP = 80  # of its upper edge that must be on a screen, so that a mouse can drag it
 _FARTHEST = 2**15  # from the origin of the screens
-Pixels = Annotated[int, Kind("a position on screens", lambda value: abs(value) < _FARTHEST)]
+Pixels = Annotated[int, Kind("a position on the screen, in pixels", lambda value: abs(value) < _FARTHEST)]
 
 
 @dataclass(frozen=True)

@@ -149,7 +149,10 @@ class Exporting(WindowPart):
         """
         name = self.session.document.look.color_by
         if self.choices.what == export_plan.FRAMES and name in self.session.laid.names:
-            self.note_of_work(f"Cannot export: some frames are coloured by '{name}', which a tool computes.")
+            self.note_of_work(
+                f"Cannot export: some frames use the colours '{name}', which a tool computes. Choose "
+                "other colours."
+            )
             return
         there = export_plan.present(self.choices, self.count)
         shown, choices, timeline = self._entry(), self.choices, self.playback.timeline
