@@ -23,6 +23,7 @@ from viewer.analysis.words import measured_in_words, with_uncertainty
         (1e-15, 2e-17, "1e-15 ± 2e-17 mm (95 %)"),
         (12.3456, math.nan, "12.3456 mm"),
         (12.3456, 0.0, "12.3456 mm"),
+        (-0.01, 0.3, "0.0 ± 0.3 mm (95 %)"),
         (math.nan, 0.1, "-"),
     ],
 )

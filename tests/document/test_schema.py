@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 import pytest
 
 from viewer.camera import Camera
-from viewer.document.schema import Kind, PoseNumber, migrated, plain, structured, unread
+from viewer.document.schema import Kind, PoseNumber, check_format, plain, structured, unread
 from viewer.errors import InputError
 from viewer.look import Look
 
@@ -80,16 +80,11 @@ def test_what_is_wrong_is_told_with_its_place(data: Any, words: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-def test_older_data_becomes_what_is_read_now_step_by_step() -> None:
-    steps = {
-        1: lambda data: data | {"angle": data["degrees"] * 2},
-        2: lambda data: {name: value for name, value in data.items() if name != "degrees"},
-    }
-    assert migrated({"format": 1, "degrees": 3}, 3, steps, "f") == {"format": 3, "angle": 6}
-    assert migrated({"format": 3, "angle": 6}, 3, steps, "f") == {"format": 3, "angle": 6}
-    for unknown in (0, 4, "3", True, None, [1], 1.0):
+def test_another_format_is_refused_with_the_one_that_is_read() -> None:
+    check_format({"format": 3}, 3, "f")
+    for unknown in (0, 4, "3", True, None, [1], 1.0, 3.0):
         with pytest.raises(InputError, match="reads 3"):
-            migrated({"format": unknown}, 3, steps, "f")
+            check_format({"format": unknown}, 3, "f")
 
 
 def test_what_nothing_here_reads_is_kept_unless_it_could_not_be_written_again() -> None:

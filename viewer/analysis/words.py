@@ -24,7 +24,7 @@ def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
     )  # two digits from 1.0 to 1.9
     if not _DECIMALS[0] <= decimals <= _DECIMALS[1]:
         return f"{value:.6g} ± {uncertainty:.1g} {unit}".rstrip()
-    shown = (f"{round(number, decimals):.{max(decimals, 0)}f}" for number in (value, uncertainty))
+    shown = (f"{round(number, decimals) + 0.0:.{max(decimals, 0)}f}" for number in (value, uncertainty))
     return f"{' ± '.join(shown)} {unit}".rstrip()
 
 

@@ -24,10 +24,6 @@ _PLAYING_PATIENCE = 2.0  # and on a pose while others are shown
 _WIDTH = 20.0  # of a bar in the list, in heights of the font
 _LINE = 0.12  # height of the line that shows how far work is, in heights of the font
 _TICK = 0.1  # seconds between changes of what is shown
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
-)  # fmt: skip
 
 
 @dataclass(eq=False)
@@ -121,7 +117,7 @@ class Tasks(WindowPart):
         left, top, width, height = view
         corner = ImVec2(left + width, top + height) - imgui.get_style().window_padding
         imgui.set_next_window_pos(corner, imgui.Cond_.always, ImVec2(1, 1))
-        imgui.begin("work", flags=_FLAGS)
+        imgui.begin("work", flags=widgets.FLOATING)
         self.draw(0.5 * width)
         imgui.end()
 

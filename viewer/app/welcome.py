@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from ..scan.open import DEMO
+from . import widgets
 from .part import ViewArea, WindowPart, remembered
 from .session import Session
 
@@ -17,11 +18,7 @@ _LINES = (
     (icons.ICON_FA_RULER, "M measures between two points"),
     (icons.ICON_FA_KEYBOARD, "F1 shows all keys"),
 )
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
-    | imgui.WindowFlags_.always_auto_resize
-)  # fmt: skip
+_FLAGS = widgets.FLOATING | imgui.WindowFlags_.no_inputs | imgui.WindowFlags_.no_nav
 _TEXT_AT = 2.2  # in heights of the font
 
 

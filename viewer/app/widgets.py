@@ -28,6 +28,10 @@ _TOOLTIP = 60  # characters of a line
 _NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
 _FACTS = 6.0  # where facts begin, in heights of the font
 _NARROW = 15.0  # width of a window, in heights of the font, below which labels stand over their widgets
+FLOATING = (  # flags of a small window that floats over others
+    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
+)  # fmt: skip
 ICON_WIDTH = 1.3  # of a button with an icon, in heights of frames
 _DRAG_SPEED = 0.005  # share of a number without limits that a pixel adds
 
@@ -267,6 +271,32 @@ def edit_color(name: str, value: str) -> str:
 def _edit_text(name: str, value: str) -> str:
     entered, new = imgui.input_text(name, value, imgui.InputTextFlags_.enter_returns_true.value)
     return new if entered else value
+
+
+class NameField:
+    """A field that gives something another name. subject: what it is for now, None for nothing."""
+
+    def __init__(self) -> None:
+        self.subject: object = None
+        self._text = ""
+        self._is_asked = False
+
+    def begin(self, subject: object, name: str) -> None:
+        """Have a name typed, beginning with this one."""
+        self.subject, self._text, self._is_asked = subject, name, True
+
+    def draw(self, width: float) -> str | None:
+        """Declare the field; the new name once it is typed. Enter or a click elsewhere takes it, Escape does
+        not."""
+        imgui.set_next_item_width(width)
+        if self._is_asked:
+            imgui.set_keyboard_focus_here()
+            self._is_asked = False
+        _, self._text = imgui.input_text("##name", self._text, imgui.InputTextFlags_.auto_select_all.value)
+        if not imgui.is_item_deactivated():
+            return None
+        self.subject = None
+        return None if imgui.is_key_pressed(imgui.Key.escape) else self._text
 
 
 def edit_path(name: str, path: str, flags: int = 0) -> tuple[bool, str]:

@@ -72,8 +72,8 @@ from .schema import (
     Stamp,
     Time,
     Unit,
+    check_format,
     is_object,
-    migrated,
     plain,
     read_json,
     structured,
@@ -317,7 +317,7 @@ class Recording:
                 path,
                 "Use a .json file that the window has recorded, or a saved picture",
             )
-        data = migrated(data, FORMAT, {}, path)
+        check_format(data, FORMAT, path)
         entries = data.get("entries")
         if entries is None:
             complete = {name: value for name, value in data.items() if name not in _head()}

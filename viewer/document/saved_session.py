@@ -33,8 +33,8 @@ from .schema import (
     PoseNumber,
     ReadBy,
     ScanName,
+    check_format,
     is_object,
-    migrated,
     plain,
     read_json,
     structured,
@@ -75,11 +75,11 @@ class SavedSession:
         """
         if not is_object(data) or "document" not in data:
             raise InputError("is not a session", where, DAMAGED)
-        current = migrated(data, FORMAT, {}, where)
+        check_format(data, FORMAT, where)
         known = {field.name for field in fields(cls)}
-        session = structured(cls, {name: current[name] for name in known & current.keys()}, where)
-        others = current.keys() - known - {"format", "version"}
-        left = {f"session.{name}": unread(current[name]) for name in sorted(others)}
+        session = structured(cls, {name: data[name] for name in known & data.keys()}, where)
+        others = data.keys() - known - {"format", "version"}
+        left = {f"session.{name}": unread(data[name]) for name in sorted(others)}
         return session._with_unread(left) if left else session
 
     def _with_unread(self, left: dict[str, Any]) -> SavedSession:

@@ -286,29 +286,15 @@ def unread(value: Any, depth: int = 0) -> Any:
     return value
 
 
-def migrated(
-    data: Mapping[str, Any],
-    to: int,
-    steps: Mapping[int, Callable[[dict[str, Any]], dict[str, Any]]],
-    where: object,
-) -> dict[str, Any]:
-    """JSON data in the form of the format `to`.
-
-    steps: format -> what makes of data in that format data in the next one. Raises InputError where the
-    data has no format, or one that is not known.
-    """
+def check_format(data: Mapping[str, Any], expected: int, where: object) -> None:
+    """Check that JSON data has a format. Raises InputError where it has none, or another one."""
     from .. import __version__
 
     found = data.get("format")
-    if type(found) is not int or not (found == to or found in steps):
-        what = f"has the format {found!r:.40}, but this version of Scan4D ({__version__}) reads {to}"
-        kind = NewerFormatError if type(found) is int and found > to else InputError
+    if type(found) is not int or found != expected:
+        what = f"has the format {found!r:.40}, but this version of Scan4D ({__version__}) reads {expected}"
+        kind = NewerFormatError if type(found) is int and found > expected else InputError
         raise kind(what, where, f"Use version {data.get('version')!r:.40}, which wrote it")
-    current = dict(data)
-    while found < to:
-        current = steps[found](current)
-        found += 1
-    return current | {"format": to}
 
 
 # --- how the library reads ------------------------------------------------------------------

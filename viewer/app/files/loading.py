@@ -22,10 +22,6 @@ from .scans import title
 
 _PATIENCE = 0.3  # seconds that may pass before a wait is shown
 _WIDTH = 24.0  # in heights of the font
-_FLAGS = (
-    imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
-    | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
-)  # fmt: skip
 
 
 class Awaited(NamedTuple):
@@ -89,7 +85,7 @@ class Loading(WindowPart):
         middle = ImVec2(left + width / 2, top + height / 2)
         imgui.set_next_window_pos(middle, imgui.Cond_.always, ImVec2(0.5, 0.5))
         imgui.set_next_window_size_constraints(ImVec2(own_width, 0), ImVec2(own_width, 1e4))
-        imgui.begin("loading", flags=_FLAGS)
+        imgui.begin("loading", flags=widgets.FLOATING)
         room = imgui.get_content_region_avail().x
         imgui.text_unformatted(widgets.fitted(printable(words), room))
         style = imgui.get_style()

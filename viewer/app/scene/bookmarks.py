@@ -22,10 +22,7 @@ _LONGEST = 60  # letters of a name
 
 @dataclass(eq=False)
 class Bookmarks(WindowPart):
-    """Actions on the bookmarks of the document.
-
-    editing: the one whose name is being typed, None while none is.
-    """
+    """Actions on the bookmarks of the document. renaming: the field for the name of one."""
 
     name = "bookmarks"
     CONDITIONS = {"bookmarks": lambda bookmarks: bool(bookmarks.all)}
@@ -33,10 +30,8 @@ class Bookmarks(WindowPart):
     note_of_scan: Callable[[str], None]
 
     def __post_init__(self) -> None:
-        self.editing: Bookmark | None = None
-        self._is_asked = False  # for its name, but the field is not there yet
+        self.renaming = widgets.NameField()
         self._last: Bookmark | None = None  # gone to or added
-        self._text = ""
 
     @property
     def all(self) -> tuple[Bookmark, ...]:
@@ -97,8 +92,9 @@ class Bookmarks(WindowPart):
         deleted = None
         for number, bookmark in enumerate(self.all):
             imgui.push_id(number)
-            if bookmark is self.editing:
-                self._draw_editing(number)
+            if bookmark is self.renaming.subject:
+                if (name := self.renaming.draw(-1)) is not None:
+                    self.rename(number, name)
             else:
                 deleted = number if self._draw_row(number, bookmark) else deleted
             imgui.pop_id()
@@ -122,21 +118,9 @@ class Bookmarks(WindowPart):
             widgets.tooltip(bookmark.name)
         imgui.same_line(0, gap)
         if widgets.icon_button(icons.ICON_FA_PEN_TO_SQUARE, "Rename"):
-            self.editing, self._text, self._is_asked = bookmark, bookmark.name, True
+            self.renaming.begin(bookmark, bookmark.name)
         imgui.same_line(0, gap)
         return widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
-
-    def _draw_editing(self, number: int) -> None:
-        """A field for the name. Enter or a click elsewhere keeps it, Escape does not."""
-        imgui.set_next_item_width(-1)
-        if self._is_asked:
-            imgui.set_keyboard_focus_here()
-            self._is_asked = False
-        _, self._text = imgui.input_text("##name", self._text, imgui.InputTextFlags_.auto_select_all)
-        if imgui.is_item_deactivated():
-            if not imgui.is_key_pressed(imgui.Key.escape):
-                self.rename(number, self._text)
-            self.editing = None
 
     COMMANDS = (
         Command("bookmark_add", "Add bookmark", add, "Ctrl+B", "view"),

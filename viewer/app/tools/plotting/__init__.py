@@ -20,6 +20,7 @@ from ....errors import InputError
 from ....output.overlays import NOTHING_DRAWN, DrawnMarks
 from ....output.plots import PLOT_SUFFIXES, CurvePlot
 from ....scan.inputs import refuse_input
+from ... import widgets
 from ...commands import Command, Menu
 from ...file_dialog import SAVE, FileDialog
 from ...scene.canvas import Canvas, ScreenView
@@ -33,7 +34,6 @@ from .lasso import Lasso
 from .lines import MeasureLines
 from .measurer import Measurer
 from .paths import Paths
-from .renaming import Renaming
 from .shown import Curve, Shown
 from .words import numbers_in_words
 
@@ -59,7 +59,7 @@ class Tool:
         self.lasso = Lasso(context)
         self.measurer = Measurer(context)
         self.pointed: str | None = None
-        self.renaming = Renaming()
+        self.renaming = widgets.NameField()
         self.saving = FileDialog(
             SAVE, "Export plot", "A table (.csv) or a picture (.png, .svg) of the plot",
             PLOT_SUFFIXES, self._save, context.redraw,

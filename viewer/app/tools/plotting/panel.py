@@ -62,7 +62,7 @@ def _draw_measures(tool: Tool) -> None:
             tool.choose("Show measure", hidden=others if is_shown else (*others, measure.name))
         imgui.same_line()
         room = right - imgui.get_cursor_pos_x() - 3 * imgui.get_frame_height()
-        if tool.renaming.name == measure.name:
+        if tool.renaming.subject == measure.name:
             if (name := tool.renaming.draw(room)) is not None:
                 tool.rename(measure.name, name)
         else:
@@ -70,7 +70,7 @@ def _draw_measures(tool: Tool) -> None:
             widgets.tooltip(f"{measure.name}: {measure.kind} of {', '.join(measure.landmarks)}")
         imgui.same_line(right - 2.7 * imgui.get_frame_height())
         if widgets.icon_button(icons.ICON_FA_PEN_TO_SQUARE, "Rename"):
-            tool.renaming.begin(measure.name)
+            tool.renaming.begin(measure.name, measure.name)
         imgui.same_line(right - 1.3 * imgui.get_frame_height())
         if widgets.icon_button(icons.ICON_FA_TRASH, "Delete"):
             tool.delete(measure.name)
