@@ -14,6 +14,7 @@ from pathlib import Path
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
+from ...document.saved_session import is_session
 from ...files import absolute, printable, working_folder
 from ...scan.listing import Listed
 from ...task import Task, in_background
@@ -297,7 +298,7 @@ class FolderView:
         em, left = imgui.get_font_size(), imgui.get_cursor_pos_x()
         beside = imgui.text_disabled if faint else imgui.text
         imgui.align_text_to_frame_padding()
-        beside(_ICONS[row.kind])
+        beside(icons.ICON_FA_BOOKMARK if is_session(Path(row.path)) else _ICONS[row.kind])
         imgui.same_line(left + _ICON_ROOM * em)
         columns = [
             (_COUNT_ROOM * em, f"{row.frames} frames" if row.frames > 1 else size_in_words(row.size)),
