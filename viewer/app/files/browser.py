@@ -203,7 +203,8 @@ class Browser(WindowPart):
         self._previewer.draw_picture()
         if (row := self._view.row) is not None:
             imgui.text_wrapped(printable(row.title))
-            imgui.text_wrapped(printable(self._previewer.words))
+            words = "Session" if is_session(Path(row.path)) else printable(self._previewer.words)
+            imgui.text_wrapped(words)
             shown = [size_in_words(row.size), date_in_words(row.changed, "%Y-%m-%d %H:%M")]
             widgets.faint(", ".join(filter(None, shown)))
 

@@ -32,7 +32,7 @@ _MARKS = {
     "measure_lines": "Measures",
     "plot": "Include plot",
 }
-_FIRST_MARKS = 0.55  # of a row of boxes, for the first one
+_FIRST_MARKS = 0.52  # of a row of boxes, for the first one
 _HELP = {parameter.name: parameter.help for parameter in (*describe(Choices), *describe(Marks))}
 
 
