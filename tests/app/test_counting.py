@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -14,7 +13,6 @@ from viewer.app.scene.counting import Counting, words
 from viewer.app.scene.viewport import Viewport
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
-from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.scan.pose import Pose
 
@@ -24,13 +22,6 @@ PARAMS = find_backend("surfels").params({"passes": "one"})
 REQUEST = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "surfels", PARAMS)
 SIZE = (60, 40)
 LATER = 60.0  # seconds
-
-
-@pytest.fixture
-def viewport() -> Iterator[Viewport]:
-    viewport = Viewport(shared_renderer(), (0, 0, *SIZE))
-    yield viewport
-    viewport.release()
 
 
 def counting_of(viewport: Viewport) -> Counting:

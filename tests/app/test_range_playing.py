@@ -20,7 +20,6 @@ from viewer.app.scene.viewport import Viewport
 from viewer.app.session import Session
 from viewer.backends import Backend
 from viewer.camera import Camera
-from viewer.drawing.renderer import shared_renderer
 from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.scan import formats
@@ -43,13 +42,6 @@ def timeline(tmp_path: Path) -> Iterator[Timeline]:
         formats.write(tmp_path / f"f{index}.exr", merge(views), views)
     with open_scan(tmp_path) as timeline:
         yield timeline
-
-
-@pytest.fixture
-def viewport() -> Iterator[Viewport]:
-    viewport = Viewport(shared_renderer(), (0, 0, *SIZE))
-    yield viewport
-    viewport.release()
 
 
 def play(timeline: Timeline, viewport: Viewport, backend: Backend | str) -> list[Pose]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
@@ -29,13 +28,6 @@ from viewer.scan.pose import Pose
 POSE = Pose(0, 0.0, "sphere", sphere(3000))
 REQUEST = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "points")
 SIZE = (60, 40)
-
-
-@pytest.fixture
-def viewport() -> Iterator[Viewport]:
-    viewport = Viewport(shared_renderer(), (0, 0, *SIZE))
-    yield viewport
-    viewport.release()
 
 
 def test_a_pixel_is_read_once_until_mouse_or_picture_move(

@@ -78,11 +78,6 @@ def click_point(app: RunningApp, number: int) -> None:
     app.settle()
 
 
-def press(app: RunningApp, key: str) -> None:
-    app.screen.do("key", key)
-    app.settle()
-
-
 def ctrl(screen: Screen, key: str) -> None:
     """As fingers do it: one key after the other."""
     screen.do("key", f"ctrl+{key}")
@@ -122,8 +117,8 @@ def test_tools_stand_beside_each_other_under_the_timeline(screen: Screen, tmp_pa
         (folder / f"{name}.py").write_text(BELOW.format(name=name, key=key, pressed=pressed))
     with running_app(screen, tmp_path, scan, before=use_tools(folder)) as app:
         left, top, width, height = app.view()
-        press(app, "alt+a")
-        press(app, "alt+b")
+        app.press("alt+a")
+        app.press("alt+b")
         lower = app.view()[3]
         assert app.view()[:3] == (left, top, width)
         assert lower < height - 150
@@ -134,7 +129,7 @@ def test_tools_stand_beside_each_other_under_the_timeline(screen: Screen, tmp_pa
         assert app.view()[3] == pytest.approx(lower - 40, abs=3)
         app.act("drawer/two", ("item_click", "Press two"))
         app.told("switched off .*two until the next start: ValueError: two is pressed")
-        press(app, "alt+a")
+        app.press("alt+a")
         assert app.view()[3] == height
 
 
@@ -143,10 +138,10 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
     with running_app(screen, tmp_path, scan) as app:
-        press(app, "k")
+        app.press("k")
         click_point(app, UPPER)
         click_point(app, LOWER)
-        press(app, "d")
+        app.press("d")
 
         ctrl(screen, "c")
         app.told("Copied 1 curves")
@@ -189,7 +184,7 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
 
 def check_saved_picture(app: RunningApp, folder: Path) -> None:
     """A picture that is saved has landmarks, ways and measures as the view has them, and is drawn again."""
-    press(app, "p")
+    app.press("p")
     saved = Path(app.told(r"Saved (.+\.png)")[1])
     picture = np.asarray(Image.open(saved).convert("RGB")).astype(int)
     app.send_notes_away()  # that of the saved picture lies over the view
@@ -238,11 +233,11 @@ def test_curves_are_saved_and_ways_are_drawn_and_held_still(
 ) -> None:
     pytest.importorskip("matplotlib")
     with running_app(screen, tmp_path, scan) as app:
-        press(app, "k")
+        app.press("k")
         for number in (UPPER, LOWER, 0, 14):
             click_point(app, number)
-        press(app, "Escape")
-        press(app, "d")
+        app.press("Escape")
+        app.press("d")
         app.choose(DRAWER, "##order", "###speed")
         app.settle()
         saved = save_as(app, "speed.csv")
@@ -251,7 +246,7 @@ def test_curves_are_saved_and_ways_are_drawn_and_held_still(
         assert save_as(app, "speed.svg").read_text().count("<svg") == 1
         assert save_as(app, "speed.png").read_bytes()[:4] == b"\x89PNG"
 
-        press(app, "d")
+        app.press("d")
         for mode in ("against", "repeats", "time"):
             app.choose(DRAWER, "##mode", f"###{mode}")
             app.settle()

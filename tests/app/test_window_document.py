@@ -58,9 +58,7 @@ class Hands:
         self.middle = left + width // 2, top + height // 2
 
     def press(self, *keys: str) -> None:
-        for key in keys:
-            self.app.screen.do("key", key)
-            self.app.settle()
+        self.app.press(*keys)
 
     def move(self, right: int = 0, down: int = 0) -> None:
         self.app.screen.do("mousemove", self.middle[0] + right, self.middle[1] + down)

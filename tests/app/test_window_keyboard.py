@@ -29,13 +29,6 @@ def app(running: RunningApp) -> RunningApp:
     return running
 
 
-def press(app: RunningApp, *keys: str) -> None:
-    """As fingers do it: one after the other."""
-    for key in keys:
-        app.screen.do("key", key)
-        app.settle()
-
-
 def framed(app: RunningApp, *box: int) -> int:
     """How many pixels of a part of the screen have the colour of what frames the widget with the keyboard.
 
@@ -69,17 +62,17 @@ def looks_from(app: RunningApp) -> list[int]:
 @pytest.mark.slow
 def test_alt_opens_the_menus_and_arrows_and_enter_choose(app: RunningApp) -> None:
     assert looks_from(app) == [0, 0, 1]
-    press(app, "Alt_L", "Right", "Right")  # File, Edit, View
-    press(app, "Down", "Down", "Down", "Right", "Down", "Return")  # From, Back
+    app.press("Alt_L", "Right", "Right")  # File, Edit, View
+    app.press("Down", "Down", "Down", "Right", "Down", "Return")  # From, Back
     assert looks_from(app) == [0, 0, -1]
 
 
 def test_alt_and_a_letter_open_a_menu_and_escape_gives_the_view_its_keys_back(app: RunningApp) -> None:
-    press(app, "alt+v", "Down", "Down", "Down", "Right", "Return")
-    press(app, "alt+t", "Escape")
-    press(app, "Alt_L", "Right", "Left", "Escape")
+    app.press("alt+v", "Down", "Down", "Down", "Right", "Return")
+    app.press("alt+t", "Escape")
+    app.press("Alt_L", "Right", "Left", "Escape")
     assert app.settle().frame == 0
-    press(app, "Right")
+    app.press("Right")
     assert app.settle().frame == 1
 
 
@@ -91,37 +84,37 @@ def test_alt_with_something_else_opens_nothing(app: RunningApp) -> None:
     app.screen.do("mousemove", left + width // 2, top + height // 2)
     app.screen.do("keydown", "Alt_L", "click", 1, "keyup", "Alt_L")
     app.settle()
-    press(app, "Right")  # in a menu it would go to the next
+    app.press("Right")  # in a menu it would go to the next
     assert app.settle().frame == 1
 
 
 def test_f6_leads_through_panel_and_timeline_and_back(app: RunningApp) -> None:
     ticks, loop = framed(app, *panel(app)), framed(app, *timeline(app))  # of what is on
-    press(app, "F6")
+    app.press("F6")
     assert framed(app, *panel(app)) > ticks + 100
-    press(app, "Right", "space", "space")  # in the panel these are not the view's
+    app.press("Right", "space", "space")  # in the panel these are not the view's
     assert (app.settle().frame, app.state.is_playing) == (0, False)
-    press(app, "ctrl+F6")
+    app.press("ctrl+F6")
     assert framed(app, *panel(app)) == ticks
     assert framed(app, *timeline(app)) > loop + 50
-    press(app, "F6", "Right")
+    app.press("F6", "Right")
     assert app.settle().frame == 1
     assert framed(app, *timeline(app)) == loop
 
 
 def test_a_widget_of_the_panel_is_worked_by_keys(app: RunningApp) -> None:
     assert app.settle().clicking is None
-    press(app, "F6", "Home", "Return")  # closes the first section
-    press(app, "Tab", "Tab", "Tab", "Return")  # over the next head and the template to a button
+    app.press("F6", "Home", "Return")  # closes the first section
+    app.press("Tab", "Tab", "Tab", "Return")  # over the next head and the template to a button
     assert app.settle().clicking == "landmarks"
-    press(app, "Return")
+    app.press("Return")
     assert app.settle().clicking is None
-    press(app, "Home", "Return")
+    app.press("Home", "Return")
 
 
 @pytest.mark.slow
 def test_the_timeline_plays_and_pauses_by_its_button(app: RunningApp) -> None:
-    press(app, "shift+F6", "Right", "Right")
+    app.press("shift+F6", "Right", "Right")
     app.screen.do("key", "Return")
     app.see(is_playing=True)
     app.screen.do("key", "Return")
@@ -134,12 +127,12 @@ def test_the_timeline_plays_and_pauses_by_its_button(app: RunningApp) -> None:
 
 def test_the_mouse_takes_the_keyboard_back(app: RunningApp) -> None:
     ticks = framed(app, *panel(app))
-    press(app, "F6")
+    app.press("F6")
     left, top, width, height = app.view()
     app.screen.do("mousemove", left + width // 2, top + height // 2, "click", 1)
     app.settle()
     assert framed(app, *panel(app)) == ticks
-    press(app, "Right")
+    app.press("Right")
     assert app.settle().frame == 1
 
 
@@ -152,23 +145,23 @@ def test_the_view_is_turned_panned_and_zoomed_by_keys(app: RunningApp) -> None:
     steps = np.degrees(np.arccos(start.rotation()[2] @ turned.rotation()[2])) / 15
     assert steps == pytest.approx(max(round(steps), 2))
     assert turned.rotation()[2][0] > 0, "as a drag to the left"
-    press(app, "ctrl+z")
+    app.press("ctrl+z")
     assert Camera.from_json(app.settle().camera) == start, "they are one step"
-    press(app, "shift+Up")
+    app.press("shift+Up")
     moved = Camera.from_json(app.settle().camera)
     steps = 12 * np.subtract(start.target, moved.target)[1] / start.view_height
     assert steps == pytest.approx(max(round(steps), 1), abs=1e-3)
-    press(app, "equal")
+    app.press("equal")
     near = Camera.from_json(app.settle().camera).distance
     assert near < moved.distance
-    press(app, "minus")
+    app.press("minus")
     assert Camera.from_json(app.settle().camera).distance > near
 
 
 @pytest.mark.slow
 def test_the_dialog_that_exports_is_filled_in_by_keys(app: RunningApp) -> None:
-    press(app, "ctrl+e")
+    app.press("ctrl+e")
     assert app.settle().is_export_open
-    press(app, "shift+Tab", "shift+Tab", "Return")  # from the last button, Cancel, to the one before
+    app.press("shift+Tab", "shift+Tab", "Return")  # from the last button, Cancel, to the one before
     path = app.told(r"Saved (.+\.png)")[1]
     assert Path(path).stat().st_size > 1000

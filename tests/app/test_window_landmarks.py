@@ -54,13 +54,6 @@ def click(app: RunningApp, point: NDArray[np.float64]) -> State:
     return app.settle()
 
 
-def press(app: RunningApp, *keys: str) -> State:
-    for key in keys:
-        app.screen.do("key", key)
-        app.settle()
-    return app.settle()
-
-
 def part(state: State) -> dict[str, Any]:
     """What the document holds of landmarks."""
     held: dict[str, Any] = state.document["parts"]["landmarks"]
@@ -98,7 +91,7 @@ def test_21_landmarks_take_21_clicks_and_are_followed(screen: Screen, tmp_path: 
         assert list(state.landmarks) == names, "they are in the order of the template"
         for name, number in zip(names, numbers, strict=True):
             assert is_at(state.landmarks[name][1], grid(1)[number]), name
-        press(app, "period")
+        app.press("period")
         state = app.see(lambda state: all(one[0] == "tracked" for one in state.landmarks.values()))
         for name, number in zip(names, numbers, strict=True):
             assert math.dist(state.landmarks[name][1], grid(1.25)[number]) < 1.25 * CLICK
@@ -110,7 +103,7 @@ def test_the_window_is_at_rest_only_when_landmarks_are_followed(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:
     with running_app(screen, tmp_path, scan) as app:
-        press(app, "k")
+        app.press("k")
         for number, name in ((34, "Landmark 1"), (60, "Landmark 2")):
             state = click(app, grid(1)[number])
             assert state.followed[name], "following begins a moment after the click, and has ended"
@@ -121,7 +114,7 @@ def test_the_window_is_at_rest_only_when_landmarks_are_followed(
 def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path: Path, scan: Path) -> None:
     points = [grid(scale) for scale in GROWTH]
     with running_app(screen, tmp_path, scan) as app:
-        press(app, "k")
+        app.press("k")
         app.see(clicking="landmarks")
         click(app, points[0][34])
         click(app, points[0][60])
@@ -130,23 +123,23 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
 
         assert "Arrow keys move Landmark 3." in state.prompt
         before = keys_of(state, "Landmark 3")[0]
-        after = keys_of(press(app, "Right", "Right", "Up"), "Landmark 3")[0]
+        after = keys_of(app.press("Right", "Right", "Up"), "Landmark 3")[0]
         pixel = (after[0] - before[0]) / 2
         assert 0 < pixel < CLICK
         assert after[1] - before[1] == pytest.approx(pixel, rel=0.2), "arrows move it by a pixel each"
-        state = press(app, "ctrl+z", "ctrl+z", "ctrl+z")
+        state = app.press("ctrl+z", "ctrl+z", "ctrl+z")
         assert keys_of(state, "Landmark 3")[0] == before
         screen.do("keydown", "Right")
         app.see(lambda state: keys_of(state, "Landmark 3")[0][0] > before[0] + 3 * pixel)
         screen.do("keyup", "Right")
         app.settle()
-        state = press(app, "ctrl+z")
+        state = app.press("ctrl+z")
         assert keys_of(state, "Landmark 3")[0] == before, "what a held key does is one step"
 
-        press(app, "period")
+        app.press("period")
         state = app.see(lambda state: state.landmarks["Landmark 1"][0] == "tracked")
         assert "Arrow keys" not in state.prompt
-        state = press(app, "Left", "Right", "Right", "Left")
+        state = app.press("Left", "Right", "Right", "Left")
         assert (state.frame, state.prompt.count("Arrow keys")) == (1, 0), "arrows go from frame to frame"
         assert keys_of(state, "Landmark 3") == {0: before}
         start, stop = on_screen(app, points[1][34]), on_screen(app, points[1][50])
@@ -155,27 +148,27 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         assert is_at(keys[0], points[0][34]), "the frame before stays as it was"
         assert math.dist(keys[1], points[1][50]) < 1.25 * CLICK, "the frame that is dragged in has a key"
         assert dragged.camera == state.camera, "the view stays"
-        state = press(app, "shift+Delete")
+        state = app.press("shift+Delete")
         assert list(keys_of(state, "Landmark 1")) == [0]
 
-        state = press(app, "shift+x")
+        state = app.press("shift+x")
         assert state.landmarks["Landmark 1"][0] == "not visible in this frame"
-        state = press(app, "ctrl+Home")
+        state = app.press("ctrl+Home")
         assert state.landmarks["Landmark 1"][0] == "placed"
 
         app.act(PANEL, ("item_input_value", "##name", "mouth"))
         state = app.settle()
         assert "mouth" in state.landmarks
-        state = press(app, "Delete")
+        state = app.press("Delete")
         assert list(state.landmarks) == ["Landmark 2", "Landmark 3"]
-        state = press(app, "ctrl+z", "ctrl+z")
+        state = app.press("ctrl+z", "ctrl+z")
         assert list(state.landmarks) == ["Landmark 1", "Landmark 2", "Landmark 3"]
 
-        press(app, "Escape")
+        app.press("Escape")
         app.see(clicking=None)
         state = click(app, points[0][70])
         assert len(state.landmarks) == 3, "clicks place none any longer"
-        state = press(app, "Right")
+        state = app.press("Right")
         assert state.frame == 1, "arrows go from frame to frame again"
         assert "Traceback" not in app.log()
 
@@ -198,9 +191,9 @@ def test_own_template_with_a_skipped_one_and_a_mirrored_one(
         click(app, points[64])
         screen.do("mousemove", *on_screen(app, points[10]))
         app.settle()
-        state = press(app, "a")
+        state = app.press("a")
         assert is_at(keys_of(state, "left")[0], points[70]), "the mirrored place is taken"
-        state = press(app, "ctrl+z", "x")
+        state = app.press("ctrl+z", "x")
         assert state.landmarks["left"][0] == "skipped"
         assert "Traceback" not in app.log()
 
@@ -208,14 +201,14 @@ def test_own_template_with_a_skipped_one_and_a_mirrored_one(
 @pytest.mark.slow
 def test_present_landmarks_become_a_template(screen: Screen, tmp_path: Path, scan: Path) -> None:
     with running_app(screen, tmp_path, scan) as app:
-        press(app, "k")
+        app.press("k")
         for number in (60, 74):
             click(app, grid(1)[number])
         app.choose(PANEL, "##partner", "###partner Landmark 1")
-        press(app, "d")
+        app.press("d")
         app.choose(PANEL, "##template", "###save template")
         app.settle()
-        press(app, "ctrl+a")
+        app.press("ctrl+a")
         screen.do("type", "--delay", 40, "pair")
         screen.do("key", "Return")
         app.told("Saved .*pair.json, 2 landmarks and 1 measures")
@@ -240,7 +233,7 @@ def test_present_landmarks_become_a_template(screen: Screen, tmp_path: Path, sca
 def test_notes_are_pinned_and_kept(screen: Screen, tmp_path: Path, scan: Path) -> None:
     points = grid(1)
     with running_app(screen, tmp_path, scan) as app:
-        press(app, "j")
+        app.press("j")
         state = click(app, points[34])
         screen.do("type", "--delay", 40, "scar")
         app.settle()
@@ -250,7 +243,7 @@ def test_notes_are_pinned_and_kept(screen: Screen, tmp_path: Path, scan: Path) -
         place, frame = part(state)["notes"]
         assert (place["text"], place["frame"], frame["text"], frame["position"]) == ("scar", 0, "blink", None)
         assert is_at(place["position"], points[34])
-        press(app, "Return")
+        app.press("Return")
         app.process.terminate()
         assert app.process.wait(PATIENCE) == 0
     assert len(stored_of(tmp_path, scan).document.part(Landmarks).notes) == 2
@@ -281,11 +274,11 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
         app.told("Imported 2 landmarks from here.mrk.json")
         state = app.see(lambda state: "B" in state.landmarks)
         assert is_at(state.landmarks["A"][1], points[34])
-        press(app, "Right")
+        app.press("Right")
         state = app.see(lambda state: state.landmarks["A"][0] == "tracked")
         assert math.dist(state.landmarks["A"][1], 1.25 * points[34]) < 1.25 * CLICK
         for typed, frames in (("all.c3d", 3), ("one.mrk.json", 1)):
-            press(app, "ctrl+l", "ctrl+a")
+            app.press("ctrl+l", "ctrl+a")
             assert app.state.fields["##name"] == "scan_landmarks.mrk.json"
             screen.do("type", "--delay", 40, typed)
             screen.do("key", "Return")

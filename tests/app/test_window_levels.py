@@ -73,11 +73,6 @@ def app(running: RunningApp) -> Iterator[RunningApp]:
     assert "Traceback" not in running.log()
 
 
-def press(app: RunningApp, key: str) -> None:
-    app.screen.do("key", key)
-    app.settle()
-
-
 def holes(app: RunningApp) -> int:
     """How many pixels of the view's upper half, where no legend is, are painted as holes."""
     view = shown(app)
@@ -89,12 +84,12 @@ def test_a_key_paints_holes_whatever_draws(app: RunningApp) -> None:
     assert not holes(app)
     for name in ("points", "surfels"):
         while app.state.backend != name:
-            press(app, "b")
+            app.press("b")
         before = shown(app).copy()
-        press(app, "g")
+        app.press("g")
         assert app.state.document["look"]["holes"]
         assert holes(app) > 20
-        press(app, "g")
+        app.press("g")
         np.testing.assert_array_equal(shown(app), before)
 
 
@@ -136,32 +131,32 @@ def test_each_level_has_its_key(levels: RunningApp) -> None:
     on = counted(app)
     assert min(on[n] for n in range(4)) > 50, on
     for level in range(5):
-        press(app, str(level))
+        app.press(str(level))
         assert params(app.state)[f"level_{level}"] is False
         assert counted(app)[level] == 0
         assert counted(app) != on or level == 4
-        press(app, str(level))
+        app.press(str(level))
         np.testing.assert_array_equal(shown(app), before)
-    press(app, "g")
+    app.press("g")
     open_with_levels = holes(app)
-    press(app, "h")
+    app.press("h")
     assert params(app.state)["fill"] is False
     off = counted(app)
     assert off[0] > 0
     assert not any(off[level] for level in range(1, 5))
     assert holes(app) > 5000 + 10 * open_with_levels
-    press(app, "h")
-    press(app, "g")
+    app.press("h")
+    app.press("g")
     np.testing.assert_array_equal(shown(app), before)
 
 
 @pytest.mark.slow
 def test_the_key_of_hidden_points_uncovers_what_is_seen_through_a_surface(levels: RunningApp) -> None:
     app, before = levels, shown(levels).copy()
-    press(app, "shift+h")
+    app.press("shift+h")
     assert params(app.state)["hide"] is False
     assert (shown(app) != before).any(axis=2).sum() > 100
-    press(app, "shift+h")
+    app.press("shift+h")
     np.testing.assert_array_equal(shown(app), before)
 
 
@@ -174,7 +169,7 @@ def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
         place = len(rows) // 2
         app.screen.do("mousemove", left + columns[place], top + rows[place])
         assert f"filled from level {level}" in app.settle().pointed
-    press(app, "m")
+    app.press("m")
     app.screen.do("click", 1)
     app.told("filled")
     assert not app.settle().distances
@@ -185,7 +180,7 @@ def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes
     app: RunningApp,
 ) -> None:
     draw_pyramids(app, "polygons")
-    press(app, "r")
+    app.press("r")
     app.see(is_recording=True)
     app.screen.do("key", "e", "key", "space")
     app.see(is_playing=True)
@@ -197,11 +192,11 @@ def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes
             assert app.state.is_playing
     app.screen.do("key", "space", "key", "e", "key", "h")
     app.settle()
-    press(app, "p")
+    app.press("p")
     picture = Path(app.told(r"Saved (.+\.png)")[1])
-    press(app, "r")
+    app.press("r")
     recording = Path(app.told(r"Saved (.+\.json)")[1])
-    press(app, "h")
+    app.press("h")
     entries = Recording.load(recording).entries
     for _, name in KEYS:
         assert any(not getattr(entry.params, name) for entry in entries), f"none without {name}"

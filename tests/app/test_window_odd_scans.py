@@ -37,19 +37,14 @@ def click(app: RunningApp, x: float, y: float) -> None:
     app.settle()
 
 
-def press(app: RunningApp, key: str) -> None:
-    app.screen.do("key", key)
-    app.settle()
-
-
 def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float]]:
     """Place landmarks, measure a distance and a path of the last two, draw all ways, go through all that
     curves can show; the values of both."""
-    press(app, "k")
+    app.press("k")
     for x, y in PLACES:
         click(app, x, y)
-    press(app, "Escape")
-    press(app, "d")
+    app.press("Escape")
+    app.press("d")
     app.choose(PANEL, "Add a measure/##kind", "###path")
     app.act(PANEL, ("item_click", "Add a measure/Add measure"))
     for number in range(len(PLACES)):
@@ -64,8 +59,8 @@ def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float
             app.choose("drawer/plotting", f"##{combo}", f"###{word}")
             app.settle()
     app.act(PANEL, ("item_click", "Landmark paths (trajectories)/hold/##value"))
-    press(app, "End")
-    press(app, "p")
+    app.press("End")
+    app.press("p")
     app.told("Saved ")
     state = app.settle()
     assert state.landmarks.keys() == {"Landmark 1", "Landmark 2", "Landmark 3"}
@@ -78,7 +73,7 @@ def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float
 def test_a_scan_with_one_frame(screen: Screen, tmp_path: Path) -> None:
     np.savez(tmp_path / "one.npz", **surface(49))
     with running_app(screen, tmp_path, tmp_path / "one.npz") as app:
-        press(app, "ctrl+5")
+        app.press("ctrl+5")
         (straight,), (along,) = measured_with_all_there_is(app)
         assert straight == pytest.approx(np.hypot(30, 36), abs=8)
         assert along > straight
@@ -91,7 +86,7 @@ def test_a_topology_that_changes_midway(screen: Screen, tmp_path: Path) -> None:
         across = 49 if frame < FRAMES // 2 else 61
         np.savez(tmp_path / "scan" / f"{frame}.npz", **surface(across, 1 + GROWTH * frame))
     with running_app(screen, tmp_path, tmp_path / "scan") as app:
-        press(app, "ctrl+5")
+        app.press("ctrl+5")
         straight, along = measured_with_all_there_is(app)
         scales = 1 + GROWTH * np.arange(FRAMES)
         for values in (straight, along):

@@ -33,12 +33,6 @@ def app(screen: Screen, tmp_path: Path, scan: Path) -> Iterator[RunningApp]:
     assert "Traceback" not in app.log()
 
 
-def press(app: RunningApp, *keys: str) -> None:
-    for key in keys:
-        app.screen.do("key", key)
-        app.settle()
-
-
 def write(app: RunningApp, text: str) -> None:
     app.screen.do("type", "--delay", 40, text)
     app.settle()
@@ -46,23 +40,23 @@ def write(app: RunningApp, text: str) -> None:
 
 def test_ctrl_s_asks_once_and_then_saves_to_that_file(app: RunningApp, tmp_path: Path) -> None:
     file = tmp_path / "work" / "b sub" / "one.scan4d.json"
-    press(app, "p")
+    app.press("p")
     app.told("Saved .*scan4d_0001.png")
-    press(app, "ctrl+s")
+    app.press("ctrl+s")
     assert app.state.fields["##name"] == "scan.scan4d.json", "as the scan is named, not the picture"
-    press(app, "Up", "Return")  # into the folder, the only row
+    app.press("Up", "Return")  # into the folder, the only row
     app.act("Save session", ("item_click", "##name"))
-    press(app, "ctrl+a")
+    app.press("ctrl+a")
     write(app, "one")
-    press(app, "Return")
+    app.press("Return")
     assert app.told("Saved (.*)")[1] == str(file)
     first = SavedSession.load(file)
-    press(app, "ctrl+4", "ctrl+s")
+    app.press("ctrl+4", "ctrl+s")
     assert app.settle().lists == 0, "nothing is asked"
     assert app.told("Saved (.*)")[1] == str(file)
     assert SavedSession.load(file).document.camera != first.document.camera
     assert app.settle().latest_note.startswith("Saved")
-    press(app, "Next")
+    app.press("Next")
     app.see(lambda state: state.scan.endswith("other.npy"))
     assert not app.settle().latest_note, "which is about the scan before"
 
@@ -88,24 +82,24 @@ def test_the_dialog_opens_a_session_of_the_open_scan_and_closes_and_ctrl_s_saves
     file = tmp_path / "mine.scan4d.json"
     SavedSession(str(scan), None, 0, Document()).export(file)
     with running_app(screen, tmp_path / "work", scan, home=tmp_path / "home") as app:
-        press(app, "ctrl+4")
+        app.press("ctrl+4")
         changed = app.settle().document
-        press(app, "ctrl+o", "Tab")
+        app.press("ctrl+o", "Tab")
         assert app.state.is_browser_open
         write(app, str(file))
-        press(app, "Return")
+        app.press("Return")
         assert app.told("Opened the session (.*)")[1] == str(file)
         state = app.see(is_browser_open=False, undoes="Open session")
         assert state.document != changed
         assert state.lists == 0
-        press(app, "ctrl+z", "ctrl+o")
+        app.press("ctrl+z", "ctrl+o")
         assert app.see(is_browser_open=True).refusal == ""
         write(app, "mine")  # narrows the rows to the session alone
-        press(app, "Return")
+        app.press("Return")
         assert app.told("Opened the session (.*)")[1] == str(file)
         app.see(is_browser_open=False, undoes="Open session")
         before = file.read_bytes()
-        press(app, "ctrl+4", "ctrl+s")
+        app.press("ctrl+4", "ctrl+s")
         assert app.told("Saved (.*)")[1] == str(file)
         assert file.read_bytes() != before
         assert "Traceback" not in app.log()
@@ -114,14 +108,14 @@ def test_the_dialog_opens_a_session_of_the_open_scan_and_closes_and_ctrl_s_saves
 def test_a_file_is_replaced_only_after_a_question(app: RunningApp, tmp_path: Path) -> None:
     file = tmp_path / "work" / "kept.scan4d.json"
     file.write_text("kept")
-    press(app, "ctrl+s")
+    app.press("ctrl+s")
     write(app, "kept")
-    press(app, "Return")
+    app.press("Return")
     assert app.state.lists == 2, "the question stands over the dialog"
-    press(app, "Escape")
+    app.press("Escape")
     assert app.state.lists == 1, "Escape ends the question alone"
     assert file.read_text() == "kept"
-    press(app, "Return")
+    app.press("Return")
     app.act("Replace the file?", ("item_click", "Replace"))
     assert app.told("Saved (.*)")[1] == str(file)
     assert app.settle().lists == 0
@@ -143,14 +137,14 @@ def test_a_folder_lists_its_folders_and_the_newest_files_first(tmp_path: Path) -
 def test_the_folder_of_an_export_is_gone_to_and_escape_ends_one_dialog(
     app: RunningApp, tmp_path: Path
 ) -> None:
-    press(app, "ctrl+e")
+    app.press("ctrl+e")
     app.act("Export", ("item_click", "\uf07c"))
     assert app.settle().lists == 2
-    press(app, "Escape")
+    app.press("Escape")
     assert app.state.lists == 1
     app.act("Export", ("item_click", "\uf07c"))
-    press(app, "Up", "Return")  # into the folder, the only row
+    app.press("Up", "Return")  # into the folder, the only row
     app.act("Choose a folder", ("item_click", "###take"))
     assert app.settle().fields["##folder"] == str(tmp_path / "work" / "b sub")
-    press(app, "Escape")
+    app.press("Escape")
     assert app.state.lists == 0

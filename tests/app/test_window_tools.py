@@ -350,20 +350,15 @@ COMMANDS = {"Tools": (
 """
 
 
-def press(app: RunningApp, key: str) -> None:
-    app.screen.do("key", key)
-    app.settle()
-
-
 def shown(app: RunningApp) -> tuple[str, int, float]:
     """What the tool above tells: source of colours, bytes of the pose on the GPU, x of its place."""
-    press(app, "alt+e")
+    app.press("alt+e")
     told = app.told(r"^(\w+), (\d+) bytes, at (\S+)$")
     return told[1], int(told[2]), float(told[3])
 
 
 def saved_picture(app: RunningApp) -> Path:
-    press(app, "p")
+    app.press("p")
     return Path(app.told(r"Saved (.+\.png)")[1])
 
 
@@ -380,12 +375,12 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
     (tmp_path / "tools" / "laying.py").write_text(LAYING)
     with running_app(screen, tmp_path, scan, before=use_tools(tmp_path / "tools")) as app:
         x, y = middle(app)
-        press(app, "alt+c")
+        app.press("alt+c")
         color, before, _ = shown(app)
         assert color == "plain"
         plain = saved_picture(app)
 
-        press(app, "alt+a")
+        app.press("alt+a")
         app.choose(PANEL, "color_by/##value", "###rising")
         app.settle()
         color, laid, _ = shown(app)
@@ -394,21 +389,21 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         app.settle()
         height, number = pointed(app)
         assert number == pytest.approx(5 * height[1], abs=0.05)
-        press(app, "r")
+        app.press("r")
         app.told("Cannot record: Scan4D computed the colours 'rising'")
-        press(app, "ctrl+e")
+        app.press("ctrl+e")
         app.told("Cannot export: Scan4D computed the colours 'rising'")
-        press(app, "p")
+        app.press("p")
         app.told("cannot be replayed: Scan4D computed the colours 'rising'")
         colored = Path(app.told(r"Saved (.+\.png)")[1])
         assert len(np.unique(pixels(colored).reshape(-1, 3), axis=0)) > 50
         with pytest.raises(InputError):
             Recording.load(colored)
 
-        press(app, "alt+b")
-        press(app, "f")
+        app.press("alt+b")
+        app.press("f")
         assert shown(app) == ("rising", laid, 100), "nothing is uploaded again"
-        press(app, "alt+c")
+        app.press("alt+c")
         screen.do("mousemove", x, y)
         app.settle()
         place = place_under_mouse(app)
@@ -419,12 +414,12 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         assert entry.place is not None
         assert entry.place[0] == (0.8, -0.6, 0, 100)
 
-        press(app, "r")
+        app.press("r")
         app.see(is_recording=True)
-        press(app, "r")
+        app.press("r")
         app.told(r"Saved .+\.json")
 
-        press(app, "m")
+        app.press("m")
         click(app, x, y)
         click(app, x + 60, y)
         (measured,) = app.settle().distances
@@ -433,13 +428,13 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         np.testing.assert_allclose(ends[0], (100, 0, 3), atol=0.05)
         stored = app.state.document["parts"]["landmarks"]["all"]
         np.testing.assert_allclose([end["keys"][0]["position"] for end in stored], measured["positions"])
-        press(app, "Escape")
-        press(app, "ctrl+z")  # pictures have measured lines, too
+        app.press("Escape")
+        app.press("ctrl+z")  # pictures have measured lines, too
 
-        press(app, "alt+d")
+        app.press("alt+d")
         app.told("switched off Laying until the next start: .*'rising' is .*expected 160,000 numbers")
         assert (pixels(saved_picture(app)) != pixels(moved)).any(), "where the scan has it"
-        press(app, "shift+r")
+        app.press("shift+r")
         app.see(is_replaying=False)
         app.settle()
         np.testing.assert_array_equal(pixels(saved_picture(app)), pixels(moved))

@@ -210,6 +210,13 @@ class RunningApp:
                 self.take_in()
             self.screen.do(*command)
 
+    def press(self, *keys: str) -> State:
+        """Press keys, each when what the one before does is done; the state then."""
+        for key in keys:
+            self.screen.do("key", key)
+            self.settle()
+        return self.settle()
+
     def drag(self, *places: tuple[float, float], button: int = 1) -> State:
         """Press a button at the first place of the screen, go from place to place, let go at the last."""
         start, *moves = [("mousemove", round(x), round(y)) for x, y in places]

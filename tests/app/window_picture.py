@@ -38,13 +38,6 @@ CLICKED = {
 }  # fmt: skip
 
 
-def press(app: RunningApp, *keys: str) -> None:
-    """Press keys, each when what the one before does is done."""
-    for key in keys:
-        app.screen.do("key", key)
-        app.settle()
-
-
 def click(app: RunningApp, place: str) -> None:
     """Click a place of the demo's face, as the first frame has it."""
     left, top, width, height = app.view()
@@ -57,10 +50,10 @@ def click(app: RunningApp, place: str) -> None:
 
 def measured(app: RunningApp) -> None:
     """A distance between the eyes."""
-    press(app, "m")
+    app.press("m")
     for eye in EYES:
         click(app, eye)
-    press(app, "Escape")
+    app.press("Escape")
 
 
 def tracked(app: RunningApp) -> None:
@@ -71,8 +64,8 @@ def tracked(app: RunningApp) -> None:
         if landmark.name in CLICKED:
             click(app, CLICKED[landmark.name])
         else:
-            press(app, "x")
-    press(app, "Escape", "v")
+            app.press("x")
+    app.press("Escape", "v")
 
 
 PICTURES: dict[str, tuple[str, Callable[[RunningApp], None]]] = {
