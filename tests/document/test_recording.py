@@ -54,14 +54,6 @@ def test_a_recording_comes_back_as_it_was(tmp_path: Path) -> None:
     assert [entry.at for entry in again.entries] == [0, 0.52, 1.5]
 
 
-def test_a_recording_without_a_quality_shows_one_sample_as_it_did(tmp_path: Path) -> None:
-    path = saved(tmp_path)
-    data = json.loads(path.read_text())
-    assert data["entries"][0]["look"].pop("quality") == "balanced"
-    path.write_text(json.dumps(data))
-    assert [entry.look.quality for entry in Recording.load(path).entries] == ["fast"] * 3
-
-
 def test_a_recording_tells_only_what_has_changed_an_entry_a_line(tmp_path: Path) -> None:
     text = saved(tmp_path).read_text()
     data = json.loads(text)

@@ -251,12 +251,10 @@ class Entry:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any], where: object = None) -> Entry:
-        """The entry of a complete JSON object; what earlier versions did not tell is as they had it.
+        """The entry of a complete JSON object.
 
         where: it stands, for messages. Raises InputError for whatever is wrong in it.
         """
-        if is_object(data.get("look")):  # before there were choices
-            data = {**data, "look": {"range": "frame", "quality": "fast", **data["look"]}}
         entry = structured(cls, data, where)
         params = structured(find_backend(entry.backend).params_class, entry.params, f"{where}, params")
         return replace(entry, params=params)
