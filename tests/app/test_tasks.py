@@ -132,14 +132,14 @@ def told(tasks: str) -> dict[str, int]:
 
 
 def test_set_a_open_zoom_fill_and_back_to_the_list(person: Person) -> None:
-    while person.app.state.backend != "points":  # which break apart
-        person.press("shift", "b")
     for _ in FACES:
         before = person.look()
         person.task = "A1"
         person.press("Next")
-        person.app.see(frame=0, backend="points")
-        person.app.settle()
+        person.app.see(frame=0)
+        person.task = "points, which break apart"
+        while person.app.settle().backend != "points":
+            person.press("shift", "b")
         assert person.look().description["scan"] != before.description["scan"]
         person.task = "A2"
         person.drag(3, 0, 0.45)
@@ -231,7 +231,7 @@ def test_set_c_distances_to_a_table_a_film_colours_and_back(tmp_path: Path) -> N
         assert Path(file).name == "demo_distances.csv"
         with open(file, newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))
-        assert sorted(int(row["frame_1"]) for row in rows) == list(range(1, 65))
+        assert sorted(int(row["frame"]) for row in rows) == list(range(1, 65))
         assert np.ptp([float(row["distance"]) for row in rows]) > 1, "the mouth moves"
         app.screen.do("key", "Escape")
         person.task = "C4"

@@ -371,7 +371,7 @@ def test_a_recording_holds_what_was_shown_and_is_drawn_again(
         app.settle()
         assert is_red(shown(app)[:60, :200]).sum() > red + 50, "a mark says that it records"
         shots = [Screenshot(app)]
-        for key, backend in (("Right", "auto_splats"), ("b", "hpr"), ("shift+b", "auto_splats")):
+        for key, backend in (("Right", "auto_splats"), ("b", "codeword"), ("shift+b", "auto_splats")):
             screen.do("key", key)
             app.see(frame=1, backend=backend)
             app.settle()

@@ -253,13 +253,13 @@ def test_curves_are_saved_and_ways_are_drawn_and_held_still(
         left, top, width, height = app.view()
         before = screen.picture()[top : top + height, left : left + width].copy()
         app.act(PANEL, ("item_open", "Landmark paths (trajectories)"))
-        app.act(PANEL, ("item_click", "Landmark paths (trajectories)/ways/$$0/##traced"))
+        app.act(PANEL, ("item_click", "Landmark paths (trajectories)/paths/$$0/##traced"))
         app.settle()
         after = screen.picture()[top : top + height, left : left + width]
         assert (before != after).any(axis=2).sum() > 100
         check_saved_picture(app, tmp_path)
         for number in (1, 2, 3):
-            app.act(PANEL, ("item_click", f"Landmark paths (trajectories)/ways/$${number}/##anchors"))
+            app.act(PANEL, ("item_click", f"Landmark paths (trajectories)/paths/$${number}/##anchors"))
         app.act(PANEL, ("item_click", "Landmark paths (trajectories)/hold/##value"))
         app.settle()
         assert "Traceback" not in app.log()

@@ -266,7 +266,7 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
         app.told("cannot read some of the saved changes: parts.landmarks")
-        app.told("This version of Scan4D has no renderer 'cubist': .* draws it instead")
+        app.told("This version of Scan4D has no renderer 'cubist'. .* draws it instead")
         state = app.see(frame=1)
         assert state.document["backend"] == "cubist"
         assert state.document["camera"] == data["document"]["camera"]

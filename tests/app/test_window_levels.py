@@ -85,6 +85,7 @@ def test_a_key_paints_holes_whatever_draws(app: RunningApp) -> None:
     for name in ("points", "surfels"):
         while app.state.backend != name:
             app.press("b")
+        app.see(renderer_named=None)
         before = shown(app).copy()
         app.press("g")
         assert app.state.document["look"]["holes"]
