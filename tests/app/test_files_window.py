@@ -247,7 +247,7 @@ def test_what_cannot_be_read_at_the_start_is_told_over_the_demo_or_the_next(
         assert len([note for note in app.notes if "0.npy" in note]) == 1
         close(app)
     with running_app(screen, tmp_path, damaged) as app:
-        app.told("Cannot open: damaged: none of its 2 frames")
+        app.told("Cannot open: damaged: Scan4D cannot read any of its 2 frames")
         app.see(scan=DEMO, is_idle=True)
         close(app)
     with running_app(screen, tmp_path, tmp_path / "missing.ply") as app:

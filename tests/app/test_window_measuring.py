@@ -89,7 +89,7 @@ def read_back(app: RunningApp, folder: Path) -> None:
     ctrl(screen, "a")  # the field has kept the keyboard
     screen.do("type", "--delay", 40, "other.csv")
     screen.do("key", "Return")
-    app.told("is of 'another.npz', not of 'scan.npz'")
+    app.told("belongs to the scan 'another.npz', not to 'scan.npz'")
     ctrl(screen, "k")
     app.settle()
     for _ in range(len([one for one in folder.iterdir() if one.is_dir()]) + 1):
