@@ -198,7 +198,7 @@ def test_what_is_as_good_as_a_point_is_shown(at: float, size: float) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("{", "not a JSON file"),
+        ("{", "is not JSON"),
         ("[]", "JSON object"),
         ('{"eyes": [0, 0, 1]}', "unknown camera field 'eyes'"),
         ('{"eye": [0, 0]}', "three finite numbers"),
@@ -221,5 +221,5 @@ def test_bad_camera_files_are_explained(tmp_path: Path, text: str, message: str)
 
 
 def test_a_missing_camera_file_is_explained(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="cannot be read"):
         Camera.load(tmp_path / "none.json")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
@@ -13,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bounds import Bounds
-from .errors import InputError, explained, shortened, unknown_name
-from .files import parsed_json, read_text, whole_file
+from .errors import InputError, shortened, unknown_name
+from .files import parsed_json, read_text, reading, save_json
 from .geometry import Vector, front_vector, up_vector, vector
 
 PROJECTIONS = ("perspective", "orthographic")
@@ -124,15 +123,8 @@ class Camera:
     @classmethod
     def load(cls, path: str | Path) -> Camera:
         """Read a camera's JSON file; raises InputError naming the file."""
-        try:
+        with reading(path, "is not JSON"):
             return cls.from_json(parsed_json(read_text(path, _MOST_BYTES)))
-        except OSError as error:
-            what, hint = explained(error)
-            raise InputError(f"cannot read the camera: {what}", path, hint) from error
-        except ValueError as error:  # of the text's encoding as well
-            raise InputError(f"not a JSON file: {error}", path) from error
-        except InputError as error:
-            raise InputError(error.what, path, error.hint) from error
 
     def to_json(self) -> dict[str, Any]:
         """A JSON object with every field, vectors as lists."""
@@ -140,8 +132,7 @@ class Camera:
 
     def save(self, path: str | Path) -> None:
         """Write `to_json` as a file. Raises InputError where it cannot be written."""
-        with whole_file(path) as temporary:
-            temporary.write_text(json.dumps(self.to_json(), indent=2) + "\n", encoding="utf-8")
+        save_json(path, self.to_json())
 
     # --- reading it -------------------------------------------------------------------
 

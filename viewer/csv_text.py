@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -19,6 +20,11 @@ _WIDE = "\uff1d\uff0b\uff0d\uff20"  # the same signs as East Asian keyboards hav
 # Also a text that begins like one with an apostrophe.
 _FORMULA = re.compile(rf"'*[=+\-@\t\r\n{_WIDE}]")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+
+
+def cell(value: float) -> float | None:
+    """A number as tables have it, empty where it is not known."""
+    return float(value) if math.isfinite(value) else None
 
 
 def to_text(rows: Iterable[Iterable[object]], separator: str = ",") -> str:

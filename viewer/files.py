@@ -41,6 +41,14 @@ def whole_file(path: Path | str) -> Iterator[Path]:
         raise InputError(f"cannot be written: {what}", path, hint) from error
 
 
+def save_json(path: Path | str, data: Any) -> None:
+    """Write data as a JSON file, in one step. Raises InputError where it cannot be written, and ValueError
+    for NaN and infinities."""
+    with whole_file(path) as temporary:
+        text = json.dumps(data, indent=1, allow_nan=False, ensure_ascii=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+
+
 def output_folder(path: Path) -> None:
     """Make a folder that the user has named for output, where it is missing. Raises InputError."""
     try:
@@ -83,6 +91,22 @@ def read_text(path: Path | str, most_bytes: int) -> str:
     if len(data) > most_bytes:
         raise OSError(errno.EINVAL, f"is longer than {most_bytes:,} bytes", str(path))
     return data.decode("utf-8")
+
+
+@contextmanager
+def reading(path: Path | str, not_parsed: str, hint: str | None = None) -> Iterator[None]:
+    """Raise InputError, which names the file, for what goes wrong inside. not_parsed: words for a text that
+    cannot be parsed. hint: for errors without one."""
+    try:
+        yield
+    except InputError as error:
+        where = ", ".join(map(str, filter(None, (path, error.where))))
+        raise InputError(error.what, where, error.hint or hint) from None
+    except OSError as error:
+        what, how = explained(error)
+        raise InputError(f"cannot be read: {what}", path, how) from error
+    except ValueError as error:  # of the text's encoding as well
+        raise InputError(f"{not_parsed} ({error})", path, hint) from error
 
 
 def parsed_json(text: str) -> Any:

@@ -43,10 +43,7 @@ class Rigid:
         """The motion back."""
         if self.is_identity:
             return self
-        back = np.eye(4)
-        back[:3, :3] = self.rotation.T
-        back[:3, 3] = -self.rotation.T @ self.matrix[:3, 3]
-        return Rigid(back)
+        return Rigid(rigid_matrix(self.rotation.T, -self.rotation.T @ self.matrix[:3, 3]))
 
     def points(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Moved points, (..., 3)."""
@@ -76,6 +73,27 @@ class Rigid:
         moved = self.matrix.copy()
         moved[:3, 3] += self.rotation @ origin - origin
         return Rigid(moved)
+
+
+def rigid_matrix(rotation: NDArray[np.floating], translation: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The matrix (4, 4) of a rotation (3, 3) and a translation (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, translation
+    return matrix
+
+
+def rotation_about(vector: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The rotation (3, 3) about a vector (3,) by its length in radians."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_rotvec(vector).as_matrix()
+
+
+def best_rotation(moved: NDArray[np.float64], still: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The rotation (3, 3) that brings points (N, 3) nearest to others, by least squares (Kabsch 1976; Umeyama
+    1991 for the sign). Both have their mean at zero."""
+    left, _, right = np.linalg.svd(still.T @ moved)
+    return left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
 
 
 def is_rigid(matrix: NDArray[np.float64], tolerance: float) -> bool:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from .bounds import Bounds
 from .camera import Camera
@@ -131,6 +132,11 @@ class View:
     def depths(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
         """Depths (...) of points (..., 3), relative to the origin."""
         return -(positions @ self.rotation[2] + self.translation[2])
+
+    def footprint(self, depth: ArrayLike) -> Any:
+        """The edge of the square that a pixel covers at depths of any shape, scan units, float64."""
+        depths = np.asarray(depth, np.float64)
+        return (depths if self.perspective else np.ones_like(depths)) / self.scale
 
     def contains(self, positions: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Tell which points (N, 3), relative to the origin, are in the picture and its depth range; (N,)."""

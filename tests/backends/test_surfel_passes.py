@@ -23,7 +23,7 @@ from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.look import Look
-from viewer.mesh.reference import footprint, trace, visible_pixels
+from viewer.mesh.reference import trace, visible_pixels
 from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
@@ -90,7 +90,7 @@ def test_a_sphere_is_exact(draw: Draw, instancing: str, projection: str) -> None
         assert not (inside & ~drawn).any(), "a hole"
         # Along the normal, in which discs are off by their sagitta.
         error = (surface.depth[inside] - truth.depth[inside]) * truth.incidence()[inside]
-        pixel = float(np.median(footprint(truth.view, truth.depth[inside])))
+        pixel = float(np.median(truth.view.footprint(truth.depth[inside])))
         sagitta = 1 - np.sqrt(1 - float(cloud.radii[0]) ** 2)
         assert np.sqrt((error**2).mean()) < 0.05 * pixel + sagitta
         reference = reference_surface(truth, surface.gpu, look).image()

@@ -17,7 +17,7 @@ from viewer.bench.truth.surface import reference_surface
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.look import Look
-from viewer.mesh.reference import both_see, footprint, trace, visible
+from viewer.mesh.reference import both_see, trace, visible
 from viewer.mesh.triangles import Mesh, read_mesh, vertex_normals
 from viewer.scan.formats import read, read_faces
 from viewer.scan.points import PointCloud
@@ -191,7 +191,7 @@ def test_pairs_of_pixels_show_the_same_points() -> None:
     there = np.full_like(where, np.nan)
     there[second.covered] = second.positions()
     apart = np.linalg.norm(where.reshape(-1, 3)[a] - there.reshape(-1, 3)[b], axis=1)
-    assert apart.max() < 5 * footprint(second.view, second.depth[second.covered]).max()
+    assert apart.max() < 5 * second.view.footprint(second.depth[second.covered]).max()
 
 
 def test_what_turns_out_of_sight_has_no_pair() -> None:
@@ -225,7 +225,7 @@ def test_a_reference_has_no_error_against_itself(renderer: Renderer) -> None:
     assert len(pair[0]) == picture.covered.sum()
     errors = (
         metrics.coverage(picture.covered, picture.covered)
-        | metrics.depth(picture.depth, picture.depth, footprint(picture.view, picture.depth), 0.01)
+        | metrics.depth(picture.depth, picture.depth, picture.view.footprint(picture.depth), 0.01)
         | metrics.normals(picture.normal, picture.normal)
         | metrics.flicker((frame, frame), (frame, frame), pair)
     )
@@ -244,7 +244,7 @@ def test_errors_of_a_drawn_sphere_are_of_its_spacing(draw: Callable[..., Surface
     cloud = sphere(20_000)
     picture = trace(AnalyticScene((Sphere(),)), CAMERA, SIZE)
     drawn = draw(cloud, CAMERA, SIZE, backend)
-    errors = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), 0.025)
+    errors = metrics.depth(drawn.depth, picture.depth, picture.view.footprint(picture.depth), 0.025)
     assert errors["depth_median"] < 0.025
     assert metrics.normals(drawn.normal, picture.normal)["normal_median"] < 3
     coverage = metrics.coverage(drawn.coverage > 0, picture.covered)
@@ -286,7 +286,7 @@ def test_errors_of_the_bunny_are_sane(
     drawn = draw(cloud, camera, size, bounds.backend, look=look)
     seen = visible(mesh, cloud.positions, camera)
     assert 0.3 < seen.mean() < 0.6
-    depth = metrics.depth(drawn.depth, picture.depth, footprint(picture.view, picture.depth), spacing)
+    depth = metrics.depth(drawn.depth, picture.depth, picture.view.footprint(picture.depth), spacing)
     assert depth["depth_median"] < spacing
     assert depth["wrong_layer_percent"] < bounds.wrong_layers
     coverage = metrics.coverage(drawn.coverage > 0, picture.covered)

@@ -124,7 +124,7 @@ def _fitted(
     if len(used) < LEAST or not is_seen:
         return None, 0.0
     # Across the surface rather than along the ray.
-    lean = np.hypot(1, np.linalg.norm(slope) / _footprint(view, start))
+    lean = np.hypot(1, np.linalg.norm(slope) / view.footprint(start))
     if np.sqrt(np.mean(off[belongs] ** 2)) / lean > _THICK * reach:
         return None, 0.0  # they fill space
     return _plate(view, offsets[used], depths[used], start, slope, used), reach
@@ -157,7 +157,7 @@ def _plate(
     """The thin plate through the points, at the middle."""
     # Distances are along the surface: where it is steep, points next to each other in the picture are far
     # apart.
-    footprint = _footprint(view, start)
+    footprint = view.footprint(start)
     along = np.linalg.cholesky(footprint**2 * np.eye(2) + np.outer(slope, slope))
     sides = _ASIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
     flat = np.concatenate([offsets, sides]) @ along
@@ -203,11 +203,6 @@ def _chance_of_end(flat: Float) -> float:
     if beyond <= 0 or area <= 0:
         return 0.0
     return float(-np.expm1(-beyond / np.sqrt(area / len(flat))))
-
-
-def _footprint(view: View, depth: float) -> float:
-    """The edge of a pixel at a depth, scan units."""
-    return (depth if view.perspective else 1.0) / view.scale
 
 
 def _bending(some: Float, others: Float) -> Float:

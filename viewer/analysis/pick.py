@@ -195,7 +195,7 @@ def _reach(surface: Surface, depth: float) -> int:
 
 def _pitch(surface: Surface, depth: float) -> float:
     """The usual distance between points at a depth, pixels."""
-    return surface.scanned.pose.spacing * surface.view.scale / (depth if surface.view.perspective else 1.0)
+    return float(surface.scanned.pose.spacing / surface.view.footprint(depth))
 
 
 def _nearest(surface: Surface, cloud: PointCloud, at: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
@@ -259,9 +259,11 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     reach = int(np.clip(np.ceil(_GAP * _pitch(surface, depth)), _REACH, _AROUND[1]))
     depths = surface.depth_around(x, y, reach)
     spacings, steepness = _BEHIND
-    footprint = (depth if surface.view.perspective else 1.0) / surface.view.scale
     away = _distances(reach)
-    behind = steepness * np.maximum(away, _REACH) * footprint + spacings * surface.scanned.pose.spacing
+    behind = (
+        steepness * np.maximum(away, _REACH) * surface.view.footprint(depth)
+        + spacings * surface.scanned.pose.spacing
+    )
     down, across = (
         np.argwhere((away <= max(reach, np.sqrt(2) * _REACH)) & (depths < shown - behind)).T - reach
     )

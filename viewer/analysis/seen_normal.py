@@ -26,7 +26,7 @@ def seen_normal(surface: Surface, x: int, y: int) -> NDArray[np.float64] | None:
     points = view.unproject(pixels, depths[is_seen])
     middle = view.unproject(np.array([[x + 0.5, y + 0.5]]), depths[reach, reach][None])[0]
     away = np.linalg.norm(points - middle, axis=1)
-    radius = reach * (depths[reach, reach] if view.perspective else 1.0) / view.scale
+    radius = reach * view.footprint(depths[reach, reach])
     kept = points[away <= 2 * radius]  # else of what is before it or behind
     for _ in range(_ROUNDS):
         if len(kept) < _LEAST:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..geometry import Vector, vector
-from ..rigid import STILL, Rigid
+from ..rigid import STILL, Rigid, best_rotation
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import nearest_row, spacing_at
@@ -152,8 +152,7 @@ def _carried(
         offset = position - shares @ was
         return shares @ now + offset, np.eye(3), float(np.linalg.norm(offset)) / math.sqrt(3)
     before, after = was.mean(axis=0), now.mean(axis=0)
-    left, _, right = np.linalg.svd((now - after).T @ (was - before))  # Kabsch 1976
-    turned = left @ np.diag([1, 1, np.sign(np.linalg.det(left @ right))]) @ right
+    turned = best_rotation(was - before, now - after)
     off = (now - after) - (was - before) @ turned.T
     free = 3 * len(was) - 6  # of the coordinates, six make the motion
     placed = shares @ now + turned @ (position - shares @ was)

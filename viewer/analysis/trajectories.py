@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..rigid import Rigid
+from ..rigid import Rigid, best_rotation, rigid_matrix
 from .curves import Smoothing, smoothed
 from .track import Known, Track
 
@@ -72,8 +72,7 @@ def held_still(track: Track, still: Sequence[Rigid | None]) -> Track:
 def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Rigid | None, ...]:
     """Find the motion of each frame that brings the anchors best to where they are in a reference frame.
 
-    Best in least squares over the anchors that both frames know (Kabsch 1976, "A solution for the best
-    rotation to relate two sets of vectors"; Umeyama 1991 for the sign). The reference is the first frame that
+    Best in least squares over the anchors that both frames know. The reference is the first frame that
     knows most of them. None where fewer than three are known, or those lie on one line. Raises InputError
     where less than three landmarks are named, where one has no track, and where no frame knows three.
     """
@@ -113,9 +112,5 @@ def _kabsch(moved: NDArray[np.float64], still: NDArray[np.float64]) -> Rigid | N
     spread = [np.linalg.svd(points, compute_uv=False) for points in (one, other)]
     if any(widths[1] <= _FLAT * widths[0] for widths in spread):
         return None
-    left, _, right = np.linalg.svd(one.T @ other)
-    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    matrix = np.eye(4)
-    matrix[:3, :3] = right.T @ mirror @ left.T
-    matrix[:3, 3] = middles[1] - matrix[:3, :3] @ middles[0]
-    return Rigid(matrix)
+    rotation = best_rotation(one, other)
+    return Rigid(rigid_matrix(rotation, middles[1] - rotation @ middles[0]))

@@ -14,7 +14,7 @@ from ..camera import Camera
 from ..gpu.context import Gpu
 from ..look import Look
 from ..mesh.range_mesh import was_scanned
-from ..mesh.reference import Reference, both_see, footprint, trace, visible
+from ..mesh.reference import Reference, both_see, trace, visible
 from ..mesh.scene import Rays, Scene
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
@@ -104,7 +104,7 @@ class Judge:
         of_scanned = {} if self.scanned is None else metrics.scanned(drawn, image, self.image, self.scanned)
         return (
             metrics.coverage(drawn, true)
-            | metrics.depth(depth, true_depth, footprint(reference.view, true_depth), self.steps)
+            | metrics.depth(depth, true_depth, reference.view.footprint(true_depth), self.steps)
             | metrics.normals(surface.normal[both], reference.normal[both])
             | metrics.color(image, self.image, true)
             | metrics.visibility(self.probes.found(depth), self.probes.seen)
@@ -155,7 +155,7 @@ def _steps(reference: Reference, spacing: float) -> NDArray[np.float64]:
     """
     depth = np.where(reference.covered, reference.depth, 0.0)
     slant = np.where(reference.covered, reference.incidence(), 1.0)
-    return np.maximum(spacing, footprint(reference.view, depth) / np.maximum(slant, _STEEPEST))
+    return np.maximum(spacing, reference.view.footprint(depth) / np.maximum(slant, _STEEPEST))
 
 
 def _scanned(reference: Reference, views: Sequence[RangeView]) -> NDArray[np.bool_]:

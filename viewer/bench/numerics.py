@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..backends import Backend
 from ..camera import PROJECTIONS, Camera
 from ..look import Look
+from ..rigid import rotation_about
 from .scenes.samples import line, on_torus, wall
 from .shots import PointView
 from .stability import Row, Tolerance
@@ -115,11 +116,8 @@ def _fitted_far(shot: PointView) -> PointView:
 
 
 def _rotation(axis: tuple[float, float, float], degrees: float) -> NDArray[np.float64]:
-    """Rodrigues' formula, (3, 3)."""
-    x, y, z = np.array(axis) / np.linalg.norm(axis)
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    angle = np.radians(degrees)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    """The rotation about an axis, (3, 3)."""
+    return rotation_about(np.radians(degrees) * np.array(axis) / np.linalg.norm(axis))
 
 
 def _typed() -> Iterator[Row]:

@@ -29,7 +29,6 @@ from ..errors import InputError
 from ..files import output_folder, whole_file
 from ..look import Look
 from ..mesh.range_mesh import triangulated
-from ..mesh.reference import footprint
 from ..picture.surface import Surface
 from ..signals import Interrupts
 from . import baselines, numerics
@@ -386,7 +385,7 @@ def _save_comparison(path: Path, judge: Judge, surface: Surface) -> None:
     reference = judge.reference
     true = {"image": judge.image, "depth": reference.depth, "normal": reference.normal}
     drawn = {"image": surface.image(), "depth": surface.depth, "normal": surface.normal}
-    panels = side_by_side(true, drawn, footprint(reference.view, reference.depth))
+    panels = side_by_side(true, drawn, reference.view.footprint(reference.depth))
     output_folder(path.parent)
     with whole_file(path) as temporary:
         Image.fromarray(panels).save(temporary)

@@ -3,7 +3,6 @@ drawing in software."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..files import parsed_json, read_text, whole_file
+from ..files import parsed_json, read_text, save_json
 from ..folders import user_folder
 from ..gpu.context import Gpu
 from ..resources import resource_path
@@ -58,10 +57,7 @@ def read_models(file: Path) -> dict[str, Model]:
 def write_models(models: Mapping[str, Model], file: Path) -> None:
     """Write models by device. Raises InputError where that is not possible."""
     plain = {device: {key: asdict(law) for key, law in model.items()} for device, model in models.items()}
-    with whole_file(file) as temporary:
-        temporary.write_text(
-            json.dumps({"format": FORMAT, "models": plain}, indent=1) + "\n", encoding="utf-8"
-        )
+    save_json(file, {"format": FORMAT, "models": plain})
 
 
 def _key(gpu: Gpu) -> str:

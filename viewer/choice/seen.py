@@ -54,7 +54,7 @@ class ScanInView:
         pixels, depths = view.project(sample)
         middle = pose.drawn_bounds().center - view.origin
         usual = float(np.median(depths)) if len(sample) else float(view.depths(middle))
-        footprint = max(usual, view.near) / view.scale if view.perspective else 1 / view.scale
+        footprint = float(view.footprint(max(usual, view.near)))
         by_chunks = is_cloud and count >= LEAST and share <= MOST
         sparse = sparse_spacing(pose.overview) if is_cloud and count else pose.spacing
         return cls(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
-from argparse import ArgumentTypeError
+from argparse import ArgumentTypeError, Namespace
+from collections.abc import Collection, Iterable
 
 
 def size(text: str) -> tuple[int, int]:
@@ -19,6 +21,22 @@ def count(text: str) -> int:
     if not text.isdecimal() or int(text) < 1:
         raise ArgumentTypeError(f"'{text}' is not a number of at least 1")
     return int(text)
+
+
+def numbers(text: str, counts: Collection[int] | None, what: str) -> tuple[float, ...]:
+    """Finite numbers with commas between. counts: how many there may be; None: any number. what: they are."""
+    try:
+        found = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        found = ()
+    if len(found) not in (counts or [len(found) or 1]) or not all(map(math.isfinite, found)):
+        raise ArgumentTypeError(f"'{text}' is not {what}")
+    return found
+
+
+def given(args: Namespace, names: Iterable[str]) -> list[str]:
+    """Those of some arguments that the user has given, as they are written: `--size`."""
+    return [f"--{name}" for name in names if getattr(args, name) not in (None, False, [])]
 
 
 def seed(text: str) -> int:

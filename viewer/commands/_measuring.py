@@ -21,7 +21,7 @@ from ..files import output_folder, whole_file
 from ..signals import held_interrupts
 from . import _arguments as arguments
 from ._console import progress, tell, warn
-from ._outputs import add_force_argument, claim
+from ._outputs import add_output_argument, claim
 
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LEAST = 32  # pixels of a picture's edge, for metrics that look at windows
@@ -32,16 +32,7 @@ QUICK = BenchSettings(size=(384, 256), views=4, repeat=1, frames=3)
 
 def add_measuring_arguments(parser: ArgumentParser) -> None:
     """Add the arguments of every measurement: the folder, the scenes, how much is measured."""
-    parser.add_argument(
-        "-o",
-        "--output",
-        dest="out",
-        metavar="DIR",
-        type=Path,
-        required=True,
-        help="folder for the results",
-    )
-    add_force_argument(parser)
+    add_output_argument(parser, "folder for the results", "DIR")
     parser.add_argument(
         "--scene",
         nargs="+",

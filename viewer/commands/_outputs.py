@@ -18,6 +18,12 @@ def add_force_argument(parser: ArgumentParser) -> None:
     parser.add_argument("--force", action="store_true", help="replace existing files")
 
 
+def add_output_argument(parser: ArgumentParser, text: str, metavar: str = "OUT") -> None:
+    """`--output` with this help, and `--force`."""
+    parser.add_argument("-o", "--output", dest="out", metavar=metavar, type=Path, required=True, help=text)
+    add_force_argument(parser)
+
+
 def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
     """Raise InputError, before any work, where these files are not to be written.
 

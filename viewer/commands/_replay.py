@@ -29,6 +29,7 @@ from ..scan.inputs import scan_inputs
 from ..scan.open import is_demo, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import DEFAULT_FPS, frame_in_words
+from . import _arguments as arguments
 from . import _drawing as drawing
 from ._console import warn
 from ._drawing import Plan
@@ -37,7 +38,7 @@ from ._outputs import claim
 # Arguments that a recording replaces.
 _OF_RECORDING = (
     "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
-    "budget", "error",
+    "budget", "error", "up",
 )  # fmt: skip
 
 
@@ -67,16 +68,9 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
 
 
 def _check_arguments(args: Namespace) -> None:
-    given = [f"--{name}" for name in _OF_RECORDING if _is_given(getattr(args, name))]
-    if args.up is not None:
-        given.append("--up")
-    if given:
+    if given := arguments.given(args, _OF_RECORDING):
         hint = "The recording defines what to draw. Leave these options out"
         raise InputError(f"--replay takes no {', '.join(given)}", args.replay, hint)
-
-
-def _is_given(value: object) -> bool:
-    return not (value is None or value is False or value == [])
 
 
 def _film(recording: Recording, fps: float) -> Sequence[Entry]:

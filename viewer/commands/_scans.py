@@ -8,8 +8,8 @@ import os
 import re
 from argparse import ArgumentParser, Namespace
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import TIMES_FILE, frame_in_words
 from ..scan.upright import UNKNOWN, Upright
-from ._console import warn
+from ._console import progress, warn
 
 _FRAMED = 5  # poses that a camera is fitted to
 _TRIED = 100  # poses that are tried where one that can be read is looked for
@@ -163,7 +163,7 @@ def report(timeline: Timeline, said: int) -> int:
 
 
 def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list[Path]:
-    """All that `frame_files` leads to, of these poses of a scan.
+    """All files that `with_files` leads to, of these poses of a scan.
 
     Raises InputError where a times.csv holds the times of other files, or would be one to other frames.
     """
@@ -176,20 +176,18 @@ def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list
     return [*files, times_file]
 
 
-@contextmanager
-def frame_files(out: Path) -> Iterator[Callable[[Pose], Path]]:
-    """The file that each pose goes to; for a pattern, times.csv beside them when all are written."""
+def with_files(out: Path, poses: Iterable[Pose], count: int) -> Iterator[tuple[Pose, Path]]:
+    """Poses, so many, each with the file that it goes to; for a pattern, times.csv beside them when all are
+    written."""
     rows: list[tuple[str, float]] = []
-
-    def file_of(pose: Pose) -> Path:
-        path = numbered(out, pose.index)
-        rows.append((printable(path.name), pose.time))  # as labels have it
-        return path
-
-    yield file_of
+    with progress(count) as tick:
+        for pose in poses:
+            path = numbered(out, pose.index)
+            rows.append((printable(path.name), pose.time))  # as labels have it
+            yield pose, path
+            tick()
     if is_pattern(out):
-        times_file = out.with_name(TIMES_FILE)
-        save_rows(times_file, [("file", "time"), *rows])
+        save_rows(out.with_name(TIMES_FILE), [("file", "time"), *rows])
 
 
 def _check_times_file(path: Path, names: set[str]) -> None:

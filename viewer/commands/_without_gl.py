@@ -27,6 +27,7 @@ from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.pose import Pose
 from ..scan.range_folders._pictures import read_color
+from . import _arguments as arguments
 from . import _drawing as drawing
 from ._console import progress, say, tell, warn
 from ._outputs import claim
@@ -69,9 +70,8 @@ def run(args: Namespace) -> int:
 
 def _refuse(args: Namespace, names: tuple[str, ...], what: str) -> None:
     """Raise InputError where one of these arguments is given."""
-    for name in names:
-        if getattr(args, name) not in (None, False, []):
-            raise InputError(what, f"--{name}", "Leave it out")
+    for flag in arguments.given(args, names):
+        raise InputError(what, flag, "Leave it out")
 
 
 def _replay(args: Namespace, path: Path) -> None:

@@ -8,8 +8,7 @@ only the points that are visible from one position.
 
 from __future__ import annotations
 
-import math
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,17 +25,18 @@ from ..scan.inputs import scan_inputs
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
+from . import _arguments as arguments
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
 from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
     chosen_poses,
-    frame_files,
     frame_outputs,
     framing,
     open_timeline,
     read_poses,
+    with_files,
 )
 
 _ESTIMATES = ("normals", "radii")
@@ -104,13 +104,7 @@ def _wanted(args: Namespace) -> list[str]:
 
 
 def _eye(text: str) -> tuple[float, ...]:
-    try:
-        eye = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        eye = ()
-    if len(eye) != 3 or not all(map(math.isfinite, eye)):
-        raise ArgumentTypeError(f"'{text}' is not a position X,Y,Z such as 0,1.5,3")
-    return eye
+    return arguments.numbers(text, (3,), "a position X,Y,Z such as 0,1.5,3")
 
 
 class _Poses:
@@ -194,10 +188,6 @@ def _write_frames(args: Namespace, timeline: Timeline, indices: Sequence[int], c
     known = sorted([*formats.writable_suffixes(views=True), *formats.scan_suffixes()])
     check_output(args.out, known, several=len(indices) > 1)
     claim(frame_outputs(args.out, indices, timeline), scan_inputs(timeline), args.force)
-    with frame_files(args.out) as file_of, progress(len(indices)) as tick:
-        remarks = set()
-        for pose in chosen.of(timeline, indices):
-            remarks.add(formats.write(file_of(pose), pose.cloud, pose.views))
-            tick()
-    for remark in remarks - {None}:
+    written = with_files(args.out, chosen.of(timeline, indices), len(indices))
+    for remark in {formats.write(path, pose.cloud, pose.views) for pose, path in written} - {None}:
         warn(f"{args.out}: {remark}")

@@ -9,7 +9,6 @@ the repeats of a movement. --plot saves the same plots as the window.
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 
 from ..analysis.curves import ORDERS, Smoothing
 from ..analysis.landmarks.files import AXES, landmark_suffixes, read_landmarks
-from ..analysis.landmarks.files.long_table import LONG_COLUMNS, cell, landmark_rows
+from ..analysis.landmarks.files.long_table import LONG_COLUMNS, landmark_rows
 from ..analysis.landmarks.landmark_set import LandmarkSet
 from ..analysis.measures import Measure, Quantity, Series
 from ..analysis.measures.curves import (
@@ -41,9 +40,9 @@ from ..analysis.measures.definitions import read_measures
 from ..analysis.measures.series import all_series
 from ..analysis.track import STATES, Known, Track
 from ..analysis.trajectories import Trajectory, held_still, stabilising, trajectory_of
-from ..csv_text import save_rows
+from ..csv_text import cell, save_rows
 from ..errors import InputError, unknown_name
-from ..files import absolute, whole_file
+from ..files import absolute, save_json
 from ..output.export import check_output
 from ..output.plots import (
     PLOT_SUFFIXES,
@@ -62,7 +61,7 @@ from ..scan.units import Scale
 from ..task import Task
 from ._console import progress, tell, warn
 from ._followed import check_on_scan, put_on_surface, tracks_in_frames, with_noise
-from ._outputs import add_force_argument, claim
+from ._outputs import add_output_argument, claim
 from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline
 
 _SUFFIXES = (".csv", ".json")
@@ -87,9 +86,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="FILE",
         help="file of measures (JSON or TOML), or a template; default: no measures",
     )
-    parser.add_argument(
-        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True, help=" or ".join(_SUFFIXES)
-    )
+    add_output_argument(parser, " or ".join(_SUFFIXES))
     parser.add_argument(
         "--numbers", type=Path, metavar="FILE",
         help="table of the largest movement of each measure (amplitude, onset, peak, ...), "
@@ -103,7 +100,6 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--plot", type=Path, metavar="FILE",
         help=f"picture of the measures over time, {', '.join(PLOT_SUFFIXES)}",
     )  # fmt: skip
-    add_force_argument(parser)
     add_pose_arguments(parser)
     how = parser.add_argument_group("tracking and measuring")
     how.add_argument(
@@ -233,36 +229,28 @@ def _write_numbers(args: Namespace, curves: Sequence[MeasureCurve], timeline: Ti
         _write(args.numbers, timeline, columns, number_rows(curves, against))
 
 
-def _length(text: str) -> float:
-    length = _number(text)
-    if not 0 <= length <= _LONGEST:
-        raise ArgumentTypeError(f"'{text}' is not a length from 0 to {_LONGEST:g}")
-    return length
+def _number_that(fits: Callable[[float], bool], what: str) -> Callable[[str], float]:
+    """A function from the text of an argument to a number, which refuses those that do not fit."""
+
+    def parse(text: str) -> float:
+        try:
+            number = float(text)
+        except ValueError:
+            number = math.nan
+        if not fits(number):
+            raise ArgumentTypeError(f"'{text}' is not {what}")
+        return number
+
+    return parse
 
 
-def _share(text: str) -> float:
-    share = _number(text)
-    if not 0 < share <= 1:
-        raise ArgumentTypeError(f"'{text}' is not a share above 0, up to 1")
-    return share
-
-
-def _time(text: str) -> float:
-    seconds = _number(text)
-    if not 0 < seconds < math.inf:
-        raise ArgumentTypeError(f"'{text}' is not a time above 0, in seconds")
-    return seconds
+_length = _number_that(lambda length: 0 <= length <= _LONGEST, f"a length from 0 to {_LONGEST:g}")
+_share = _number_that(lambda share: 0 < share <= 1, "a share above 0, up to 1")
+_time = _number_that(lambda seconds: 0 < seconds < math.inf, "a time above 0, in seconds")
 
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for part in text.split(",") if (name := part.strip())))
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return math.nan
 
 
 def _outputs(args: Namespace) -> list[Path]:
@@ -452,10 +440,7 @@ def _write(path: Path, timeline: Timeline, columns: Sequence[str], rows: Sequenc
         save_rows(path, [columns, *rows])
         return
     objects = [dict(zip(columns, row, strict=True)) for row in rows]
-    table = {"scan": timeline.name, "unit": timeline.unit, "rows": objects}
-    with whole_file(path) as temporary:
-        text = json.dumps(table, indent=1, allow_nan=False, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    save_json(path, {"scan": timeline.name, "unit": timeline.unit, "rows": objects})
 
 
 def _tell_gaps(

@@ -7,14 +7,13 @@ out%04d.exr; Scan4D writes the times into times.csv beside it.
 
 from __future__ import annotations
 
-import json
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..files import whole_file
+from ..files import save_json
 from ..mesh.merging.competition import Rules
 from ..mesh.merging.merged import MergedViews, merge_views
 from ..output.export import check_output
@@ -23,17 +22,17 @@ from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.range_view import RangeView, merge
 from ..scan.timeline import Timeline
-from ._console import escaped, progress, tell, warn
-from ._outputs import add_force_argument, claim
+from ._console import escaped, tell, warn
+from ._outputs import add_output_argument, claim
 from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
     chosen_poses,
-    frame_files,
     frame_outputs,
     frame_title,
     open_timeline,
     read_poses,
+    with_files,
 )
 
 _HEADER = ("pose", "views", "overlap", "depth rmse", "rotation", "shift", "")
@@ -42,12 +41,8 @@ _HEADER = ("pose", "views", "overlap", "depth rmse", "rotation", "shift", "")
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d merge`."""
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
-    parser.add_argument(
-        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
-        help=f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d",
-    )  # fmt: skip
+    add_output_argument(parser, f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d")
     parser.add_argument("--report", type=Path, metavar="FILE.json", help="write all findings")
-    add_force_argument(parser)
     add_pose_arguments(parser)
     how = parser.add_argument_group("merging")
     how.add_argument(
@@ -79,13 +74,11 @@ def run(args: Namespace) -> int:
         outputs = [*frame_outputs(args.out, indices, timeline), *([args.report] if args.report else [])]
         claim(outputs, scan_inputs(timeline), args.force)
         facts = []
-        with frame_files(args.out) as file_of, progress(len(indices)) as tick:
-            for pose in read_poses(timeline, indices):
-                merged = merge_views(_views(pose), rules, args.refine)
-                formats.write(file_of(pose), merge(merged.views, normals=True), merged.views)
-                facts.append({"pose": pose.index, "label": pose.label, "time": pose.time, **merged.facts()})
-                _warn_of_drift(merged, frame_title(timeline, pose.index), timeline.unit)
-                tick()
+        for pose, path in with_files(args.out, read_poses(timeline, indices), len(indices)):
+            merged = merge_views(_views(pose), rules, args.refine)
+            formats.write(path, merge(merged.views, normals=True), merged.views)
+            facts.append({"pose": pose.index, "label": pose.label, "time": pose.time, **merged.facts()})
+            _warn_of_drift(merged, frame_title(timeline, pose.index), timeline.unit)
         _tell_facts(args, timeline, facts)
     tell(args.out)
     return 0
@@ -130,9 +123,7 @@ def _tell_facts(args: Namespace, timeline: Timeline, facts: Sequence[dict[str, A
             f" area, {pose['ties']:.2%} kept from several views with tied weights; pixels kept: {kept}"
         )
     if args.report:
-        report = {"scan": timeline.name, "unit": timeline.unit, "poses": facts}
-        with whole_file(args.report) as path:
-            path.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        save_json(args.report, {"scan": timeline.name, "unit": timeline.unit, "poses": facts})
 
 
 def _rows(pose: dict[str, Any]) -> list[tuple[str, ...]]:

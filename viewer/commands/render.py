@@ -8,14 +8,12 @@ OpenGL, from code words, and can write them to a .cw file; SCAN can be such a fi
 
 from __future__ import annotations
 
-import json
-import math
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..backends import backend as find_backend
 from ..camera import Camera
@@ -27,7 +25,7 @@ from ..drawing.frame import supersample
 from ..drawing.request import Request, backend_for
 from ..drawing.timing import draw
 from ..errors import InputError
-from ..files import whole_file
+from ..files import save_json
 from ..look import SAMPLES, Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..output.legend import MARKS, Legend, marks_of
@@ -44,7 +42,7 @@ from . import _without_gl as without_gl
 from ._choosing import AUTO, add_goal_arguments, choice_of, goal_of
 from ._console import progress, say, tell, warn
 from ._drawing import Plan, Shot
-from ._outputs import add_force_argument, claim
+from ._outputs import add_output_argument, claim
 from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
@@ -61,10 +59,7 @@ _SIZE = (1920, 1280)
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d render`."""
     parser.add_argument("scan", metavar="SCAN", nargs="?", help=SCAN_HELP)
-    parser.add_argument(
-        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
-        help=".png .exr .npz .mp4, or a pattern with %%04d; with --no-gl also .cw",
-    )  # fmt: skip
+    add_output_argument(parser, ".png .exr .npz .mp4, or a pattern with %%04d; with --no-gl also .cw")
     parser.add_argument(
         "--replay", type=Path, metavar="FILE",
         help="draw a recording (.json) or a picture (.png, .exr) again; SCAN replaces its scan",
@@ -74,7 +69,6 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="anonymise: store no name, folder or time of the scan",
     )  # fmt: skip
     parser.add_argument("--progress", action="store_true", help="print a line of JSON for each picture")
-    add_force_argument(parser)
     add_pose_arguments(parser)
     picture = parser.add_argument_group("picture")
     picture.add_argument(
@@ -213,12 +207,7 @@ def _draw(plan: Plan, args: Namespace) -> None:
             drawn = request
             put(surface, number, entry.description(), legend)
         if args.stats:
-            _write_json(stats.summary(renderer, surface, request, frames, entry.automatic), args.stats)
-
-
-def _write_json(data: dict[str, Any], path: Path) -> None:
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+            save_json(args.stats, stats.summary(renderer, surface, request, frames, entry.automatic))
 
 
 class _Wanted(NamedTuple):
@@ -268,10 +257,4 @@ def _assignment(text: str) -> tuple[str, str]:
 
 
 def _orbit(text: str) -> tuple[float, ...]:
-    try:
-        numbers = tuple(float(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
-    if len(numbers) not in (2, 3) or not all(map(math.isfinite, numbers)):
-        raise ArgumentTypeError(f"'{text}' is not AZIMUTH,ELEVATION[,DISTANCE] such as 30,15")
-    return numbers
+    return arguments.numbers(text, (2, 3), "AZIMUTH,ELEVATION[,DISTANCE] such as 30,15")

@@ -26,16 +26,16 @@ from ..scan.sources import FACES_FILE
 from ..scan.timeline import Timeline
 from ..simulate.scanner import Faults, around, capture, rig
 from . import _arguments as arguments
-from ._console import progress, tell
-from ._outputs import add_force_argument, claim
+from ._console import tell
+from ._outputs import add_output_argument, claim
 from ._scans import (
     add_pose_arguments,
     chosen_poses,
-    frame_files,
     frame_outputs,
     framing,
     open_timeline,
     read_poses,
+    with_files,
 )
 
 _HINT = "Name a mesh that has the faces with --faces"
@@ -46,10 +46,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "scan", metavar="MESH|SEQUENCE", help="a file with faces (PLY, OBJ, NPZ), a folder, a pattern, demo"
     )
-    parser.add_argument(
-        "-o", "--output", dest="out", metavar="OUT", type=Path, required=True,
-        help=f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d",
-    )  # fmt: skip
+    add_output_argument(parser, f"{' '.join(formats.writable_suffixes(views=True))}, or a pattern with %%04d")
     parser.add_argument(
         "--faces", type=Path, metavar="FILE",
         help=(
@@ -57,7 +54,6 @@ def add_arguments(parser: ArgumentParser) -> None:
             "frames"
         ),
     )  # fmt: skip
-    add_force_argument(parser)
     add_pose_arguments(parser)
     pods = parser.add_argument_group("scanner")
     arrangement = pods.add_mutually_exclusive_group()
@@ -135,14 +131,11 @@ def run(args: Namespace) -> int:
         aspect = args.size[0] / args.size[1]
         bounds = framing(timeline, indices)
         pods = rig(bounds, azimuths, args.elevation, aspect=aspect, fov_y=args.fov, up=args.up or UP)
-        with frame_files(args.out) as file_of, progress(len(indices)) as tick:
-            for pose in read_poses(timeline, indices):
-                views = capture(
-                    mesh_of(pose), pods, args.size, faults,
-                    seed=args.seed, frame=pose.index, unit=timeline.unit,
-                )  # fmt: skip
-                formats.write(file_of(pose), merge(views, normals=True), views)
-                tick()
+        for pose, path in with_files(args.out, read_poses(timeline, indices), len(indices)):
+            views = capture(
+                mesh_of(pose), pods, args.size, faults, seed=args.seed, frame=pose.index, unit=timeline.unit
+            )
+            formats.write(path, merge(views, normals=True), views)
     tell(args.out)
     return 0
 
@@ -197,10 +190,7 @@ def _mesh(pose: Pose, faces: Faces) -> Mesh:
 
 
 def _numbers(text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise ArgumentTypeError(f"'{text}' is not a number, or several with commas such as 0.5,1.0") from None
+    return arguments.numbers(text, None, "a number, or several with commas such as 0.5,1.0")
 
 
 def _factors(text: str) -> tuple[float, ...]:

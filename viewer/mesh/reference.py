@@ -197,13 +197,8 @@ def both_see(
     pixels, depth = view.project(moved)
     column, row = np.floor(pixels).astype(np.intp).T
     there = second.depth[row, column]
-    same = np.abs(there - depth) <= _SAME * footprint(view, depth)
+    same = np.abs(there - depth) <= _SAME * view.footprint(depth)
     return source[same], (row * view.size[0] + column)[same]
-
-
-def footprint(view: View, depth: NDArray[np.floating]) -> NDArray[np.float64]:
-    """The edge of the square that a pixel covers at a depth, scan units, of the shape of `depth`."""
-    return (np.asarray(depth, np.float64) if view.perspective else np.ones(depth.shape)) / view.scale
 
 
 def pixel_rays(view: View, pixels: NDArray[np.integer]) -> tuple[Rays, Rays]:

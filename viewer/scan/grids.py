@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..rigid import rigid_matrix
 from .range_view import RangeView
 
 _FLATTEST = 1e-3  # of the second direction that a grid needs
@@ -99,8 +100,6 @@ def view_of_grid(grid: NDArray[np.floating], to_grid: NDArray[np.float64], name:
     fy, cy = _line(-in_camera[:, 1], row + 0.5)
     depth, xy = np.full(valid.shape, np.nan, np.float32), np.full((*valid.shape, 2), np.nan, np.float32)
     depth[valid], xy[valid] = -in_camera[:, 2], in_camera[:, :2]
-    turn = np.eye(4)
-    turn[:3, :3] = axes
     return RangeView(
         kind="height",
         depth=depth,
@@ -110,7 +109,7 @@ def view_of_grid(grid: NDArray[np.floating], to_grid: NDArray[np.float64], name:
         fy=fy,
         cx=cx,
         cy=cy,
-        world_to_camera=turn @ to_grid,
+        world_to_camera=rigid_matrix(axes, np.zeros(3)) @ to_grid,
         name=name,
         unit=unit,
     )

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..rigid import is_rigid
+from ..rigid import is_rigid, rigid_matrix
 
 UPRIGHT = np.eye(4)  # of a camera without a pose: the world is its own space
 IMAGE_AXES = np.diag([1.0, -1.0, -1.0, 1.0])  # +y down and +z ahead, to up and back; and from there
@@ -21,7 +21,7 @@ def from_camera_to_world(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     if not is_rigid(pose, _ROUNDED):
         raise InputError("its pose is not a rotation and a translation")
     left, _, right = np.linalg.svd(pose[:3, :3])
-    return IMAGE_AXES @ from_rotation((left @ right).T, -(left @ right).T @ pose[:3, 3])
+    return IMAGE_AXES @ rigid_matrix((left @ right).T, -(left @ right).T @ pose[:3, 3])
 
 
 def from_world_to_camera(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -31,23 +31,10 @@ def from_world_to_camera(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     return from_camera_to_world(np.asarray(np.linalg.inv(matrix), np.float64))
 
 
-def from_rotation(rotation: NDArray[np.float64], translation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrix (4, 4) of a rotation (3, 3) and a translation (3,)."""
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = rotation, translation
-    return matrix
-
-
 def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix (3, 3) of a quaternion x y z w of any length but 0. Raises InputError for others."""
-    length = float(np.linalg.norm(quaternion))
-    if not (np.isfinite(length) and length > 0):
+    from scipy.spatial.transform import Rotation
+
+    if not (np.isfinite(quaternion).all() and quaternion.any()):
         raise InputError(f"the quaternion {quaternion.tolist()} is not a rotation")
-    x, y, z, w = quaternion / length
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return Rotation.from_quat(quaternion).as_matrix()

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..rigid import rigid_matrix
 from .range_view import RangeView
 from .units import conversion
 
@@ -83,8 +84,6 @@ def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, nam
             )
         east, north = metres_of_a_degree(y)
         x, y, right, down = 0.0, 0.0, right * east * metre, down * north * metre
-    to_camera = np.eye(4)
-    to_camera[:2, 3] = -x, -y
     return RangeView(
         kind="height",
         depth=np.negative(heights[ground.turned], dtype=np.float32),
@@ -93,7 +92,7 @@ def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, nam
         fy=1 / abs(down),
         cx=columns / 2,
         cy=rows / 2,
-        world_to_camera=to_camera,
+        world_to_camera=rigid_matrix(np.eye(3), np.array([-x, -y, 0.0])),
         name=name,
         unit=ground.unit,
     )

@@ -17,6 +17,7 @@ from ..camera import Camera
 from ..errors import InputError
 from ..mesh.reference import Reference, trace
 from ..mesh.scene import Scene
+from ..rigid import rigid_matrix
 from ..scan.points import UNKNOWN_UNIT
 from ..scan.range_view import RangeView
 
@@ -165,9 +166,6 @@ def _measure(
     measured = picture.covered & ~steep & (lost >= faults.dropouts) & (stored > 0) & np.isfinite(stored)
 
     rotation = _to_the_left(faults.calibration_error) @ view.rotation
-    to_camera = np.eye(4)
-    to_camera[:3, :3] = rotation
-    to_camera[:3, 3] = -rotation @ np.array(pod.eye)
     return RangeView(
         depth=np.where(measured, stored, np.float32(np.nan)),
         mask=measured,
@@ -177,7 +175,7 @@ def _measure(
         fy=view.scale,
         cx=view.size[0] / 2,
         cy=view.size[1] / 2,
-        world_to_camera=to_camera,
+        world_to_camera=rigid_matrix(rotation, -rotation @ np.array(pod.eye)),
         name=name,
         unit=unit,
     )

@@ -3,7 +3,8 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.bench.scenes import samples
-from viewer.bench.scenes.registration import OrientedPoints, register, turned
+from viewer.bench.scenes.registration import OrientedPoints, register
+from viewer.rigid import rigid_matrix, rotation_about
 
 # An ellipsoid: a sphere, squeezed, so that turning it shows.
 UNIT = samples.on_sphere(6000)["positions"]
@@ -16,9 +17,7 @@ def target() -> OrientedPoints:
 
 
 def moved(rotation: list[float], translation: list[float]) -> np.ndarray:
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = turned(np.array(rotation)), translation
-    return motion
+    return rigid_matrix(rotation_about(np.array(rotation)), np.array(translation))
 
 
 def test_a_known_motion_is_found() -> None:
@@ -46,6 +45,6 @@ def test_nothing_in_reach_says_so() -> None:
 
 
 def test_it_is_the_same_every_time() -> None:
-    away = UNIT[::5] * AXES @ turned(np.array([0.1, 0.0, 0.0]))
+    away = UNIT[::5] * AXES @ rotation_about(np.array([0.1, 0.0, 0.0]))
     first, second = (register(away, target(), np.eye(4), (0.5, 0.1))[0] for _ in range(2))
     np.testing.assert_array_equal(first, second)

@@ -29,7 +29,7 @@ from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.drawing.timing import call_ms, draw, pass_ms
 from viewer.look import Look
-from viewer.mesh.reference import Reference, footprint, trace
+from viewer.mesh.reference import Reference, trace
 from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView
@@ -142,7 +142,7 @@ class Drawn:
         """The pixels, (H, W), that show the true surface."""
         shown = reference.covered & np.isfinite(self.depth)
         off = np.abs(self.depth[shown] - reference.depth[shown])
-        shown[shown] = off <= _SAME * footprint(reference.view, reference.depth[shown])
+        shown[shown] = off <= _SAME * reference.view.footprint(reference.depth[shown])
         return shown
 
 
@@ -163,7 +163,7 @@ def _inside(reference: Reference, mask: Mask, edge: int = _EDGE) -> Mask:
 
     depth = np.where(reference.covered, reference.depth, 0)
     step = ndimage.maximum_filter(depth, 3) - ndimage.minimum_filter(depth, 3)
-    smooth = step <= _STEEP * footprint(reference.view, depth)
+    smooth = step <= _STEEP * reference.view.footprint(depth)
     return ndimage.binary_erosion(mask & smooth, iterations=edge)
 
 

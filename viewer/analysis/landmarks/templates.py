@@ -7,17 +7,16 @@ there are any its `partner` in the mirror and `about`, how it is found) and `mea
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError, shortened
-from ...files import parsed_json, read_text, whole_file
+from ...files import parsed_json, read_text, reading, save_json
 from ...resources import resource_path
 from ..measures import Measure
-from ..measures.definitions import errors_of, measure_of
+from ..measures.definitions import measure_of
 from ..measures.kinds import kind_of
 from . import Landmark, Template
 from .landmark_set import LONGEST_LANDMARK_NAME
@@ -51,7 +50,7 @@ def is_template_file(path: Path | str) -> bool:
 def read_template(path: Path | str) -> Template:
     """The template of a file. Raises InputError, which tells the place of what is wrong."""
     path = Path(path)
-    with errors_of(path, "is not JSON", _HINT):
+    with reading(path, "is not JSON", _HINT):
         return _template(parsed_json(read_text(path, _MOST_BYTES)))
 
 
@@ -171,5 +170,4 @@ def save_template(path: Path | str, template: Template) -> None:
         "format": _FORMAT, "name": template.name, "title": template.title, "source": template.source,
         "landmarks": landmarks, "measures": measures,
     }  # fmt: skip
-    with whole_file(path) as temporary:
-        temporary.write_text(json.dumps(data, indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    save_json(path, data)

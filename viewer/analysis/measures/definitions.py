@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ...errors import InputError, explained, shortened
-from ...files import parsed_json, parsed_toml, read_text
+from ...errors import InputError, shortened
+from ...files import parsed_json, parsed_toml, read_text, reading
 from . import Measure
 from .kinds import kind_of
 
@@ -22,25 +20,9 @@ def read_measures(path: Path | str) -> tuple[Measure, ...]:
     """The measures of a file, of a template as well, at least one. Raises InputError, which says what is
     wrong and where."""
     path = Path(path)
-    with errors_of(path, "is neither JSON nor TOML", _HINT):
+    with reading(path, "is neither JSON nor TOML", _HINT):
         text = read_text(path, _MOST_BYTES)
         return _measures(parsed_toml(text) if path.suffix.lower() == ".toml" else parsed_json(text))
-
-
-@contextmanager
-def errors_of(path: Path, not_parsed: str, hint: str) -> Iterator[None]:
-    """Raise InputError, which names the file, for what goes wrong inside. not_parsed: words for a text that
-    cannot be parsed. hint: for errors without one."""
-    try:
-        yield
-    except InputError as error:
-        where = ", ".join(map(str, filter(None, (path, error.where))))
-        raise InputError(error.what, where, error.hint or hint) from None
-    except OSError as error:
-        what, how = explained(error)
-        raise InputError(f"cannot be read: {what}", path, how) from error
-    except ValueError as error:  # of the text's encoding as well
-        raise InputError(f"{not_parsed} ({error})", path, hint) from error
 
 
 def _measures(data: Any) -> tuple[Measure, ...]:

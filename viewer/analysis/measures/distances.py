@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...csv_text import text_of_cell
-from ...errors import InputError, explained
-from ...files import open_plain, read_text
+from ...csv_text import cell, text_of_cell
+from ...errors import InputError
+from ...files import open_plain, read_text, reading
 from ...scan.pose import Pose
 from ...scan.units import Scale, conversion
 from ..landmarks import Landmark
@@ -74,7 +74,7 @@ def distance_rows(
             if series.known[frame] >= Known.TRACKED or STATES[Known.PLACED] in (end[0] for end in ends):
                 value, sure = scale.factor * series.values[frame], SURE * scale.factor * series.sigmas[frame]
                 head = scan, measure.name, frame + 1, float(series.times[frame])
-                rows.append([*head, _cell(value), _cell(sure), scale.unit, *ends[0], *ends[1]])
+                rows.append([*head, cell(value), cell(sure), scale.unit, *ends[0], *ends[1]])
     return rows
 
 
@@ -85,14 +85,10 @@ def _end_cells(landmark: Landmark, track: Track, frame: int, factor: float) -> l
     return [
         STATES[Known(int(track.known[frame]))],
         None if key is None else key.id,
-        *(_cell(factor * length) for length in lengths),
+        *(cell(factor * length) for length in lengths),
         spacing,
         None if key is None else key.level,
     ]
-
-
-def _cell(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
 
 
 def is_distance_table(path: Path) -> bool:
@@ -139,13 +135,8 @@ def read_distances(
 
 def _rows(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
     """The rows of a table, each after its place in words. Raises InputError for what is no such table."""
-    try:
+    with reading(path, "is not a UTF-8 text", _HINT):
         text = read_text(path, _MOST_BYTES)
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", path, hint) from error
-    except UnicodeDecodeError as error:
-        raise InputError("is not a UTF-8 text", path, _HINT) from error
     rows = csv.DictReader(StringIO(text, newline=""), strict=True)
     try:
         for row in rows:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...mesh.scene import Rays
+from ...rigid import rigid_matrix, rotation_about
 
 _STEPS = 60  # at each reach
 _STILL = 1e-6  # a step that moves nothing any more: radians, and scan units
@@ -62,17 +63,6 @@ def _step(points: Rays, target: OrientedPoints, reach: float) -> tuple[NDArray[n
     # Not by matrix products: those may sum in another order on another number of threads.
     square, right = np.einsum("ni,nj->ij", rows, rows), -np.einsum("ni,n->i", rows, off)
     solution = np.linalg.lstsq(square, right, rcond=None)[0]
-    motion = np.eye(4)
-    motion[:3, :3] = turned(solution[:3])
-    motion[:3, 3] = center - motion[:3, :3] @ center + solution[3:]
+    turn = rotation_about(solution[:3])
+    motion = rigid_matrix(turn, center - turn @ center + solution[3:])
     return motion, float(np.sqrt(np.mean(off**2))), float(paired.mean())
-
-
-def turned(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The matrix (3, 3) of a rotation vector (3,), radians (Rodrigues)."""
-    angle = np.linalg.norm(rotation)
-    if angle == 0:
-        return np.eye(3)
-    x, y, z = rotation / angle
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...bounds import Bounds
-from ...rigid import STILL, Rigid
+from ...rigid import STILL, Rigid, rigid_matrix, rotation_about
 from ...scan.range_view import RangeView
 from ...task import checkpoint
 from ..scene import Rays
@@ -89,16 +89,15 @@ class _Frame:
 
     def motion(self, twist: Twist) -> Rigid:
         """The motion of a twist."""
-        turn = _rotation(twist[:3] / self.scale)
-        matrix = np.eye(4)
-        matrix[:3, :3] = turn
-        matrix[:3, 3] = self.middle + twist[3:] - turn @ self.middle
-        return Rigid(matrix)
+        turn = rotation_about(twist[:3] / self.scale)
+        return Rigid(rigid_matrix(turn, self.middle + twist[3:] - turn @ self.middle))
 
     def twist(self, motion: Rigid) -> Twist:
         """The twist of a motion."""
-        moved = motion.points(self.middle[None])[0]
-        return np.concatenate([_turn(motion.rotation) * self.scale, moved - self.middle])
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_matrix(motion.rotation).as_rotvec()
+        return np.concatenate([turn * self.scale, motion.points(self.middle) - self.middle])
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +232,7 @@ def _motioned(surface: RangeSurface, motion: Rigid) -> RangeSurface:
 def _closest(points: Rays, fixed: RangeSurface, frame: _Frame, within: float) -> Rigid:
     """The motion that brings points (N, 3), relative to the frame's middle, onto a surface, by ICP."""
     from open3d import geometry, pipelines, utility
+    from scipy.spatial.transform import Rotation
 
     registration = pipelines.registration
     source, target = geometry.PointCloud(), geometry.PointCloud()
@@ -251,10 +251,7 @@ def _closest(points: Rays, fixed: RangeSurface, frame: _Frame, within: float) ->
             registration.ICPConvergenceCriteria(max_iteration=_ITERATIONS),
         )
         found = np.array(result.transformation)
-    matrix = np.eye(4)
-    matrix[:3, :3] = _rotation(_turn(found[:3, :3]))
-    matrix[:3, 3] = found[:3, 3]
-    motion = Rigid(matrix)
+    motion = Rigid(rigid_matrix(Rotation.from_matrix(found[:3, :3]).as_matrix(), found[:3, 3]))
     farthest = np.linalg.norm(motion.points(points) - points, axis=1).max()
     if not farthest <= 3 * within:  # it has slid away
         return STILL
@@ -332,25 +329,3 @@ def _components(pairs: dict[tuple[int, int], _Registration], count: int) -> list
         for i, j in pairs:
             group[[i, j]] = group[[i, j]].min()
     return [np.flatnonzero(group == one) for one in np.unique(group)]
-
-
-def _rotation(turn: Rays) -> NDArray[np.float64]:
-    """The rotation (3, 3) about a vector (3,) by its length in radians (Rodrigues)."""
-    angle = float(np.linalg.norm(turn))
-    x, y, z = turn / angle if angle else turn
-    across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * across @ across
-
-
-def _turn(rotation: NDArray[np.float64]) -> Rays:
-    """The vector (3,) about which a rotation (3, 3) of less than half a turn turns, as long as its angle."""
-    axis = np.array(
-        [
-            rotation[2, 1] - rotation[1, 2],
-            rotation[0, 2] - rotation[2, 0],
-            rotation[1, 0] - rotation[0, 1],
-        ]
-    )
-    sine = float(np.linalg.norm(axis)) / 2
-    angle = np.arctan2(sine, (np.trace(rotation) - 1) / 2)
-    return axis / (2 * sine) * angle if sine else np.zeros(3)

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, shortened, unknown_name
+from ...rigid import rigid_matrix
 from ..grids import view_of_camera
-from ..image_poses import from_camera_to_world, from_rotation, rotation_of
+from ..image_poses import from_camera_to_world, rotation_of
 from ..points import UNKNOWN_UNIT, PointCloud
 from ..pose import Scanned
 from ..range_view import RangeView
@@ -142,7 +143,7 @@ def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
         numbers = np.empty(0)
     if numbers.shape != (7,) or not np.isfinite(numbers).all():
         raise InputError(f"its VIEWPOINT is not a pose: {shortened(' '.join(viewpoint))}")
-    return from_camera_to_world(from_rotation(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
+    return from_camera_to_world(rigid_matrix(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
 
 
 def write(path: Path, cloud: PointCloud) -> str | None:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
 from ...files import named_inside
+from ...rigid import rigid_matrix
 from ..formats._admission import check_count
 from ..formats.npz import read_arrays
 from ..formats.ply import read_range_grid
 from ..grids import view_of_grid
-from ..image_poses import from_rotation, rotation_of
+from ..image_poses import rotation_of
 from ..range_view import RangeView
 from ._source import MOST_VIEWS, RangeFrames
 from ._texts import text_of
@@ -68,7 +69,7 @@ def _placement(conf: Path, line: str) -> tuple[str, NDArray[np.float64]]:
         hint = f"A line is {_SCAN}, a file, and 7 numbers: a translation and a quaternion x y z w"
         raise InputError(f"'{shortened(line)}' does not describe a scan", conf, hint)
     rotation = rotation_of(numbers[3:])
-    return name, from_rotation(rotation, -rotation @ numbers[:3])
+    return name, rigid_matrix(rotation, -rotation @ numbers[:3])
 
 
 def _file(named: Path) -> Path:

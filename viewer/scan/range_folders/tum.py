@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
 from ...files import named_inside
-from ..image_poses import UPRIGHT, from_camera_to_world, from_rotation, rotation_of
+from ...rigid import rigid_matrix
+from ..image_poses import UPRIGHT, from_camera_to_world, rotation_of
 from ._calibration import PRIMESENSE, calibration_beside
 from ._partners import PICTURE_BYTES, DepthPicture, frames_of_pictures
 from ._source import RangeFrames
@@ -136,4 +137,4 @@ def _pose(words: list[str], path: Path) -> NDArray[np.float64]:
     except ValueError:
         hint = "A row is seconds, tx ty tz qx qy qz qw"
         raise InputError(f"'{shortened(' '.join(words))}' is not a pose", path, hint) from None
-    return from_camera_to_world(from_rotation(rotation_of(numbers[3:]), numbers[:3]))
+    return from_camera_to_world(rigid_matrix(rotation_of(numbers[3:]), numbers[:3]))

@@ -212,8 +212,3 @@ def _wide(
         frames=None if frame_at is None else frames,
         notes=LandmarkNotes(units.unit),
     )
-
-
-def cell(value: float) -> float | None:
-    """A number as tables have it, empty where it is not known."""
-    return float(value) if math.isfinite(value) else None

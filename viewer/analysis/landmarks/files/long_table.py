@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from ....csv_text import to_text
+from ....csv_text import cell, to_text
 from ...track import STATES, Known
 from ..landmark_set import LandmarkSet
-from ._tables import LONG_COLUMNS, cell, has_columns, read_table
+from ._tables import LONG_COLUMNS, has_columns, read_table
 
 TITLE = "table of landmarks"
 SUFFIXES = (".csv",)

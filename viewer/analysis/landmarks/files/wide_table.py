@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ....csv_text import to_text
+from ....csv_text import cell, to_text
 from ..landmark_set import LandmarkSet
-from ._tables import cell, has_columns, read_table
+from ._tables import has_columns, read_table
 from ._text import without_states
 
 TITLE = "wide table of landmarks"
