@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from demo_surface import rest_of
 from experiments.landmarks.places import PLACES, path_of, skin_normals, truth_places
 
 from viewer.errors import InputError
 from viewer.scan.demo import head
-from viewer.scan.demo.motion import rest_of
 from viewer.scan.demo.variants import demo_motion
 
 

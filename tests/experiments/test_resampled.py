@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from demo_surface import rest_of, surface_normal, surface_value
 from experiments.landmarks.resampled import ResampledDemo, ResampledMesh
 
-from viewer.scan.demo.motion import rest_of, surface_normal, surface_value
 from viewer.scan.open import find_source
 from viewer.scan.spacing import typical_spacing
 from viewer.scan.timeline import Timeline

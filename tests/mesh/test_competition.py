@@ -12,6 +12,7 @@ from range_scenes import shape_view, sphere_view
 
 from viewer.errors import InputError
 from viewer.mesh.merging.competition import Rules, compete, competition_weights
+from viewer.mesh.merging.surfaces import RangeSurface
 from viewer.mesh.triangles import Mesh
 from viewer.scan.open import open_scan
 from viewer.scan.range_view import RangeView
@@ -29,7 +30,8 @@ def ball() -> Mesh:
 def test_weights_are_confidence_times_facing() -> None:
     view = replace(sphere_view((0.0, 0.0, 4.0)), color=None)
     assert view.confidence is not None
-    weights, valid = competition_weights(view), view.valid()
+    surface, valid = RangeSurface.of(view), view.valid()
+    weights = surface.on_grid(competition_weights(surface, confident=True))
     out = view.positions()  # normals of the unit sphere
     rays = view.eye - out
     cosine = (out * rays).sum(axis=1) / np.linalg.norm(rays, axis=1)
@@ -38,7 +40,7 @@ def test_weights_are_confidence_times_facing() -> None:
     assert np.abs(weights[valid][inner] - expected).max() < 0.05
     assert (weights[~valid] == 0).all()
     assert (weights >= 0).all()
-    facing = competition_weights(view, confident=False)[valid][inner]
+    facing = competition_weights(surface, confident=False)[inner]
     assert np.abs(facing - cosine[inner]).max() < 0.05
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -12,7 +13,7 @@ from scenes import DRAWS_POINTS, of_variant, variants
 from viewer.backends import Backend, Limit, backends
 from viewer.backends import backend as find_backend
 from viewer.backends.points import PointSquares
-from viewer.bench.numerics import EXACT, distinct_limits, rows, swept_settings
+from viewer.bench.numerics import EXACT, rows
 from viewer.bench.rounding import Rounding
 from viewer.bench.shots import RgbdImage, picture
 from viewer.bench.stability import Difference, Row, difference
@@ -31,6 +32,29 @@ LIMITED = [
     pytest.param(row, one, marks=pytest.mark.backend(one.name), id=f"{row.name}-{one}")
     for one in backends().values() for row in ROWS if row.name in one.limits
 ]  # fmt: skip
+
+
+def distinct_limits(backends: Iterable[Backend]) -> list[str]:
+    """The reasons of all limits, each once."""
+    declared = (limit for one in backends for row in one.limits for limit in one.limits_of(row))
+    return list(dict.fromkeys(limit.reason for limit in declared))
+
+
+def swept_settings(backend: Backend) -> list[dict[str, Any]]:
+    """Parameters that make other pictures than the defaults, one at a time: the words and switches that the
+    declaration sweeps, and those that its limits speak of."""
+    conditions = [limit.when for row in backend.limits for limit in backend.limits_of(row)]
+    settings = []
+    for parameter in backend.parameters:
+        if parameter.affects != "speed" and parameter.type in (bool, str):
+            limited = [value for when in conditions for value in when.get(parameter.name, ())]
+            settings += [{parameter.name: value} for value in dict.fromkeys([*parameter.sweep, *limited])]
+    defaults = backend.params()
+    return [
+        setting
+        for setting in settings
+        if any(getattr(defaults, name) != value for name, value in setting.items())
+    ]
 
 
 def marks_of(backend: Backend, way: dict[str, Any]) -> list[pytest.MarkDecorator]:

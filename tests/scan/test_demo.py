@@ -8,6 +8,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from demo_surface import rest_of, surface_normal, surface_value
 from numpy.typing import NDArray
 from scenes import rarely
 
@@ -90,7 +91,7 @@ def test_dual_numbers_refuse_what_they_cannot_derive() -> None:
 def test_points_lie_on_the_exact_surface(demo: DemoSource, index: int) -> None:
     points = demo.load(index).world().T
     skin = rest_points().skin
-    at_rest = motion.rest_of(points[:, :skin], seconds(demo, index))
+    at_rest = rest_of(points[:, :skin], seconds(demo, index))
     assert np.abs(head.skin(*at_rest)).max() < 1e-4  # mm: float32
     assert np.abs(head.eyes(*points[:, skin:])).max() < 1e-4
 
@@ -98,7 +99,7 @@ def test_points_lie_on_the_exact_surface(demo: DemoSource, index: int) -> None:
 @pytest.mark.parametrize("index", [EYES_SHUT, *rarely(REST, MOUTH_OPEN, SMILE)])
 def test_nearly_all_points_are_on_the_outside(demo: DemoSource, index: int) -> None:
     """Some of an eyeball's points are always behind the lids."""
-    value = motion.surface_value(demo.load(index).world(), seconds(demo, index))
+    value = surface_value(demo.load(index).world(), seconds(demo, index))
     assert value.max() < 1e-4
     assert np.mean(value > -1e-4) > 0.97
 
@@ -111,15 +112,12 @@ def test_normals_are_those_of_the_surface_and_face_outwards(demo: DemoSource, in
     shown = head.eyes(*points.T) > 1e-3
     points, normals = points[shown], normals[shown]
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
-    assert degrees_between(normals, motion.surface_normal(points, time)).max() < 0.06  # stored in 16 bits
-    difference = [
-        motion.surface_value(points + s, time) - motion.surface_value(points - s, time)
-        for s in STEP * np.eye(3)
-    ]
+    assert degrees_between(normals, surface_normal(points, time)).max() < 0.06  # stored in 16 bits
+    difference = [surface_value(points + s, time) - surface_value(points - s, time) for s in STEP * np.eye(3)]
     slope = np.transpose(difference) / np.linalg.norm(difference, axis=0)[:, None]
-    exact = motion.surface_normal(points, time)
+    exact = surface_normal(points, time)
     assert degrees_between(exact, slope).max() < 0.01
-    assert np.mean(motion.surface_value(points + 0.02 * exact, time) > 0) > 0.998
+    assert np.mean(surface_value(points + 0.02 * exact, time) > 0) > 0.998
 
 
 def test_eyeballs_have_exact_normals() -> None:
@@ -146,7 +144,7 @@ def test_the_halves_of_the_face_meet_smoothly() -> None:
 def test_motion_can_be_undone(demo: DemoSource, index: int) -> None:
     places = around_the_head(4000)
     moved, _, growth = motion.move(places, motion.normalized(places), seconds(demo, index))
-    np.testing.assert_allclose(motion.rest_of(moved, seconds(demo, index)), places, atol=1e-9)
+    np.testing.assert_allclose(rest_of(moved, seconds(demo, index)), places, atol=1e-9)
     assert growth.min() > 0
 
 
@@ -259,7 +257,7 @@ def test_the_mouth_opens_and_the_eyes_shut(demo: DemoSource) -> None:
     behind_the_lip, before_the_pupil = (0.0, -66.0, 87.0), (31.0, 11.0, 74.5)
 
     def inside(place: tuple[float, float, float], index: int) -> bool:
-        return bool(motion.surface_value([place], seconds(demo, index))[0] < 0)
+        return bool(surface_value([place], seconds(demo, index))[0] < 0)
 
     assert inside(behind_the_lip, REST)
     assert not inside(behind_the_lip, MOUTH_OPEN)

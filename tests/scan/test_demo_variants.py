@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from demo_surface import rest_of, surface_normal, surface_value
 
 from viewer.errors import InputError
 from viewer.scan.demo import DemoSource, motion
@@ -37,7 +38,7 @@ def test_motion_of_a_variant_can_be_undone(name: str) -> None:
     schedule, there = demo_motion(name), places()
     for time in np.arange(0.1, motion.PERIOD, 0.45):
         moved, normals, growth = motion.move(there, motion.normalized(there), float(time), schedule)
-        np.testing.assert_allclose(motion.rest_of(moved, float(time), schedule), there, atol=1e-9)
+        np.testing.assert_allclose(rest_of(moved, float(time), schedule), there, atol=1e-9)
         np.testing.assert_allclose(np.linalg.norm(normals, axis=0), 1, atol=1e-12)
         assert growth.min() > 0
 
@@ -48,12 +49,12 @@ def test_points_and_normals_of_a_variant_are_of_its_surface(name: str) -> None:
     cloud, time = demo.load(20), float(demo.times()[20])
     rows = np.arange(0, len(cloud), 40)
     points = cloud.world(rows)
-    value = motion.surface_value(points, time, demo.motion)
+    value = surface_value(points, time, demo.motion)
     assert value.max() < 2e-4  # mm: float32, turned
     shown = np.abs(value) < 2e-4
     assert shown.mean() > 0.97
     assert cloud.normals is not None
-    exact = motion.surface_normal(points[shown], time, demo.motion)
+    exact = surface_normal(points[shown], time, demo.motion)
     assert np.quantile((exact * cloud.normals[rows][shown]).sum(axis=1), 0.01) > 0.99999
 
 

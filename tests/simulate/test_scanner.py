@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_surface import surface_value
 from scenes import sphere_hits, sphere_mesh
 
 from viewer import cli
@@ -19,7 +20,6 @@ from viewer.errors import InputError
 from viewer.mesh.reference import trace
 from viewer.mesh.triangles import Mesh, face_normals, read_mesh
 from viewer.scan.demo import DemoSource
-from viewer.scan.demo.motion import surface_value
 from viewer.scan.formats import exr, read, read_faces, read_points
 from viewer.scan.range_view import RangeView, merge
 from viewer.simulate.scanner import Faults, around, capture, rig

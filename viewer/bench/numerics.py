@@ -7,15 +7,13 @@ Where a backend cannot hold a row in principle, its module says so and what it h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..backends import Backend
 from ..camera import PROJECTIONS, Camera
 from ..look import Look
 from ..rigid import rotation_about
@@ -31,29 +29,6 @@ FLOAT32 = Tolerance(5e-5, "float32 on the GPU: six roundings of a pixel coordina
 _SHIFT = np.array([1.0, -0.37, 0.61])  # on no power-of-two grid
 _QUARTER_TURN = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # about x: +z becomes +y
 _UNIT = 38  # pixels of the body's shot
-
-
-def distinct_limits(backends: Iterable[Backend]) -> list[str]:
-    """The reasons of all limits, each once."""
-    declared = (limit for one in backends for row in one.limits for limit in one.limits_of(row))
-    return list(dict.fromkeys(limit.reason for limit in declared))
-
-
-def swept_settings(backend: Backend) -> list[dict[str, Any]]:
-    """Parameters that make other pictures than the defaults, one at a time: the words and switches that the
-    declaration sweeps, and those that its limits speak of."""
-    conditions = [limit.when for row in backend.limits for limit in backend.limits_of(row)]
-    settings = []
-    for parameter in backend.parameters:
-        if parameter.affects != "speed" and parameter.type in (bool, str):
-            limited = [value for when in conditions for value in when.get(parameter.name, ())]
-            settings += [{parameter.name: value} for value in dict.fromkeys([*parameter.sweep, *limited])]
-    defaults = backend.params()
-    return [
-        setting
-        for setting in settings
-        if any(getattr(defaults, name) != value for name, value in setting.items())
-    ]
 
 
 def rows() -> Iterator[Row]:

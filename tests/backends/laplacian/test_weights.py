@@ -16,6 +16,7 @@ from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.mesh.merging.competition import competition_weights
+from viewer.mesh.merging.surfaces import RangeSurface
 from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
 from viewer.scan.range_view import RangeView
@@ -29,6 +30,12 @@ AWAY = 5  # samples from an edge of the mask, where it falls; on the scan it is 
 def hills(seed: int) -> NDArray[np.float64]:
     row, column = np.mgrid[: SHAPE[0], : SHAPE[1]]
     return -500 + 9 * np.sin(column / 7 + seed) * np.cos(row / 9)
+
+
+def scan_weights(view: RangeView) -> NDArray[np.float64]:
+    """The weight of each pixel on the scan itself, (H, W)."""
+    surface = RangeSurface.of(view)
+    return surface.on_grid(competition_weights(surface, confident=True))
 
 
 def best_weights(renderer: Renderer, views: tuple[RangeView, ...]) -> NDArray[np.float64]:
@@ -57,7 +64,7 @@ def test_weights_of_a_view_are_those_of_the_scan(renderer: Renderer, told: bool,
         confidence[5, 5] = 1.0  # the largest, by which others are told
     color = rng.integers(0, 256, (*SHAPE, 3), np.uint8)
     view = heights(hills(0), mask, color=color, confidence=confidence)
-    found, expected = best_weights(renderer, (view,)), competition_weights(view)
+    found, expected = best_weights(renderer, (view,)), scan_weights(view)
     inside = ndimage.binary_erosion(mask, np.ones((3, 3)), AWAY)
     assert np.ptp(expected[inside]) > 0.2
     np.testing.assert_allclose(found[inside], expected[inside], atol=0.01)
@@ -71,6 +78,6 @@ def test_the_better_of_two_views_is_that_of_the_scan(renderer: Renderer) -> None
     sure[:, 5, 5] = 1.0
     one, other = (heights(hills(0), color=color, confidence=each) for each in sure)
     found = best_weights(renderer, (one, replace(other, name="other")))
-    expected = np.maximum(competition_weights(one), competition_weights(other))
+    expected = np.maximum(scan_weights(one), scan_weights(other))
     inside = np.s_[AWAY:-AWAY, AWAY:-AWAY]
     np.testing.assert_allclose(found[inside], expected[inside], atol=0.01)

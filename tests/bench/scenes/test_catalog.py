@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from demo_surface import surface_value
 from scenes import rarely
 
 from viewer.bench.scenes import catalog
@@ -304,7 +305,7 @@ def test_real_scans_lie_on_their_truth(name: str, data_dir: Path) -> None:
 
 
 def test_the_demo_lies_on_its_mesh_while_it_speaks() -> None:
-    from viewer.scan.demo.motion import PERIOD, surface_value
+    from viewer.scan.demo.motion import PERIOD
 
     subject = catalog.subject("demo", None)
     assert subject.moments == 64

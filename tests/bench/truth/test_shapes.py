@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from demo_surface import DemoHead, surface_value
 from numpy.typing import NDArray
 from scenes import sphere_hits
 
-from viewer.bench.truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, DemoHead, Plane, Sphere, Torus
+from viewer.bench.truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from viewer.camera import Camera
 from viewer.mesh.reference import pixel_rays, trace
 from viewer.mesh.scene import NOTHING
-from viewer.scan.demo.motion import surface_value
 
 SIZE = (64, 48)
 

@@ -17,6 +17,7 @@ from ...scan.open import find_source
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
+from ...scan.timeline import Timeline
 from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
 from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
@@ -79,26 +80,31 @@ def _analytic(shape: AnalyticSurface, sampler: Sampler, mesh: Callable[[], Mesh]
     return _Scene(make, counts=True, count=_COUNT)
 
 
+def _one_mesh(load: Callable[[_Request], Mesh], *needs: str, credit: str = "", up: str = "+y") -> _Scene:
+    """A mesh that does not move."""
+
+    def make(request: _Request) -> Subject:
+        def moment(_: int) -> Moment:
+            return _of_mesh(load(request), request, 0, 0.0, request.name)
+
+        return Subject(name=request.name, load=moment, up=up, credit=credit)
+
+    return _Scene(make, needs, counts=True)
+
+
+def _stored(request: _Request, inside_out: bool = False) -> Mesh:
+    """The mesh of a file. inside_out: whether its faces run clockwise as stored."""
+    stored = read_mesh(request.paths[0])
+    return smooth(Mesh(stored.points, stored.faces[:, ::-1]) if inside_out else stored)
+
+
 def _model(file: str, credit: str, up: str = "+y", inside_out: bool = False) -> _Scene:
-    make = partial(_still, credit=credit, up=up, inside_out=inside_out)
-    return _Scene(make, (f"models/{file}",), counts=True)
-
-
-def _still(request: _Request, credit: str = "", up: str = "+y", inside_out: bool = False) -> Subject:
-    """A mesh that does not move. inside_out: whether its faces run clockwise as stored."""
-    (file,) = request.paths
-
-    def load(_: int) -> Moment:
-        stored = read_mesh(file)
-        mesh = Mesh(stored.points, stored.faces[:, ::-1]) if inside_out else stored
-        return _of_mesh(smooth(mesh), request, 0, 0.0, file.name)
-
-    return Subject(name=request.name, load=load, up=up, credit=credit)
+    return _one_mesh(partial(_stored, inside_out=inside_out), f"models/{file}", credit=credit, up=up)
 
 
 def _file(request: _Request) -> Subject:
     """A mesh file that a user names: read at once, so that an error in it appears at once."""
-    made = _still(request)
+    made = _one_mesh(_stored).make(request)
     try:
         made.moment(0)
     except InputError as error:
@@ -117,14 +123,18 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
         times = paced_times(labels, DEFAULT_FPS)
 
         def load(index: int) -> Moment:
-            points = source.load(index)
-            assert isinstance(points, PointCloud), "formats with faces also hold points"
-            mesh = smooth(Mesh(points, source.faces(index).triangles()))
-            return _of_mesh(mesh, request, index, float(times[index]), labels[index])
+            return _of_mesh(_frame(source, index), request, index, float(times[index]), labels[index])
 
         return Subject(name=request.name, load=load, moments=len(source), up=up, credit=credit)
 
     return _Scene(make, (f"sequences/{folder}",), counts=True)
+
+
+def _frame(source: Timeline, index: int) -> Mesh:
+    """The mesh of a frame."""
+    points = source.load(index)
+    assert isinstance(points, PointCloud), "formats with faces also hold points"
+    return smooth(Mesh(points, source.faces(index).triangles()))
 
 
 def _of_mesh(mesh: Mesh, request: _Request, index: int, time: float, label: str) -> Moment:
@@ -157,14 +167,11 @@ def _demo(request: _Request) -> Subject:
     return Subject(name=request.name, load=load, moments=len(source), tolerance=_HEAD_TOLERANCE)
 
 
-def _hand(request: _Request) -> Subject:
+def _hand(_: _Request) -> Mesh:
     """The demo's head with a hand before its face."""
     from ..truth.hand_mesh import hand_before_face
 
-    def load(_: int) -> Moment:
-        return _of_mesh(hand_before_face(), request, 0, 0.0, request.name)
-
-    return Subject(name=request.name, load=load)
+    return hand_before_face()
 
 
 def _laser(folder: str, model: str, tolerance: float) -> _Scene:
@@ -208,34 +215,16 @@ def _simulated(name: str, scene: _Scene, pods: int) -> _Scene:
 def _lattice(folder: str, counts: tuple[int, int, int], credit: str) -> _Scene:
     """The moments of a sequence of meshes side by side, at one moment."""
 
-    def make(request: _Request) -> Subject:
+    def load(request: _Request) -> Mesh:
         source = find_source(request.paths[0])
+        return in_lattice([_frame(source, index) for index in range(len(source))], counts)
 
-        def frame(index: int) -> Mesh:
-            points = source.load(index)
-            assert isinstance(points, PointCloud), "formats with faces also hold points"
-            return smooth(Mesh(points, source.faces(index).triangles()))
-
-        def load(_: int) -> Moment:
-            mesh = in_lattice([frame(index) for index in range(len(source))], counts)
-            return _of_mesh(mesh, request, 0, 0.0, request.name)
-
-        return Subject(name=request.name, load=load, credit=credit)
-
-    return _Scene(make, (f"sequences/{folder}",), counts=True)
+    return _one_mesh(load, f"sequences/{folder}", credit=credit)
 
 
 def _two_scales(file: str, credit: str) -> _Scene:
     """A model with itself on its head."""
-
-    def make(request: _Request) -> Subject:
-        def load(_: int) -> Moment:
-            mesh = on_its_head(smooth(read_mesh(request.paths[0])))
-            return _of_mesh(mesh, request, 0, 0.0, request.name)
-
-        return Subject(name=request.name, load=load, credit=credit)
-
-    return _Scene(make, (f"models/{file}",), counts=True)
+    return _one_mesh(lambda request: on_its_head(_stored(request)), f"models/{file}", credit=credit)
 
 
 def _spoilt(name: str, scene: _Scene, changes: Sequence[Change], noise: float = 0.0) -> _Scene:
@@ -297,7 +286,7 @@ _ANALYTIC = {
     "box": _analytic(Cuboid(), samples.on_cube, tessellation.cube_mesh),
     "torus": _analytic(Torus(), samples.on_torus, tessellation.torus_mesh),
     "demo": _Scene(_demo),
-    "hand-before-face": _Scene(_hand, counts=True),
+    "hand-before-face": _one_mesh(_hand),
 }
 _MESHES = {
     "bunny": _model("stanford_bunny_35947.ply", _STANFORD),

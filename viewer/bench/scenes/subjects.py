@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from hashlib import sha256
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,19 +95,9 @@ def smooth(mesh: Mesh) -> Mesh:
 
 
 def with_rows(cloud: PointCloud, rows: NDArray[np.integer]) -> PointCloud:
-    """Some of the points of a cloud, without scalars and ids."""
-
-    def pick(values: NDArray | None) -> Any:
-        return None if values is None else values[rows]
-
-    return PointCloud(
-        positions=cloud.positions[rows],
-        origin=cloud.origin,
-        normals=pick(cloud.normals),
-        colors=pick(cloud.colors),
-        radii=pick(cloud.radii),
-        axes=pick(cloud.axes),
-    )
+    """Points of a cloud, in any order: without scalars, ids and what the scan says of itself."""
+    chosen = cloud.of_rows(rows)
+    return replace(chosen, scalars={}, ids=None, remainders=None, topology=None, viewpoint=None)
 
 
 def _add(update: Callable[[bytes], object], part: PointCloud | Scene) -> None:

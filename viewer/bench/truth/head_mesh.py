@@ -1,6 +1,6 @@
 """The subject of the demo scan as a mesh that moves: what its points are measured against.
 
-The exact surface takes a millisecond a ray (`DemoHead`); this mesh of it takes a microsecond.
+The exact implicit surface takes a millisecond a ray; this mesh of it takes a microsecond.
 """
 
 from __future__ import annotations

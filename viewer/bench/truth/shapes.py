@@ -1,4 +1,4 @@
-"""Analytic scenes in float64: spheres, planes, boxes, tori, and the demo head at a moment."""
+"""Analytic scenes in float64: spheres, planes, boxes and tori."""
 
 from __future__ import annotations
 
@@ -196,45 +196,16 @@ class Torus(AnalyticSurface):
         return flat, np.linalg.norm(flat, axis=1), along
 
 
-@dataclass(frozen=True, kw_only=True)
-class DemoHead(AnalyticSurface):
-    """The subject of the demo scan at a time in seconds, in mm, uncoloured.
-
-    About a millisecond a pixel: for small pictures.
-    """
-
-    time: float = 0.0
-
-    @property
-    def reach(self) -> float:
-        """See `AnalyticSurface`."""
-        return 170.0
-
-    def distance(self, starts: Rays, steps: Rays) -> NDArray[np.float64]:
-        """See `AnalyticSurface`."""
-        from ...scan.demo.motion import surface_value
-
-        # Its value is a distance only roughly, and grows faster than one where the lips part.
-        return first_zero(lambda points: surface_value(points, self.time), starts, steps, self.reach, 0.5)
-
-    def normal(self, points: Rays) -> Rays:
-        """See `AnalyticSurface`."""
-        from ...scan.demo.motion import surface_normal
-
-        return surface_normal(points, self.time) if len(points) else points
-
-
 def first_zero(
     value: Callable[[Rays], NDArray[np.float64]],
     starts: Rays,
     steps: Rays,
     reach: float,
-    caution: float = 1.0,
 ) -> NDArray[np.float64]:
     """Distances to an implicit surface in the ball of radius `reach` about zero, along rays, (N,), in steps.
 
     Sphere tracing (Hart 1996) that never steps less than a thousandth of `reach`, so that it ends by
-    crossing, and then closes in on the zero. caution: the share of the value that is safe to step.
+    crossing, and then closes in on the zero. A step of the value must be safe.
     """
     length = np.linalg.norm(steps, axis=1)
     found = np.full(len(starts), np.inf)
@@ -244,7 +215,7 @@ def first_zero(
     rays = np.flatnonzero(_dot(at, at) <= (1.001 * outside) ** 2)
     here = value(at[rays])
     while len(rays):
-        step = np.clip(caution * np.abs(here), _FINEST * reach, _COARSEST * reach) / length[rays]
+        step = np.clip(np.abs(here), _FINEST * reach, _COARSEST * reach) / length[rays]
         ahead = t[rays] + step
         points = starts[rays] + ahead[:, None] * steps[rays]
         there = value(points)

@@ -86,16 +86,6 @@ class Competition:
     ties: float
 
 
-def competition_weights(view: RangeView, confident: bool = True) -> NDArray[np.float64]:
-    """The weight S C V of each pixel, (H, W), 0 or more: S whether it is valid, C its confidence where the
-    view has one, V the cosine between the normal and the direction to the pod, at least 0.
-
-    confident: False leaves C out.
-    """
-    surface = RangeSurface.of(view)
-    return surface.on_grid(_weights(surface, confident))
-
-
 def compete(views: Sequence[RangeView], rules: Rules | None = None) -> Competition:
     """Mask the pixels whose patch another view sees better, so that each patch is kept once; ties by `rules`.
 
@@ -115,7 +105,7 @@ class _Contest:
         self.reach = reach(surfaces)
         confident = all(surface.view.confidence is not None for surface in surfaces)
         self.weights = [
-            surface.smoothed(_weights(surface, confident), rules.smoothing) for surface in surfaces
+            surface.smoothed(competition_weights(surface, confident), rules.smoothing) for surface in surfaces
         ]
         count = len(surfaces)
         self.tolerances = np.zeros((count, count))
@@ -250,8 +240,13 @@ def normal_deviation(distances: NDArray[np.float64]) -> float:
     return _NORMAL_DEVIATION * float(np.median(distances))
 
 
-def _weights(surface: RangeSurface, confident: bool) -> NDArray[np.float64]:
-    """The weights of the points of a surface, (N,)."""
+def competition_weights(surface: RangeSurface, confident: bool) -> NDArray[np.float64]:
+    """The weights S C V of the points of a surface, (N,), 0 or more: S whether it is valid, C its
+    confidence where the view has one, V the cosine between the normal and the direction to the pod, at least
+    0.
+
+    confident: False leaves C out.
+    """
     facing = np.maximum(surface.cosines(surface.points, surface.normals), 0)
     confidence = surface.view.confidence
     if not confident or confidence is None:

@@ -1,7 +1,7 @@
 """How the demo subject moves: rotations that fade in space, and the head turns, on a schedule that repeats.
 
 The head at rest is an implicit surface; a pose is that surface bent by twists, one after the other, and then
-turned. Both can be undone exactly, so the moved head is an implicit surface as well. `variants` has the
+turned. Both have an inverse, so the moved head is an implicit surface as well. `variants` has the
 schedules besides the usual one.
 """
 
@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from . import head
 from .dual import coordinates
@@ -20,8 +20,7 @@ from .shapes import Scalar, Triple, bell, length, ramp
 PERIOD = 2.56  # seconds
 _FAINT = 1e-8  # radians or weights that move a point by less than float32 can tell
 _BATCH = 1 << 13  # points moved at a time, so that intermediate results stay in the cache
-_BISECTIONS = 52  # halvings that bring an angle down to the precision of float64
-_NECK = np.array((0.0, -110.0, -30.0))  # mm, about which the head turns
+NECK = np.array((0.0, -110.0, -30.0))  # mm, about which the head turns
 
 
 @dataclass(frozen=True)
@@ -44,7 +43,7 @@ class Twist:
         amount: radians, for all points or (N,).
         """
         weight = self.weight(*coordinates(points))
-        arm = points - _column(self.center, points)
+        arm = points - column(self.center, points)
         tangent = _cross(self.axis, arm)
         # By the matrix determinant lemma and Sherman and Morrison: the Jacobian is a rotation
         # times I + tangent slope^T.
@@ -53,20 +52,8 @@ class Twist:
         bent = growth * normals - slope * _dot(tangent, normals)
         stretch = np.sqrt(_dot(bent, bent))
         angle = amount * weight.value
-        moved = _rotate(self.axis, arm, angle) + _column(self.center, points)
-        return moved, _rotate(self.axis, bent / stretch, angle), stretch
-
-    def undo(self, points: NDArray, amount: Scalar) -> NDArray:
-        """Points from which moved points (3, N) came, (3, N), by bisection along their circles."""
-        center = _column(self.center, points)
-        arm = points - center
-        low, high = np.zeros(points.shape[1]), np.ones(points.shape[1])
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (low + high)
-            origin = _rotate(self.axis, arm, -amount * middle) + center
-            below = self.weight(*origin) > middle
-            low, high = np.where(below, middle, low), np.where(below, high, middle)
-        return _rotate(self.axis, arm, -0.5 * amount * (low + high)) + center
+        moved = rotate(self.axis, arm, angle) + column(self.center, points)
+        return moved, rotate(self.axis, bent / stretch, angle), stretch
 
 
 def _eyelid(x: Scalar, y: Scalar, z: Scalar) -> Scalar:
@@ -166,7 +153,7 @@ class HeadMotion:
         """The rotation of the head about the neck at a time in seconds, (3, 3)."""
         rotation = np.eye(3)
         for turn in self.turns:
-            rotation = _rotate(turn.axis, rotation, np.array(_sum(turn.peaks, time)))
+            rotation = rotate(turn.axis, rotation, np.array(_sum(turn.peaks, time)))
         return rotation
 
 
@@ -207,59 +194,23 @@ def turn(points: NDArray, normals: NDArray, time: float, motion: HeadMotion) -> 
     """Points and normals, (3, N), turned as the head is at a time in seconds: all that the eyeballs do."""
     if not motion.turns:
         return points, normals
-    rotation, neck = motion.turned(time).astype(points.dtype), _NECK.astype(points.dtype)[:, None]
+    rotation, neck = motion.turned(time).astype(points.dtype), NECK.astype(points.dtype)[:, None]
     return rotation @ (points - neck) + neck, rotation @ normals
 
 
 def _twisted(
     points: NDArray, normals: NDArray, twists: list[tuple[Twist, tuple[float, float]]]
 ) -> tuple[NDArray, NDArray, NDArray]:
-    mirror = _mirror(points)
+    mirror = mirror_factors(points)
     points, normals, growth = points * mirror, normals * mirror, np.ones_like(points[0])
     for twist, amounts in twists:
         if (twist.weight(*points) > _FAINT).any():
-            points, normals, stretch = twist.apply(points, normals, _of_side(amounts, mirror))
+            points, normals, stretch = twist.apply(points, normals, of_side(amounts, mirror))
             growth *= stretch
     return points * mirror, normals * mirror, growth
 
 
-def rest_of(points: NDArray[np.float64], time: float, motion: HeadMotion = TALK) -> NDArray[np.float64]:
-    """Places at rest of the skin at points (3, N) of a moment, (3, N): the inverse of `move`."""
-    points = _turned_back(points, time, motion)
-    mirror = _mirror(points)
-    points = points * mirror
-    for twist, amounts in reversed(motion.amounts(time)):
-        points = twist.undo(points, _of_side(amounts, mirror))
-    return points * mirror
-
-
-def surface_value(points: ArrayLike, time: float, motion: HeadMotion = TALK) -> NDArray[np.float64]:
-    """The exact subject at a time: negative inside, 0 on the surface, about mm near it.
-
-    points: (N, 3), mm. Gives (N,) float64. See `surface_normal`.
-    """
-    p = np.asarray(points, np.float64).T
-    return np.minimum(head.skin(*rest_of(p, time, motion)), head.eyes(*_turned_back(p, time, motion)))
-
-
-def surface_normal(points: ArrayLike, time: float, motion: HeadMotion = TALK) -> NDArray[np.float64]:
-    """The exact unit normals (N, 3) of the subject at points (N, 3) of its surface at a time."""
-    p = np.asarray(points, np.float64).T
-    rest, back = rest_of(p, time, motion), _turned_back(p, time, motion)
-    skin, eyes = head.skin(*coordinates(rest)), head.eyes(*coordinates(back))
-    _, of_skin, _ = move(rest, normalized(skin.gradient), time, motion)
-    _, of_eyes = turn(back, normalized(eyes.gradient), time, motion)
-    return np.where(skin.value < eyes.value, of_skin, of_eyes).T
-
-
-def _turned_back(points: NDArray[np.float64], time: float, motion: HeadMotion) -> NDArray[np.float64]:
-    """Points (3, N) of a moment, where they were before the head turned."""
-    if not motion.turns:
-        return points
-    return motion.turned(time).T @ (points - _NECK[:, None]) + _NECK[:, None]
-
-
-def _of_side(amounts: tuple[float, float], mirror: NDArray) -> Scalar:
+def of_side(amounts: tuple[float, float], mirror: NDArray) -> Scalar:
     """Amounts that left and right side have, for all points or, where they differ, (N,) by their side."""
     left, right = amounts
     return left if left == right else np.where(mirror[0] > 0, left, right).astype(mirror.dtype)
@@ -270,7 +221,7 @@ def normalized(vectors: NDArray) -> NDArray:
     return vectors / np.sqrt(_dot(vectors, vectors))
 
 
-def _mirror(points: NDArray) -> NDArray:
+def mirror_factors(points: NDArray) -> NDArray:
     """Factors (3, N) that bring points to the side x >= 0, and back."""
     factors = np.ones_like(points)
     factors[0] = np.copysign(1.0, points[0])
@@ -286,11 +237,12 @@ def _cross(axis: Triple, v: NDArray) -> NDArray:
     return np.stack([k[1] * v[2] - k[2] * v[1], k[2] * v[0] - k[0] * v[2], k[0] * v[1] - k[1] * v[0]])
 
 
-def _rotate(axis: Triple, v: NDArray, angle: NDArray) -> NDArray:
+def rotate(axis: Triple, v: NDArray, angle: NDArray) -> NDArray:
     """Vectors (3, N) turned about a unit axis by angles (N,) (Rodrigues)."""
     along = (axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2]) * (1.0 - np.cos(angle))
-    return v * np.cos(angle) + _cross(axis, v) * np.sin(angle) + _column(axis, v) * along
+    return v * np.cos(angle) + _cross(axis, v) * np.sin(angle) + column(axis, v) * along
 
 
-def _column(values: Triple, like: NDArray) -> NDArray:
+def column(values: Triple, like: NDArray) -> NDArray:
+    """Three numbers as a column (3, 1) of the type of `like`."""
     return np.array(values, like.dtype)[:, None]
