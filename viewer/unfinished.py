@@ -79,13 +79,13 @@ def remove_leftovers() -> None:
 @contextmanager
 def _noted(path: Path) -> Iterator[Path]:
     # From the root, without links: at a later start nothing else can stand for it.
-    place = os.path.join(os.path.realpath(path.parent), path.name)
-    _NOTES.add(place)
+    noted = os.path.join(os.path.realpath(path.parent), path.name)
+    _NOTES.add(noted)
     try:
         yield path
     finally:
-        _remove(place)
-        _NOTES.drop(place)
+        _remove(noted)
+        _NOTES.drop(noted)
 
 
 def _folder() -> Path:
@@ -103,16 +103,16 @@ class _Notes:
         self._began = False
         self._guard = threading.Lock()
 
-    def add(self, place: str) -> None:
+    def add(self, path: str) -> None:
         with self._guard, suppress(OSError):
-            self._there.add(place)
+            self._there.add(path)
             self._begin()
             if self._stream is not None:
-                self._stream.write(os.fsencode(place) + b"\0")
+                self._stream.write(os.fsencode(path) + b"\0")
 
-    def drop(self, place: str) -> None:
+    def drop(self, path: str) -> None:
         with self._guard, suppress(OSError):
-            self._there.discard(place)
+            self._there.discard(path)
             if self._stream is not None and not self._there:
                 self._stream.truncate(0)
 
@@ -134,8 +134,8 @@ class _Notes:
 
     def _end(self) -> None:
         """Delete what an interrupt of the tidying has left, and the notes."""
-        for place in self._there:
-            _remove(place)
+        for path in self._there:
+            _remove(path)
         if self._stream is not None and self.lock_file is not None:
             self._stream.close()
             with suppress(OSError):
@@ -155,27 +155,27 @@ def _remove_noted(lock_file: Path) -> None:
     notes = lock_file.with_suffix("")
     with suppress(OSError), FileLock(lock_file, timeout=0, fallback_to_soft=False):
         noted = notes.read_bytes().split(b"\0") if notes.exists() else []
-        if not any([_remains(os.fsdecode(place)) for place in noted]):  # all are tried
+        if not any([_remains(os.fsdecode(path)) for path in noted]):  # all are tried
             notes.unlink(missing_ok=True)
             lock_file.unlink()
 
 
-def _remains(place: str) -> bool:
+def _remains(path: str) -> bool:
     """Delete a noted file or folder; whether it is still there. What is not of our form is left alone."""
-    folder, name = os.path.split(place)
-    if not (os.path.isabs(place) and os.path.realpath(folder) == folder):
+    folder, name = os.path.split(path)
+    if not (os.path.isabs(path) and os.path.realpath(folder) == folder):
         return False
     if not (_FILE.fullmatch(name) or _FOLDER.fullmatch(name)):
         return False
-    _remove(place)
-    return os.path.lexists(place)
+    _remove(path)
+    return os.path.lexists(path)
 
 
-def _remove(place: str) -> None:
+def _remove(path: str) -> None:
     """Delete a file of the one form, or a folder of the other; links are not followed."""
     with suppress(OSError):
-        mode, name = os.lstat(place).st_mode, os.path.basename(place)
+        mode, name = os.lstat(path).st_mode, os.path.basename(path)
         if stat.S_ISDIR(mode) and _FOLDER.fullmatch(name):
-            shutil.rmtree(place, ignore_errors=True)
+            shutil.rmtree(path, ignore_errors=True)
         elif stat.S_ISREG(mode) and _FILE.fullmatch(name):
-            os.unlink(place)
+            os.unlink(path)

@@ -113,7 +113,7 @@ def test_stretched_edges_yield() -> None:
     body = DeformableBody(arms(0), SPACING)
     still = body._holds(body.pose)
     np.testing.assert_allclose(still, 1.0)
-    places = body.pose.places * (1.2, 1.2, 1.2)
+    places = body.pose.positions * (1.2, 1.2, 1.2)
     np.testing.assert_allclose(body._holds(type(body.pose)(places, body.pose.turns)), 0.5)
 
 
@@ -143,10 +143,10 @@ def test_a_patch_goes_along_with_a_body(angle: float) -> None:
     np.testing.assert_allclose(still.normals, patch.normals, atol=1e-6)
     body.move_to(arms(1))
     carried = hold.carried()
-    assert np.linalg.norm(carried.place - on_arm(1, 1, ENDS)[1]) < SPACING
+    assert np.linalg.norm(carried.position - on_arm(1, 1, ENDS)[1]) < SPACING
     moved = hold.bent(patch, grip)
     assert np.abs(moved.local - patch.local).max() < SPACING  # an arm is rigid
-    here = patch_of(MomentSurface(arms(1), SPACING), carried.place, 9.0, 200)
+    here = patch_of(MomentSurface(arms(1), SPACING), carried.position, 9.0, 200)
     assert here is not None
     back = hold.unbent(here, carried.turn)
     assert np.abs(back.local - here.local).max() < SPACING

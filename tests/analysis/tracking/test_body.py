@@ -53,7 +53,7 @@ def test_a_place_turns_with_the_body() -> None:
 def test_an_empty_frame_leaves_it_where_it_was() -> None:
     body = DeformableBody(arms(0), SPACING)
     body.move_to(np.empty((0, 3)))
-    assert np.array_equal(body.pose.places, DeformableBody(arms(0), SPACING).pose.places)
+    assert np.array_equal(body.pose.positions, DeformableBody(arms(0), SPACING).pose.positions)
 
 
 @pytest.mark.parametrize("count", [1, *rarely(20)])
@@ -84,5 +84,5 @@ def test_landmarks_of_limbs_are_told_on_their_own_limb() -> None:
 def test_points_far_from_all_others_are_no_part_of_it() -> None:
     points = np.concatenate([arms(0), np.random.default_rng(3).uniform(200, 900, (40, 3))])
     body = DeformableBody(points, SPACING)
-    assert body.pose.places.max() < 100
+    assert body.pose.positions.max() < 100
     assert body.distance < 10 * SPACING

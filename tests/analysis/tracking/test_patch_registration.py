@@ -67,7 +67,7 @@ def test_a_patch_is_found_where_it_went(frame: int) -> None:
     assert found is not None
     assert found.kept > 0.7
     assert found.middle > 0.9
-    error = found.place - path[frame]
+    error = found.position - path[frame]
     assert np.linalg.norm(error) < 0.15 * SPACING
     edge = moved(np.array([[1.0, 0, 0], [0, 0, 0]]), frame)
     direction = (edge[0] - edge[1]) / np.linalg.norm(edge[0] - edge[1])
@@ -97,7 +97,7 @@ def test_colors_tell_the_place_on_a_plane() -> None:
         patch, surface(0, is_flat=True), Placement(place + np.array([0.7, 0.5, 0])), LEVEL, np.eye(3)
     )
     assert found is not None
-    assert np.linalg.norm(found.place[:2] - place[:2]) < 0.1
+    assert np.linalg.norm(found.position[:2] - place[:2]) < 0.1
     assert np.sqrt(np.diag(found.covariance))[:2].max() < 0.2
 
 

@@ -28,34 +28,34 @@ class Prism:
     corners: Outline
 
     @classmethod
-    def over(cls, places: Points) -> Prism | None:
-        """The prism over places (K, 3), across the plane nearest to them; None where they tell none."""
-        center, normal = plane_of(places, THROUGH)
+    def over(cls, positions: Points) -> Prism | None:
+        """The prism over positions (K, 3), across the plane nearest to them; None where they tell none."""
+        center, normal = plane_of(positions, THROUGH)
         if not np.isfinite(normal).all():
             return None
         axes = np.linalg.svd(normal[None])[2][1:]
-        return cls(center, normal, axes, (places - center) @ axes.T)
+        return cls(center, normal, axes, (positions - center) @ axes.T)
 
     def flat(self, points: Points) -> NDArray[np.float64]:
         """Places of points (..., 3) in the plane, (..., 2)."""
         return (points - self.center) @ self.axes.T
 
     def with_corner(self, number: int, corner: Outline) -> Prism:
-        """The prism over the same plane with another place of one corner, (2,)."""
+        """The prism over the same plane with another position of one corner, (2,)."""
         corners = self.corners.copy()
         corners[number] = corner
         return replace(self, corners=corners)
 
     def has(self, flat: Outline) -> NDArray[np.bool_]:
-        """Whether places in the plane, (..., 2), are in the polygon, (...)."""
+        """Whether positions in the plane, (..., 2), are in the polygon, (...)."""
         return is_within(flat.reshape(-1, 2), self.corners).reshape(flat.shape[:-1])
 
     def within(self) -> Outline:
         """Places of a grid of 48 x 48 over the polygon that are in it, (N, 2)."""
         low, high = self.corners.min(axis=0), self.corners.max(axis=0)
         steps = (np.stack(np.meshgrid(*2 * [np.arange(_GRID)]), axis=-1).reshape(-1, 2) + 0.5) / _GRID
-        places = low + steps * (high - low)
-        return places[is_within(places, self.corners)]
+        positions = low + steps * (high - low)
+        return positions[is_within(positions, self.corners)]
 
     def around(self) -> Outline:
         """Places along the sides of the polygon, 48 on each, (48 K, 2)."""
@@ -74,11 +74,14 @@ class Prism:
         return np.where(is_within(flat, self.corners), -away, away)
 
 
-def is_within(places: Outline, outline: Outline) -> NDArray[np.bool_]:
-    """Whether places (N, 2) lie within a closed outline (P, 2): a ray to the right crosses it oddly often."""
-    inside = np.zeros(len(places), bool)
-    near = np.flatnonzero(((places >= outline.min(axis=0)) & (places <= outline.max(axis=0))).all(axis=1))
-    x, y = places[near].T
+def is_within(positions: Outline, outline: Outline) -> NDArray[np.bool_]:
+    """Whether positions (N, 2) lie within a closed outline (P, 2): a ray to the right crosses it oddly
+    often."""
+    inside = np.zeros(len(positions), bool)
+    near = np.flatnonzero(
+        ((positions >= outline.min(axis=0)) & (positions <= outline.max(axis=0))).all(axis=1)
+    )
+    x, y = positions[near].T
     for start, end in zip(outline, np.roll(outline, -1, axis=0), strict=True):
         rises = (start[1] > y) != (end[1] > y)
         if rises.any():
@@ -97,9 +100,9 @@ def crosses_itself(outline: Outline) -> bool:
     """Whether two sides of a closed outline (P, 2) cross each other, away from their ends."""
     start, end = outline, np.roll(outline, -1, axis=0)
 
-    def sides(places: Outline) -> NDArray[np.float64]:
-        """On which side of each side places are, (P, P): the sign."""
-        along, offset = (end - start)[:, None], places[None] - start[:, None]
+    def sides(positions: Outline) -> NDArray[np.float64]:
+        """On which side of each side positions are, (P, P): the sign."""
+        along, offset = (end - start)[:, None], positions[None] - start[:, None]
         return np.sign(along[..., 0] * offset[..., 1] - along[..., 1] * offset[..., 0])
 
     parted = sides(start) * sides(end) < 0

@@ -35,9 +35,9 @@ def area_through(patch: Patch, prism: Prism) -> NDArray[np.float64]:
 
 
 def share_through(patch: Patch, prism: Prism, flat: NDArray[np.float64]) -> float:
-    """How much of some places in the plane of a prism, (N, 2), has a surface before or behind it, 0 to 1; NaN
-    without places. Where surfaces face both ways, as those of a body do, the share is that of the side that
-    has less, unless it has less than half as much as the other.
+    """How much of some positions in the plane of a prism, (N, 2), has a surface before or behind it, 0 to 1;
+    NaN without positions. Where surfaces face both ways, as those of a body do, the share is that of the side
+    that has less, unless it has less than half as much as the other.
     """
     import open3d
 
@@ -49,9 +49,9 @@ def share_through(patch: Patch, prism: Prism, flat: NDArray[np.float64]) -> floa
     scene, tensor = open3d.t.geometry.RaycastingScene(), open3d.core.Tensor.from_numpy
     scene.add_triangles(tensor(patch.vertices.astype(np.float32)), tensor(patch.faces.astype(np.uint32)))
     met = scene.list_intersections(tensor(rays))
-    places, faces = met["ray_ids"].numpy(), met["primitive_ids"].numpy()
+    positions, faces = met["ray_ids"].numpy(), met["primitive_ids"].numpy()
     faces_up = patch.doubled[faces] @ prism.normal > 0
-    sides = [len(np.unique(places[faces_up == side])) / len(flat) for side in (True, False)]
+    sides = [len(np.unique(positions[faces_up == side])) / len(flat) for side in (True, False)]
     return min(share for share in sides if 2 * share >= max(sides))
 
 
@@ -98,7 +98,7 @@ def rim_through(patch: Patch, prism: Prism, walls: Sequence[int] | None = None) 
 
 
 def _between(line: Line, at: NDArray[np.float64], length: float) -> list[Line]:
-    """The pieces of a line that are between 0 and a length, where its places are `at`."""
+    """The pieces of a line that are between 0 and a length, where its positions are `at`."""
     pieces: list[list[NDArray[np.float64]]] = []
     for start, end, a, b in zip(line[:-1], line[1:], at[:-1], at[1:], strict=True):
         low, high = (0.0, 1.0) if a == b else sorted((-a / (b - a), (length - a) / (b - a)))

@@ -36,7 +36,7 @@ _REACH = 12.0, 2.5  # spacings that a node is drawn over, first and last
 _STIFF = 2.0, 0.05  # of the body against the surface, first and last
 _YIELD = 0.2  # of its length that an edge is stretched by, at which it keeps half of its stiffness
 _YIELDS = 0.7  # of the rounds, after which stretched edges yield
-_PREDICTED = 0.01  # weight of places that the speed predicts, against the body's stiffness
+_PREDICTED = 0.01  # weight of positions that the speed predicts, against the body's stiffness
 _STEPS = 60  # of conjugate gradients at most
 _CAPPED = 3.0  # node distances: a longer way counts as this one where poses are compared
 _STRETCH = 3.0  # spacings that count as much as a stretch by the whole length
@@ -45,8 +45,8 @@ _STRETCH = 3.0  # spacings that count as much as a stretch by the whole length
 class Grip(NamedTuple):
     """Places that go along with a body.
 
-    nodes: (n, k), those around each place. weights: (n, k), their sum 1. offsets: (n, k, 3), the place from
-    each node, as at rest. turns: (n, 3, 3), of the body there when it was gripped.
+    nodes: (n, k), those around each position. weights: (n, k), their sum 1. offsets: (n, k, 3), the position
+    from each node, as at rest. turns: (n, 3, 3), of the body there when it was gripped.
     """
 
     nodes: NDArray[np.intp]
@@ -57,9 +57,9 @@ class Grip(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class BodyPose:
-    """The places of the N nodes of a body, (N, 3), and how each is turned, (N, 3, 3)."""
+    """The positions of the N nodes of a body, (N, 3), and how each is turned, (N, 3, 3)."""
 
-    places: Float
+    positions: Float
     turns: Float
 
 
@@ -127,19 +127,19 @@ class DeformableBody:
         some = _some(points)
         surface = MomentSurface(some, self._spacing_of(points, some))
         targets = some[_spread(some, _TARGETS)[0]]
-        known = None if recurring is None else recurring.moved(self.pose.places, self._spacing)
+        known = None if recurring is None else recurring.moved(self.pose.positions, self._spacing)
         found = [self._drawn(start, surface, known) for start in (self._predicted(before), self.pose)]
         now = min(found, key=lambda pose: self._misfit(pose, targets))
-        returned = self._drawn(now, self._surface).places - self.pose.places
+        returned = self._drawn(now, self._surface).positions - self.pose.positions
         self.slips = np.maximum(self.slips, np.linalg.norm(returned, axis=1))
         self.pose, self._surface = now, surface
 
-    def gripped(self, places: Float) -> Grip:
-        """The grip of places (..., 3) of the body as it is now."""
+    def gripped(self, positions: Float) -> Grip:
+        """The grip of positions (..., 3) of the body as it is now."""
         from scipy.spatial import cKDTree
 
-        nodes = self._around[cKDTree(self.pose.places).query(places)[1]]
-        arms = places[..., None, :] - self.pose.places[nodes]
+        nodes = self._around[cKDTree(self.pose.positions).query(positions)[1]]
+        arms = positions[..., None, :] - self.pose.positions[nodes]
         away = np.linalg.norm(arms, axis=-1)
         reach = 1.01 * np.maximum(away.max(axis=-1, keepdims=True), self.distance)
         weights = (1 - away / reach) ** 2
@@ -148,20 +148,20 @@ class DeformableBody:
         return Grip(nodes, weights, np.einsum("...ji,...j->...i", turns, arms), _mean(weights, turns))
 
     def carried(self, grip: Grip, pose: BodyPose | None = None) -> tuple[Float, Float]:
-        """The places that are held, (..., 3), and how each has been turned from when it was gripped, (..., 3,
-        3). pose: in which; None: the body's now."""
+        """The positions that are held, (..., 3), and how each has been turned from when it was gripped, (...,
+        3, 3). pose: in which; None: the body's now."""
         pose = pose or self.pose
         turns = pose.turns[grip.nodes]
-        places = np.einsum("...ij,...j->...i", turns, grip.offsets) + pose.places[grip.nodes]
+        positions = np.einsum("...ij,...j->...i", turns, grip.offsets) + pose.positions[grip.nodes]
         return (
-            np.einsum("...k,...ki->...i", grip.weights, places),
+            np.einsum("...k,...ki->...i", grip.weights, positions),
             _mean(grip.weights, turns) @ np.swapaxes(grip.turns, -1, -2),
         )
 
     def _predicted(self, before: BodyPose) -> BodyPose:
         """The pose that follows if all parts move and turn on as from the pose before to the one now."""
         now = self.pose
-        wanted = 2 * now.places - before.places
+        wanted = 2 * now.positions - before.positions
         pose = BodyPose(wanted, now.turns @ before.turns.transpose(0, 2, 1) @ now.turns)
         pulls = np.broadcast_to(_PREDICTED * np.eye(3), (len(wanted), 3, 3))
         for _ in range(4):
@@ -171,13 +171,14 @@ class DeformableBody:
     def _drawn(
         self, pose: BodyPose, surface: MomentSurface, known: tuple[Float, NDArray[np.bool_]] | None = None
     ) -> BodyPose:
-        """A pose drawn onto a surface. known: places (N, 3) of nodes, and of which they are known, (N,)."""
+        """A pose drawn onto a surface. known: positions (N, 3) of nodes, and of which they are known,
+        (N,)."""
         from .body_kernels import pull_across
 
-        pulls, wanted = np.empty_like(pose.turns), np.empty_like(pose.places)
+        pulls, wanted = np.empty_like(pose.turns), np.empty_like(pose.positions)
         for share in np.linspace(0, 1, _ROUNDS):
             reach = surface.spacing * _REACH[0] ** (1 - share) * _REACH[1] ** share
-            pull_across(surface.held, pose.places, pose.turns, self._normals, reach, pulls, wanted)
+            pull_across(surface.held, pose.positions, pose.turns, self._normals, reach, pulls, wanted)
             if known is not None:
                 pulls[known[1]], wanted[known[1]] = np.eye(3), known[0][known[1]]
             stiffness = _STIFF[0] ** (1 - share) * _STIFF[1] ** share
@@ -191,9 +192,9 @@ class DeformableBody:
         def mean(ways: Float) -> float:
             return float(np.sqrt((np.minimum(ways, _CAPPED * self.distance) ** 2).mean())) / self._spacing
 
-        to = cKDTree(pose.places).query(targets)[0]
-        fro = cKDTree(targets).query(pose.places)[0]
-        edges = pose.places[self._others] - pose.places[self._ones]
+        to = cKDTree(pose.positions).query(targets)[0]
+        fro = cKDTree(targets).query(pose.positions)[0]
+        edges = pose.positions[self._others] - pose.positions[self._ones]
         if not len(edges):
             return mean(to) + mean(fro)
         stretch = np.linalg.norm(edges, axis=1) / np.linalg.norm(self._edges, axis=1) - 1
@@ -202,24 +203,26 @@ class DeformableBody:
     def _settled(
         self, pose: BodyPose, stiffness: float, pulls: Float, wanted: Float, *, yields: bool = False
     ) -> BodyPose:
-        """The pose after a step towards places (N, 3) that are wanted of nodes, with weights (N, 3, 3).
+        """The pose after a step towards positions (N, 3) that are wanted of nodes, with weights (N, 3, 3).
 
         yields: whether stretched edges, as at joints, hold less.
         """
         from .body_kernels import BodyEdges, NodeTargets, edge_products, settle_nodes
 
-        places, products = pose.places.copy(), np.empty_like(pose.turns)
+        positions, products = pose.positions.copy(), np.empty_like(pose.turns)
         holds = self._holds(pose) if yields else np.ones(len(self._edges))
         edges = BodyEdges(self._firsts, self._others, self._edges, holds)
-        settle_nodes(edges, pose.turns, stiffness, NodeTargets(pulls, wanted), _STEPS, places)
-        edge_products(edges, places, products)
-        return BodyPose(places, rotations(products))
+        settle_nodes(edges, pose.turns, stiffness, NodeTargets(pulls, wanted), _STEPS, positions)
+        edge_products(edges, positions, products)
+        return BodyPose(positions, rotations(products))
 
     def _holds(self, pose: BodyPose) -> Float:
         """How much of its stiffness each edge keeps, (E,): those that are stretched, as at joints, less."""
         turns = 0.5 * (pose.turns[self._ones] + pose.turns[self._others])
         off = (
-            pose.places[self._others] - pose.places[self._ones] - np.einsum("eij,ej->ei", turns, self._edges)
+            pose.positions[self._others]
+            - pose.positions[self._ones]
+            - np.einsum("eij,ej->ei", turns, self._edges)
         )
         return 1 / (1 + (off**2).sum(axis=1) / (_YIELD**2 * (self._edges**2).sum(axis=1)))
 

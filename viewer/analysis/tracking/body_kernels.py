@@ -48,18 +48,18 @@ def normals_at(held: Cells, rows: NDArray[np.int64]) -> Float:
 
 @compiled
 def pull_across(
-    held: Cells, places: Float, turns: Float, normals: Float, reach: float, pulls: Float, wanted: Float
+    held: Cells, positions: Float, turns: Float, normals: Float, reach: float, pulls: Float, wanted: Float
 ) -> None:
-    """The targets (N, 3) that the surface gives to nodes at places: across it, and not along it.
+    """The targets (N, 3) that the surface gives to nodes at positions: across it, and not along it.
 
     turns: (N, 3, 3). normals: (N, 3) of the nodes at rest. reach: how far a node may be off, scan units.
     pulls: (N, 3, 3) gets the weights, 0 where no surface near a node faces as it does. wanted: (N, 3) gets
-    the places.
+    the positions.
     """
-    for n in range(len(places)):
+    for n in range(len(positions)):
         pulls[n] = 0.0
-        wanted[n] = places[n]
-        row = nearest_within(held, places[n, 0], places[n, 1], places[n, 2], reach)
+        wanted[n] = positions[n]
+        row = nearest_within(held, positions[n, 0], positions[n, 1], positions[n, 2], reach)
         if row < 0:
             continue
         if not fit_at(held, row):  # stray points: each is all that there is
@@ -70,7 +70,7 @@ def pull_across(
         f, p = held.frames[row], held.parabolas[row]
         u, v, w, cosine = 0.0, 0.0, 0.0, 0.0
         for k in range(3):
-            away = places[n, k] - held.points[row, k]
+            away = positions[n, k] - held.points[row, k]
             u += f[0, k] * away
             v += f[1, k] * away
             w += f[2, k] * away
@@ -104,16 +104,16 @@ class NodeTargets(NamedTuple):
 
 @compiled
 def settle_nodes(
-    body: BodyEdges, turns: Float, stiffness: float, targets: NodeTargets, most: int, places: Float
+    body: BodyEdges, turns: Float, stiffness: float, targets: NodeTargets, most: int, positions: Float
 ) -> None:
     """Move nodes, as they are turned, to where their edges and targets hold them best.
 
-    turns: (N, 3, 3). stiffness: of the body. places: (N, 3), near them, get the solution after at most so
+    turns: (N, 3, 3). stiffness: of the body. positions: (N, 3), near them, get the solution after at most so
     many steps of conjugate gradients (Hestenes and Stiefel 1952).
     """
     firsts, others, edges, holds = body
     pulls, wanted = targets
-    count = len(places)
+    count = len(positions)
     left, ahead, image = np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
     before, wished = 0.0, 1e-300
     for n in range(count):
@@ -121,10 +121,10 @@ def settle_nodes(
             right, held = 0.0, 0.0
             for q in range(3):
                 right += pulls[n, k, q] * wanted[n, q]
-                held += pulls[n, k, q] * places[n, q]
+                held += pulls[n, k, q] * positions[n, q]
             for e in range(firsts[n], firsts[n + 1]):
                 m = others[e]
-                held += stiffness * holds[e] * (places[n, k] - places[m, k])
+                held += stiffness * holds[e] * (positions[n, k] - positions[m, k])
                 for q in range(3):
                     right -= 0.5 * stiffness * holds[e] * (turns[n, k, q] + turns[m, k, q]) * edges[e, q]
             left[n, k] = ahead[n, k] = right - held
@@ -148,7 +148,7 @@ def settle_nodes(
         step, after = before / power, 0.0
         for n in range(count):
             for k in range(3):
-                places[n, k] += step * ahead[n, k]
+                positions[n, k] += step * ahead[n, k]
                 left[n, k] -= step * image[n, k]
                 after += left[n, k] ** 2
         for n in range(count):
@@ -158,12 +158,12 @@ def settle_nodes(
 
 
 @compiled
-def edge_products(body: BodyEdges, places: Float, products: Float) -> None:
-    """Fill the sums (N, 3, 3) of the products of each node's edges, now and at rest. places: (N, 3)."""
+def edge_products(body: BodyEdges, positions: Float, products: Float) -> None:
+    """Fill the sums (N, 3, 3) of the products of each node's edges, now and at rest. positions: (N, 3)."""
     firsts, others, edges, holds = body
     products[:] = 0.0
-    for n in range(len(places)):
+    for n in range(len(positions)):
         for e in range(firsts[n], firsts[n + 1]):
             for k in range(3):
                 for q in range(3):
-                    products[n, k, q] += holds[e] * (places[others[e], k] - places[n, k]) * edges[e, q]
+                    products[n, k, q] += holds[e] * (positions[others[e], k] - positions[n, k]) * edges[e, q]

@@ -1,8 +1,8 @@
 """One landmark, followed from the frame in which it was set through the frames after or before it.
 
-Where the points around it recur in each frame, they tell the place (`pattern`). Elsewhere, in each frame the
-patch around it as it was when it was set is registered, so that errors do not add up; the patch as it was in
-the frame before only tells where to begin. Registered back, the patch found shows how sure the way is.
+Where the points around it recur in each frame, they tell the position (`pattern`). Elsewhere, in each frame
+the patch around it as it was when it was set is registered, so that errors do not add up; the patch as it was
+in the frame before only tells where to begin. Registered back, the patch found shows how sure the way is.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ _WIDE = _held_too(PatchLevel(points=500, search=3.5, rounds=8, bending=0.05, tur
 _FINE = _held_too(PatchLevel(points=300, search=2.6, rounds=8, bending=0.1, turn=0.2))
 _BACK = _held_too(PatchLevel(points=220, search=2.6, rounds=6, bending=0.05, turn=0.1))
 _WRONG = 0.3  # of the patch as in the frame before; where less is matched, it is looked for in the region
-_FREE = 8.0  # spacings: standard deviation of a place about which little is known
+_FREE = 8.0  # spacings: standard deviation of a position about which little is known
 _LOOSE = 1.5, 1.0  # of one that is nearly known, and of one to which a body has carried it
 _MODEL = 0.06  # spacings that the wide patch is off, as it bends otherwise than the model says
-_MIDDLE = 0.5  # of the points next to the place, that have to be matched
+_MIDDLE = 0.5  # of the points next to the position, that have to be matched
 # How far a patch may be off the surface, standard deviation: times the noise, and spacings besides.
 _OFF_WIDE = 3.0, 0.12
 _OFF_FINE = 2.5, 0.12
 _ASIDE = 8.0  # spacings that it may be off where the body carries it
 _LEFT_OUT = 0.2  # of how a patch of a body is deformed, that the model of its deformation leaves out
 _BY_BODY = 0.1  # of the way from where the body carries it: its share in the standard deviation
-_UNSURE = 0.6  # spacings: standard deviation of following a body, from which on a place is a gap
+_UNSURE = 0.6  # spacings: standard deviation of following a body, from which on a position is a gap
 _SLIPPED = 0.35  # the same where the body has not come back to where it was after a step and back
 _CROP = 1.6  # wide radii of the surface that is kept of the frame in which it was set
 _NOISE = 1.2  # factor of variances of registration: residuals are not independent
@@ -95,29 +95,29 @@ class Follower:
     ) -> None:
         self._settings, self.spacing = settings, surface.spacing
         self._origin = origin
-        self._place = np.array(spot.position, np.float64) - origin
+        self._position = np.array(spot.position, np.float64) - origin
         self._spread = np.zeros((3, 3)) if spot.spread is None else spot.spread
 
         def radius(share: tuple[float, float]) -> float:
             return max(share[0] * surface.size, share[1] * surface.spacing)
 
         self._wide_radius = radius(settings.wide)
-        self._far = patch_of(surface, self._place, radius(settings.far), _FAR.points)
-        self._wide = patch_of(surface, self._place, self._wide_radius, _WIDE[0].points)
-        self._fine = patch_of(surface, self._place, radius(settings.fine), _FINE[0].points)
-        self._own = surface.cropped(self._place, _CROP * self._wide_radius)
-        self._found = self._fine_found = self._region = Placement(self._place)
+        self._far = patch_of(surface, self._position, radius(settings.far), _FAR.points)
+        self._wide = patch_of(surface, self._position, self._wide_radius, _WIDE[0].points)
+        self._fine = patch_of(surface, self._position, radius(settings.fine), _FINE[0].points)
+        self._own = surface.cropped(self._position, _CROP * self._wide_radius)
+        self._found = self._fine_found = self._region = Placement(self._position)
         self._velocity = np.zeros(3)
         self._is_lost = False
         self._hold: Hold | None = None
         self._grips: tuple[Grip, Grip] | None = None
-        self._pattern = PointPattern.around(surface, self._place)
+        self._pattern = PointPattern.around(surface, self._position)
         self._recurring = None if self._pattern is None else FoundPattern.itself(self._pattern)
 
     @property
-    def place(self) -> Float | None:
-        """The place where it was found last, (3,) relative to the origin; None while it is lost."""
-        return None if self._is_lost else self._found.place
+    def position(self) -> Float | None:
+        """The position where it was found last, (3,) relative to the origin; None while it is lost."""
+        return None if self._is_lost else self._found.position
 
     @property
     def velocity(self) -> Float:
@@ -134,7 +134,8 @@ class Follower:
             self._grips = self._hold.gripped(self._wide), self._hold.gripped(self._fine)
 
     def go_along(self, points: RecurringPoints, surface: MomentSurface) -> Sighting | None:
-        """The place in the next frame as points around it tell it that recur there; None where too few do."""
+        """The position in the next frame as points around it tell it that recur there; None where too few
+        do."""
         if self._pattern is None or self._recurring is None:
             return None
         rows, linear = points.carried(self._recurring.rows, self._recurring.linear)
@@ -160,7 +161,7 @@ class Follower:
             start = carried
         else:
             return sighting
-        found = self._pattern.found(surface, start.place, start.turn)
+        found = self._pattern.found(surface, start.position, start.turn)
         if found is None:
             return sighting
         self._found = was
@@ -169,10 +170,10 @@ class Follower:
     def _go_to(self, found: FoundPattern) -> Sighting:
         """Be where the pattern of points around it is found."""
         turn = rotations(found.linear)
-        self._velocity = np.zeros(3) if self._is_lost else found.place - self._found.place
+        self._velocity = np.zeros(3) if self._is_lost else found.position - self._found.position
         self._recurring, self._hold, self._is_lost = found, None, False
-        self._found = self._fine_found = self._region = Placement(found.place, turn)
-        return Sighting(found.place + self._origin, found.covariance + turn @ self._spread @ turn.T)
+        self._found = self._fine_found = self._region = Placement(found.position, turn)
+        return Sighting(found.position + self._origin, found.covariance + turn @ self._spread @ turn.T)
 
     def _by_patches(
         self, surface: MomentSurface, before: MomentSurface, carried: Placement | None
@@ -203,11 +204,11 @@ class Follower:
             )
         wide = self._on_wide(wide_patch, surface, guesses)
         fine = self._on_fine(fine_patch, surface, wide)
-        returned = wide.turn @ (self._back(surface, fine.place, wide.turn) - self._place)
+        returned = wide.turn @ (self._back(surface, fine.position, wide.turn) - self._position)
         apart = float(np.linalg.norm(returned))
         if apart > self._bound:
             raise _Lost(f"tracking forward and backward gives positions that are {apart:.3g} apart")
-        between = fine.place - wide.place
+        between = fine.position - wide.position
         covariance = (
             _NOISE * fine.covariance
             + _APART**2 * (np.outer(returned, returned) + np.outer(between, between))
@@ -215,19 +216,19 @@ class Follower:
         )
         unsure = np.inf
         if hold is not None and carried is not None:
-            aside = fine.place - carried.place
+            aside = fine.position - carried.position
             if np.linalg.norm(aside) > _ASIDE * self.spacing:
                 raise _Lost("the surface around it moved differently")
             left_out = _LEFT_OUT * fine_patch.radius * np.linalg.norm(fine.bent)
             covariance += left_out**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
             unsure = (_SLIPPED if hold.slip() > self._bound else _UNSURE) * self.spacing
-        self._velocity = np.zeros(3) if self._is_lost else fine.place - self._found.place
-        self._found, self._fine_found, self._is_lost = wide.at(fine.place), fine, False
-        self._region = Placement(fine.place, wide.turn)
+        self._velocity = np.zeros(3) if self._is_lost else fine.position - self._found.position
+        self._found, self._fine_found, self._is_lost = wide.at(fine.position), fine, False
+        self._region = Placement(fine.position, wide.turn)
         if np.linalg.eigvalsh(covariance)[-1] > unsure**2:
             return Sighting.gap("its position along the surface is too uncertain")
         placed = wide.turn @ self._spread @ wide.turn.T
-        return Sighting(fine.place + self._origin, covariance + placed)
+        return Sighting(fine.position + self._origin, covariance + placed)
 
     @property
     def _is_held(self) -> bool:
@@ -257,7 +258,7 @@ class Follower:
         """The fine patch on a surface, from where the wide one lies. Raises _Lost."""
         slack = wide.covariance + (_MODEL * self.spacing) ** 2 * np.eye(3)
         bent = np.zeros(WAYS) if self._is_held else self._fine_found.bent
-        start = Placement(wide.place, wide.turn, bent)
+        start = Placement(wide.position, wide.turn, bent)
         fine = registered(patch, surface, start, _FINE[self._is_held], slack)
         if fine is None or fine.middle < _MIDDLE:
             raise _Lost("it is hidden, or there is a hole")
@@ -265,18 +266,18 @@ class Follower:
             raise _Lost("the surface around it has a different shape")
         return fine
 
-    def _back(self, surface: MomentSurface, place: Float, turn: Float) -> Float:
-        """The place, (3,), to which the surface around another goes back. Raises _Lost."""
-        patch, back = patch_of(surface, place, self._wide_radius, _BACK[0].points), None
+    def _back(self, surface: MomentSurface, position: Float, turn: Float) -> Float:
+        """The position, (3,), to which the surface around another goes back. Raises _Lost."""
+        patch, back = patch_of(surface, position, self._wide_radius, _BACK[0].points), None
         if patch is not None:
             patch = patch if self._hold is None else self._hold.unbent(patch, turn)
-            start = Placement(self._place, turn.T)
+            start = Placement(self._position, turn.T)
             back = registered(patch, self._own, start, _BACK[self._is_held], self._loose)
         if back is None or back.kept < self._settings.least_kept:
             raise _Lost("tracking back did not find it again")
         if back.deviation > self._limit(_OFF_WIDE):
             raise _Lost("the surface around it had a different shape")
-        return back.place
+        return back.position
 
     def _guesses(
         self, surface: MomentSurface, before: MomentSurface, carried: Placement | None
@@ -286,19 +287,19 @@ class Follower:
         if carried is not None:
             yield carried
         if not self._is_lost:
-            patch = patch_of(before, self._found.place, self._wide_radius, _NEXT[0].points)
+            patch = patch_of(before, self._found.position, self._wide_radius, _NEXT[0].points)
             if patch is not None:
-                still = Placement(self._found.place)
-                starts = [still.at(still.place + self._velocity), still]
+                still = Placement(self._found.position)
+                starts = [still.at(still.position + self._velocity), still]
                 enough = self._limit(_OFF_FINE)
                 moved = best_registered(patch, surface, starts, _NEXT, free, enough)
                 if moved is not None and moved.kept >= _WRONG:
                     bent = self._found.bent if carried is None else np.zeros(WAYS)
-                    yield Placement(moved.place, moved.turn @ self._found.turn, bent)
+                    yield Placement(moved.position, moved.turn @ self._found.turn, bent)
         if carried is None and self._far is not None:
             region = best_registered(self._far, surface, [self._region], [_FAR], free)
             if region is not None:
-                self._region = Placement(region.place, region.turn)
+                self._region = Placement(region.position, region.turn)
                 yield region
 
     @property

@@ -32,12 +32,12 @@ class Hold:
     @classmethod
     def at(cls, body: DeformableBody, begun: Placement) -> Hold:
         """The hold on a body as it is now, of a landmark as it is placed now."""
-        return cls(body, begun, body.gripped(begun.place), body.pose)
+        return cls(body, begun, body.gripped(begun.position), body.pose)
 
     def carried(self) -> Placement:
         """The placement to which the body has carried the landmark."""
-        place, turn = self.body.carried(self.grip)
-        return Placement(place, turn @ self.begun.turn)
+        position, turn = self.body.carried(self.grip)
+        return Placement(position, turn @ self.begun.turn)
 
     def slip(self) -> float:
         """How far the body there has been from where it was after a step to a frame and back, scan units."""
@@ -50,9 +50,11 @@ class Hold:
     def bent(self, patch: SurfacePatch, grip: Grip) -> SurfacePatch:
         """A patch of the key's frame, gripped then, as the body bends it now."""
         carried = self.carried()
-        places, turns = self.body.carried(grip)
+        positions, turns = self.body.carried(grip)
         axes = patch.axes @ carried.turn.T
-        return _moved(patch, (places - carried.place) @ axes.T, axes @ turns @ self.begun.turn @ patch.axes.T)
+        return _moved(
+            patch, (positions - carried.position) @ axes.T, axes @ turns @ self.begun.turn @ patch.axes.T
+        )
 
     def unbent(self, patch: SurfacePatch, turn: Float) -> SurfacePatch:
         """A patch of the frame that the body is in now, as it was in the key's frame.
@@ -61,15 +63,15 @@ class Hold:
         """
         still = Placement(patch.center)
         grip = self.body.gripped(placed_points(patch, still))
-        (places, turns), (middle, _) = (
+        (positions, turns), (middle, _) = (
             self.body.carried(each, self.pose) for each in (grip, self.body.gripped(patch.center))
         )
         axes = patch.axes @ turn @ self.begun.turn.T
-        return _moved(patch, (places - middle) @ axes.T, axes @ turns @ patch.axes.T)
+        return _moved(patch, (positions - middle) @ axes.T, axes @ turns @ patch.axes.T)
 
 
 def _moved(patch: SurfacePatch, local: Float, turns: Float) -> SurfacePatch:
-    """A patch with its points at other places (n, 3) along its axes, and turned, (n, 3, 3)."""
+    """A patch with its points at other positions (n, 3) along its axes, and turned, (n, 3, 3)."""
     return patch._replace(
         local=np.ascontiguousarray(local),
         normals=np.einsum("nij,nj->ni", turns, patch.normals),

@@ -1,11 +1,12 @@
 """Points that recur: material points that several frames hold, each in an order of its own.
 
-Where frames hold the same points, such as the vertices of one mesh, their irregular pattern tells the place
-along the surface exactly. A pattern of points counts as found where points at random would not lie so near to
-it (a contrario, Moisan and Stival 2004), and where it fits no other place nearly as well, in the other frame
-or in its own: so the grid of a range camera, which recurs at each step of a pixel, is never taken for matter.
-From patterns that are found, matches grow over the surface, each point's place predicted by those beside it
-(match propagation, Lhuillier and Quan 2002): thus they reach limbs that are too fast to be looked for.
+Where frames hold the same points, such as the vertices of one mesh, their irregular pattern tells the
+position along the surface exactly. A pattern of points counts as found where points at random would not lie
+so near to it (a contrario, Moisan and Stival 2004), and where it fits no other position nearly as well, in
+the other frame or in its own: so the grid of a range camera, which recurs at each step of a pixel, is never
+taken for matter. From patterns that are found, matches grow over the surface, each point's position predicted
+by those beside it (match propagation, Lhuillier and Quan 2002): thus they reach limbs that are too fast to be
+looked for.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ Rows = NDArray[np.int64]
 
 _POINTS = 24  # of a pattern
 _CERTAIN = 1e-6  # chance of points at random to fit as well anywhere where a pattern is looked for
-_DISTINCT = np.log(4.0)  # a point, in information: residuals of other places are twice as large at least
+_DISTINCT = np.log(4.0)  # a point, in information: residuals of other positions are twice as large at least
 _SEARCH = 5.0  # spacings that a pattern may be from where it is looked for
 _SEED_SEARCH = 12.0  # the same for patterns that matches grow from
 _SEEDS = 24  # patterns that are tried in a round
@@ -35,7 +36,7 @@ _FARTHEST = 15.0  # the same in spacings of the pattern
 _BESIDE = 13  # points that tell where one of them goes
 _MATCHED = 0.3  # local spacings that matched points of a pattern are off at most
 _STRAY = 3.0  # times the median, that they may be off where the surface is deformed
-_NEXT = 8  # points next to the place, of which half have to be matched
+_NEXT = 8  # points next to the position, of which half have to be matched
 _LEAST_FREEDOM = 0.25  # of residuals besides what the map takes of them
 _FLOOR = 0.02  # spacings: what bending leaves at least, standard deviation
 
@@ -44,11 +45,11 @@ _FLOOR = 0.02  # spacings: what bending leaves at least, standard deviation
 class FoundPattern:
     """A pattern in another frame.
 
-    place: (3,), of its centre. linear: (3, 3), how it is turned and stretched. rows: (n,), the points
-    that are its own, -1 where one has none. covariance: (3, 3), of the place.
+    position: (3,), of its centre. linear: (3, 3), how it is turned and stretched. rows: (n,), the points
+    that are its own, -1 where one has none. covariance: (3, 3), of the position.
     """
 
-    place: Float
+    position: Float
     linear: Float
     rows: Rows
     covariance: Float
@@ -56,16 +57,16 @@ class FoundPattern:
     @classmethod
     def itself(cls, pattern: PointPattern) -> FoundPattern:
         """A pattern in its own frame."""
-        return cls(pattern.place, np.eye(3), pattern.rows, np.zeros((3, 3)))
+        return cls(pattern.position, np.eye(3), pattern.rows, np.zeros((3, 3)))
 
 
 class PointPattern:
-    """The points nearest to a place of a surface."""
+    """The points nearest to a position of a surface."""
 
-    def __init__(self, surface: MomentSurface, place: Float, frame: Float, rows: Rows) -> None:
+    def __init__(self, surface: MomentSurface, position: Float, frame: Float, rows: Rows) -> None:
         """frame: (3, 3), tangents and normal. rows: (n,), of its points, the nearest first."""
-        self.rows, self.place, self._frame = rows, place, frame
-        self._offsets = surface.held.points[rows] - place
+        self.rows, self.position, self._frame = rows, position, frame
+        self._offsets = surface.held.points[rows] - position
         self._area = float(np.pi * (self._offsets[-1] ** 2).sum() / len(rows))
         self._closeness = 1 / (1 + (self._offsets**2).sum(axis=1) / self._area) ** 2
         self._spacing = surface.spacing
@@ -73,28 +74,28 @@ class PointPattern:
         self._alike: float | None = None
 
     @classmethod
-    def around(cls, surface: MomentSurface, place: Float) -> PointPattern | None:
-        """The pattern around a place; None where there are too few points, or no surface."""
+    def around(cls, surface: MomentSurface, position: Float) -> PointPattern | None:
+        """The pattern around a position; None where there are too few points, or no surface."""
         from .pattern_search_kernels import nearest_of
 
         rows = np.empty(_POINTS, np.int32)
-        found = nearest_of(surface.held, place[0], place[1], place[2], rows, np.empty(_POINTS))
+        found = nearest_of(surface.held, position[0], position[1], position[2], rows, np.empty(_POINTS))
         if found < _POINTS:
             return None
-        frame = surface.axes_at(place, float(np.linalg.norm(surface.held.points[rows[-1]] - place)))
-        pattern = None if frame is None else cls(surface, place, frame, rows.astype(np.int64))
+        frame = surface.axes_at(position, float(np.linalg.norm(surface.held.points[rows[-1]] - position)))
+        pattern = None if frame is None else cls(surface, position, frame, rows.astype(np.int64))
         return pattern if pattern is not None and pattern._area > 0 else None
 
     def found(
-        self, surface: MomentSurface, place: Float, linear: Float, search: float = _SEARCH
+        self, surface: MomentSurface, position: Float, linear: Float, search: float = _SEARCH
     ) -> FoundPattern | None:
-        """The pattern in another frame, near a place, (3,), and turned about as it is, (3, 3); None where it
-        is not found, or fits several places. search: how far it may be, spacings."""
-        best, sure = self._fitted(surface, place, linear, search)
+        """The pattern in another frame, near a position, (3,), and turned about as it is, (3, 3); None where
+        it is not found, or fits several positions. search: how far it may be, spacings."""
+        best, sure = self._fitted(surface, position, linear, search)
         if sure.log_chance > np.log(_CERTAIN) or not self._is_distinct(sure.information, sure.other):
             return None
         if self._alike is None:  # elsewhere in its own frame
-            self._alike = self._fitted(self._own, self.place, np.eye(3), 2 * search)[1].other
+            self._alike = self._fitted(self._own, self.position, np.eye(3), 2 * search)[1].other
         if not self._is_distinct(sure.information, self._alike):
             return None
         rows = np.where(best.off <= _MATCHED * np.sqrt(self._area), best.rows, -1)
@@ -102,25 +103,25 @@ class PointPattern:
 
     def followed(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
         """The pattern in another frame, where some of its points are known, (n,), others are -1; None where
-        too few next to the place are. linear: (3, 3), about how it is turned."""
+        too few next to the position are. linear: (3, 3), about how it is turned."""
         from .pattern_search_kernels import fill_pattern
 
         if (rows[:_NEXT] >= 0).sum() < _NEXT // 2:
             return None
         reach = _MATCHED * np.sqrt(self._area)
-        place, linear = self._weighted(surface, rows, linear)
+        position, linear = self._weighted(surface, rows, linear)
         rows = rows.copy()
-        fill_pattern(self._offsets, surface.held, linear, place, reach, rows)
+        fill_pattern(self._offsets, surface.held, linear, position, reach, rows)
         return self._judged(surface, rows, linear)
 
     def _fitted(
-        self, surface: MomentSurface, place: Float, linear: Float, search: float
+        self, surface: MomentSurface, position: Float, linear: Float, search: float
     ) -> tuple[PatternFit, PatternSearch]:
-        """Fit the pattern near a place: the best fit, and how sure it is."""
+        """Fit the pattern near a position: the best fit, and how sure it is."""
         from .pattern_search_kernels import PatternArrays, find_pattern, no_fit
 
         best = no_fit(len(self._offsets))
-        best.linear[:], best.position[:] = linear, place
+        best.linear[:], best.position[:] = linear, position
         reach = min(search * self._spacing, _FARTHEST * np.sqrt(self._area))
         pattern = PatternArrays(self._offsets, self._frame, self._area)
         return best, find_pattern(pattern, surface.held, best, reach)
@@ -129,35 +130,41 @@ class PointPattern:
         return information - other >= _DISTINCT * len(self._offsets)
 
     def _weighted(self, surface: MomentSurface, rows: Rows, linear: Float) -> tuple[Float, Float]:
-        """Fit the place and map of the pattern to the points that are known, the nearest above all."""
+        """Fit the position and map of the pattern to the points that are known, the nearest above all."""
         from .pattern_fit_kernels import fit_map
 
-        linear, place = linear.copy(), np.full(3, np.nan)
+        linear, position = linear.copy(), np.full(3, np.nan)
         weights = (rows >= 0) * self._closeness
         fit_map(
-            self._offsets, surface.held.points[rows], weights, self._frame, np.sqrt(self._area), linear, place
+            self._offsets,
+            surface.held.points[rows],
+            weights,
+            self._frame,
+            np.sqrt(self._area),
+            linear,
+            position,
         )
-        return place, linear
+        return position, linear
 
     def _judged(self, surface: MomentSurface, rows: Rows, linear: Float) -> FoundPattern | None:
-        """Drop points that are far off, and compute the covariance of the place from the others."""
+        """Drop points that are far off, and compute the covariance of the position from the others."""
         from .pattern_fit_kernels import FREE
 
-        place, linear = self._weighted(surface, rows, linear)
+        position, linear = self._weighted(surface, rows, linear)
         targets = surface.held.points[rows]
-        off = np.linalg.norm(place + self._offsets @ linear.T - targets, axis=1)
+        off = np.linalg.norm(position + self._offsets @ linear.T - targets, axis=1)
         usual = np.median(off[rows >= 0]) if (rows >= 0).any() else 0.0
         rows = np.where(off <= max(_MATCHED * np.sqrt(self._area), _STRAY * usual), rows, -1)
         if (rows[:_NEXT] >= 0).sum() < _NEXT // 2:
             return None
-        place, linear = self._weighted(surface, rows, linear)
+        position, linear = self._weighted(surface, rows, linear)
         weights = (rows >= 0) * self._closeness
-        left = ((place + self._offsets @ linear.T - targets) ** 2).sum(axis=1)
+        left = ((position + self._offsets @ linear.T - targets) ** 2).sum(axis=1)
         share = (weights**2).sum() / weights.sum() ** 2  # one over as many points as count
         freedom = max(1 - FREE * share, _LEAST_FREEDOM)
         variance = weights @ left / weights.sum() / 2 / freedom  # along two axes of the surface
         covariance = (variance * share + (_FLOOR * self._spacing) ** 2) * np.eye(3)
-        return FoundPattern(place, linear, rows, covariance)
+        return FoundPattern(position, linear, rows, covariance)
 
 
 class RecurringPoints:
@@ -168,7 +175,7 @@ class RecurringPoints:
     """
 
     def __init__(self, before: MomentSurface, now: MomentSurface, starts: Float, motions: Float) -> None:
-        """starts: (n, 3), places near which patterns are tried first; motions: (n, 3), where these are
+        """starts: (n, 3), positions near which patterns are tried first; motions: (n, 3), where these are
         expected to go."""
         count = len(before.held.points)
         self._before, self._now = before, now
@@ -176,14 +183,14 @@ class RecurringPoints:
         self._grown, self._taken = self.matches.copy(), np.full(len(now.held.points), -1)
         self._queue, self._queued = np.empty(count, np.int64), 0
         self._around: NDArray[np.int32] | None = None
-        for place, motion in zip(starts, motions, strict=True):
-            self._grow_from(place, place + motion, np.eye(3))
+        for position, motion in zip(starts, motions, strict=True):
+            self._grow_from(position, position + motion, np.eye(3))
         for _ in range(_LEAPS):
             left = before.held.points[self._grown < 0]
             if not len(left):
                 break
-            for place in _spread(left):
-                self._grow_from(place, *self._expected(place))
+            for position in _spread(left):
+                self._grow_from(position, *self._expected(position))
             if self._around is None:
                 break
         if self._around is not None:
@@ -198,36 +205,37 @@ class RecurringPoints:
         known = np.flatnonzero(there >= 0)
         return there, self.maps[rows[known[0]]] @ linear if len(known) else linear
 
-    def moved(self, places: Float, reach: float) -> tuple[Float, NDArray[np.bool_]]:
-        """Predict where places (n, 3) go; known, (n,), are those within reach of a recurring point."""
+    def moved(self, positions: Float, reach: float) -> tuple[Float, NDArray[np.bool_]]:
+        """Predict where positions (n, 3) go; known, (n,), are those within reach of a recurring point."""
         from scipy.spatial import cKDTree
 
         known = np.flatnonzero(self.matches >= 0)
         if not len(known):
-            return places, np.zeros(len(places), bool)
+            return positions, np.zeros(len(positions), bool)
         points = self._before.held.points[known]
-        away, nearest = cKDTree(points).query(places)
+        away, nearest = cKDTree(points).query(positions)
         rows = known[nearest]
-        arms = np.einsum("nij,nj->ni", self.maps[rows], places - points[nearest])
+        arms = np.einsum("nij,nj->ni", self.maps[rows], positions - points[nearest])
         return self._now.held.points[self.matches[rows]] + arms, away <= reach
 
-    def _expected(self, place: Float) -> tuple[Float, Float]:
-        """Predict where a place goes, (3,), and how it turns, (3, 3): as the nearest matched point does."""
+    def _expected(self, position: Float) -> tuple[Float, Float]:
+        """Predict where a position goes, (3,), and how it turns, (3, 3): as the nearest matched point
+        does."""
         known = self._queue[: self._queued]
         if not len(known):
-            return place, np.eye(3)
-        away = place - self._before.held.points[known]
+            return position, np.eye(3)
+        away = position - self._before.held.points[known]
         nearest = np.argmin((away**2).sum(axis=1))
         row = known[nearest]
         return self._now.held.points[self._grown[row]] + self.maps[row] @ away[nearest], self.maps[row]
 
-    def _grow_from(self, place: Float, expected: Float, linear: Float) -> None:
-        """Grow matches from the pattern around a place, where it is found near another one."""
+    def _grow_from(self, position: Float, expected: Float, linear: Float) -> None:
+        """Grow matches from the pattern around a position, where it is found near another one."""
         from scipy.spatial import cKDTree
 
         from .pattern_growth_kernels import MatchGrowth, grow_matches
 
-        pattern = PointPattern.around(self._before, place)
+        pattern = PointPattern.around(self._before, position)
         if pattern is None or self._grown[pattern.rows[0]] >= 0:
             return
         found = pattern.found(self._now, expected, linear, _SEED_SEARCH)

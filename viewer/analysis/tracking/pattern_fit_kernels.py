@@ -104,12 +104,18 @@ def _turned(linear: Float, axis: Float, cosine: float, out: Float) -> None:
 
 @compiled
 def fit_map(
-    offsets: Float, targets: Float, weights: Float, frame: Float, spacing: float, linear: Float, place: Float
+    offsets: Float,
+    targets: Float,
+    weights: Float,
+    frame: Float,
+    spacing: float,
+    linear: Float,
+    position: Float,
 ) -> bool:
     """Fit the map of a surface's patch: affine along its tangents, with heights over them kept.
 
     offsets: (n, 3) from the patch's centre. targets: (n, 3). weights: (n,). frame: (3, 3), tangents and
-    normal. linear: (3, 3), the map from which it begins, gets the one found; place: (3,) gets where the
+    normal. linear: (3, 3), the map from which it begins, gets the one found; position: (3,) gets where the
     centre goes.
     """
     normal = np.empty(3)
@@ -160,7 +166,7 @@ def fit_map(
     )
     a, b = np.empty(3), np.empty(3)
     for k in range(3):
-        place[k] = i00 * sides[0, k] + i01 * sides[1, k] + i02 * sides[2, k]
+        position[k] = i00 * sides[0, k] + i01 * sides[1, k] + i02 * sides[2, k]
         a[k] = i01 * sides[0, k] + i11 * sides[1, k] + i12 * sides[2, k]
         b[k] = i02 * sides[0, k] + i12 * sides[1, k] + i22 * sides[2, k]
     _across(a, b, normal)

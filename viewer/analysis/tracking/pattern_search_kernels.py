@@ -72,7 +72,7 @@ def no_fit(count: int) -> PatternFit:
 
 @compiled
 def nearest_of(surface: Cells, x: float, y: float, z: float, rows: NDArray[np.int32], squared: Float) -> int:
-    """How many points nearest to a place are found, as many as `rows` has room for, the nearest first.
+    """How many points nearest to a position are found, as many as `rows` has room for, the nearest first.
 
     squared gets their squared distances. Ties go to the lowest row.
     """
@@ -241,7 +241,7 @@ def find_pattern(pattern: PatternArrays, surface: Cells, best: PatternFit, reach
     arm = _turning_arm(offsets, spacing)
     long = np.sqrt(arm[0] ** 2 + arm[1] ** 2 + arm[2] ** 2)
     upright, each = np.empty((3, 3)), no_fit(count)
-    places, informations = np.empty((found, 3)), np.zeros(found)
+    positions, informations = np.empty((found, 3)), np.zeros(found)
     best_number, tried = -1, 0
     for n in range(found):
         row = near[n]
@@ -263,7 +263,7 @@ def find_pattern(pattern: PatternArrays, surface: Cells, best: PatternFit, reach
             information = _fit_from(pattern, surface, each)
             if information <= informations[n]:
                 continue
-            places[n], informations[n] = each.position, information
+            positions[n], informations[n] = each.position, information
             if best_number < 0 or best_number == n or information > informations[best_number] or (
                 information == informations[best_number] and row < near[best_number]
             ):  # fmt: skip
@@ -276,7 +276,7 @@ def find_pattern(pattern: PatternArrays, surface: Cells, best: PatternFit, reach
     for n in range(found):
         away = 0.0
         for k in range(3):
-            away += (places[n, k] - best.position[k]) ** 2
+            away += (positions[n, k] - best.position[k]) ** 2
         if away > (0.5 * spacing) * (0.5 * spacing):
             elsewhere = max(elsewhere, informations[n])
     information = informations[best_number]

@@ -1,4 +1,4 @@
-"""Registration of the surface around a place of one moment to that of another."""
+"""Registration of the surface around a position of one moment to that of another."""
 
 from __future__ import annotations
 
@@ -44,13 +44,13 @@ class PatchLevel:
 class Placement:
     """A patch as it lies in another moment.
 
-    place: (3,), of its centre. turn: (3, 3). bent: (12,) how it is deformed. covariance: (3, 3) of the
-    place, from noise and from what shape and colour leave open. kept: the share of the patch, by closeness,
-    that is matched. middle: that of the points next to the place. deviation: of the distances to the
-    surface, scan units.
+    position: (3,), of its centre. turn: (3, 3). bent: (12,) how it is deformed. covariance: (3, 3) of the
+    position, from noise and from what shape and colour leave open. kept: the share of the patch, by
+    closeness, that is matched. middle: that of the points next to the position. deviation: of the distances
+    to the surface, scan units.
     """
 
-    place: Float
+    position: Float
     turn: Float = field(default_factory=lambda: np.eye(3))
     bent: Float = field(default_factory=lambda: np.zeros(WAYS))
     covariance: Float = field(default_factory=lambda: np.full((3, 3), np.nan))
@@ -63,9 +63,9 @@ class Placement:
         """How badly the patch fits: the deviation, and more the less of it is matched."""
         return self.deviation / max(self.kept, 1e-9)
 
-    def at(self, place: Float) -> Placement:
-        """The placement moved to a place."""
-        return replace(self, place=place)
+    def at(self, position: Float) -> Placement:
+        """The placement moved to a position."""
+        return replace(self, position=position)
 
 
 def rotations(matrices: Float) -> Float:
@@ -75,19 +75,19 @@ def rotations(matrices: Float) -> Float:
     return left @ right
 
 
-def patch_of(surface: MomentSurface, place: Float, radius: float, points: int) -> SurfacePatch | None:
-    """The patch of a surface around a place, of so many points at most; None where it has no surface
+def patch_of(surface: MomentSurface, position: Float, radius: float, points: int) -> SurfacePatch | None:
+    """The patch of a surface around a position, of so many points at most; None where it has no surface
     there."""
     from .factor_kernels import RIGID
     from .patch_kernels import cut_patch
 
-    axes = surface.axes_at(place, radius)
+    axes = surface.axes_at(position, radius)
     if axes is None:
         return None
-    rows = surface.rows_around(place, radius)
+    rows = surface.rows_around(position, radius)
     if len(rows) > points:
         rows = rows[np.linspace(0, len(rows) - 1, points).astype(np.int64)]
-    patch = cut_patch(surface.held, place, axes, radius, rows)
+    patch = cut_patch(surface.held, position, axes, radius, rows)
     return patch if len(patch.local) > 3 * RIGID else None
 
 
@@ -95,7 +95,7 @@ def placed_points(patch: SurfacePatch, placement: Placement) -> Float:
     """The points of a patch as it is placed, (n, 3)."""
     from .patch_kernels import deformed_points
 
-    return placement.place + deformed_points(patch, placement.bent) @ patch.axes @ placement.turn.T
+    return placement.position + deformed_points(patch, placement.bent) @ patch.axes @ placement.turn.T
 
 
 def registered(
@@ -103,13 +103,13 @@ def registered(
 ) -> Placement | None:
     """The patch on a surface, from a placement on; None where too few of its points have counterparts.
 
-    slack: (3, 3), the covariance of the place from where it begins.
+    slack: (3, 3), the covariance of the position from where it begins.
     """
     from .correspondence_kernels import MovedPatch
     from .register_kernels import RegistrationPrior, RegistrationRules, register_patch
 
     bent = start.bent.copy() if level.bending else np.zeros(WAYS)
-    moved = MovedPatch(start.place.copy(), start.turn.copy(), bent)
+    moved = MovedPatch(start.position.copy(), start.turn.copy(), bent)
     prior = RegistrationPrior(
         np.linalg.inv(slack).astype(np.float64), level.turn, np.full(WAYS, level.bending)
     )

@@ -23,7 +23,7 @@ class MomentSurface:
     """Points of one moment in a grid, and the parabolas that have been fitted around them so far.
 
     spacing: between neighbours, scan units. size: the longest edge of the body of the points. held: for the
-    kernels, relative to an origin that all places share.
+    kernels, relative to an origin that all positions share.
     """
 
     def __init__(
@@ -96,25 +96,25 @@ class MomentSurface:
         )
         return other
 
-    def rows_around(self, place: Float, reach: float) -> NDArray[np.int32]:
-        """Rows of the points within reach of a place, increasing."""
+    def rows_around(self, position: Float, reach: float) -> NDArray[np.int32]:
+        """Rows of the points within reach of a position, increasing."""
         from .surface_kernels import rows_within
 
         rows, squared = np.empty(_MOST_IN_REACH, np.int32), np.empty(_MOST_IN_REACH)
-        found = rows_within(self.held, place[0], place[1], place[2], reach, rows, squared)
+        found = rows_within(self.held, position[0], position[1], position[2], reach, rows, squared)
         return np.sort(rows[:found])
 
-    def axes_at(self, place: Float, reach: float) -> Float | None:
-        """Two tangents and the normal of the surface at the point nearest to a place, (3, 3) by row; None
+    def axes_at(self, position: Float, reach: float) -> Float | None:
+        """Two tangents and the normal of the surface at the point nearest to a position, (3, 3) by row; None
         where none is within reach."""
         from .surface_kernels import fit_at, nearest_within
 
-        row = nearest_within(self.held, place[0], place[1], place[2], reach)
+        row = nearest_within(self.held, position[0], position[1], position[2], reach)
         return self.held.frames[row].astype(np.float64) if row >= 0 and fit_at(self.held, row) else None
 
-    def cropped(self, place: Float, reach: float) -> MomentSurface:
-        """The part of the surface within reach of a place, in arrays of its own."""
-        rows = self.rows_around(place, reach)
+    def cropped(self, position: Float, reach: float) -> MomentSurface:
+        """The part of the surface within reach of a position, in arrays of its own."""
+        rows = self.rows_around(position, reach)
         part, held = object.__new__(MomentSurface), self.held
         part._hold(
             held.points[rows],

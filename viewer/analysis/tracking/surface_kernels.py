@@ -94,7 +94,7 @@ def rows_within(
     rows: NDArray[np.int32],
     squared: Float,
 ) -> int:
-    """How many points lie within reach of a place, as many as `rows` has room for; gets rows and squared
+    """How many points lie within reach of a position, as many as `rows` has room for; gets rows and squared
     distances."""
     points, low, cell, size = held.points, held.low, held.cell, held.size
     starts, order = held.starts, held.order
@@ -124,7 +124,7 @@ def nearest_within(
     z: float,
     reach: float,
 ) -> int:
-    """The row of the point nearest to a place, or -1 where none is within reach."""
+    """The row of the point nearest to a position, or -1 where none is within reach."""
     points, low, cell, size = held.points, held.low, held.cell, held.size
     starts, order = held.starts, held.order
     best, least = -1, reach * reach

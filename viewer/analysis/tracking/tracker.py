@@ -351,26 +351,28 @@ def _step(share: Sequence[_Followed], thread: int, frame: int) -> None:
 
 
 def _starts(followers: Sequence[Follower]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Give the places and motions of the landmarks that are not lost, (n, 3) each."""
-    found = [follower for follower in followers if follower.place is not None]
-    places = np.array([follower.place for follower in found]).reshape(-1, 3)
-    return places, np.array([follower.velocity for follower in found]).reshape(-1, 3)
+    """Give the positions and motions of the landmarks that are not lost, (n, 3) each."""
+    found = [follower for follower in followers if follower.position is not None]
+    positions = np.array([follower.position for follower in found]).reshape(-1, 3)
+    return positions, np.array([follower.velocity for follower in found]).reshape(-1, 3)
 
 
 def _move_apart(before: Sequence[Follower], after: Sequence[Follower], surface: MomentSurface) -> bool:
     """Whether landmarks move so much against each other, from a frame to the next, as limbs do."""
-    both = [(one.place, other.place) for one, other in zip(before, after, strict=True)]
-    places = np.array([(one, other) for one, other in both if one is not None and other is not None])
-    if not len(places):
+    both = [(one.position, other.position) for one, other in zip(before, after, strict=True)]
+    positions = np.array([(one, other) for one, other in both if one is not None and other is not None])
+    if not len(positions):
         return False
-    distances = np.linalg.norm(places[:, None] - places[None], axis=-1)  # (n, n, 2)
+    distances = np.linalg.norm(positions[:, None] - positions[None], axis=-1)  # (n, n, 2)
     change = np.abs(distances[..., 1] - distances[..., 0]).max()
     return bool(change > max(_APART[0] * surface.size, _APART[1] * surface.spacing))
 
 
 def _lose(before: Sequence[Follower], after: Sequence[Follower]) -> bool:
     """Whether a step loses most of the landmarks that were found, as a jump does."""
-    found = [other.place is None for one, other in zip(before, after, strict=True) if one.place is not None]
+    found = [
+        other.position is None for one, other in zip(before, after, strict=True) if one.position is not None
+    ]
     return 2 * sum(found) > len(found)
 
 

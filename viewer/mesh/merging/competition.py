@@ -156,7 +156,7 @@ class _Contest:
         return best
 
     def _is_same(self, met: Meeting, number: int, other: int) -> NDArray[np.bool_]:
-        """Whether places of a view are of the surface that they meet, (Q,)."""
+        """Whether positions of a view are of the surface that they meet, (Q,)."""
         if self.rules.tolerance is not None:
             return met.distance <= self.rules.tolerance
         deviation = self.tolerances[number, other]
@@ -168,11 +168,11 @@ class _Contest:
         seen, shares = self.surfaces[number], _shares(self._parts(number))
         uncovered = np.zeros(len(seen.faces), bool)
         for start in range(0, len(seen.faces), _FACES_AT_ONCE):
-            places = (shares @ seen.points[seen.faces[start : start + _FACES_AT_ONCE]]).reshape(-1, 3)
-            lacking = np.arange(len(places))
+            positions = (shares @ seen.points[seen.faces[start : start + _FACES_AT_ONCE]]).reshape(-1, 3)
+            lacking = np.arange(len(positions))
             for other in self._others(number):
                 checkpoint()
-                met = meet(seen, places[lacking], self.surfaces[other], faces=shown[other])
+                met = meet(seen, positions[lacking], self.surfaces[other], faces=shown[other])
                 lacking = lacking[~self._is_same(met, number, other)]
             uncovered[start + lacking // len(shares)] = True
         return uncovered

@@ -1,4 +1,4 @@
-"""The inner loop of finding where one view's triangles lie behind places in another's picture, compiled by
+"""The inner loop of finding where one view's triangles lie behind positions in another's picture, compiled by
 numba; see `surfaces`."""
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 
-_EDGE = 1e-6  # of a triangle: how far outside of it a place still counts, so that none falls between two
+_EDGE = 1e-6  # of a triangle: how far outside of it a position still counts, so that none falls between two
 
 
-class PlacesByPixel(NamedTuple):
-    """Q places of a picture, sorted by the pixels that they lie in."""
+class PositionsByPixel(NamedTuple):
+    """Q positions of a picture, sorted by the pixels that they lie in."""
 
     pixels: NDArray[np.float64]  # (Q, 2), column and row
     depth: NDArray[np.float64]  # (Q,)
@@ -25,27 +25,27 @@ class PlacesByPixel(NamedTuple):
 
 
 class LayerHits(NamedTuple):
-    """The triangle that is found for each of Q places."""
+    """The triangle that is found for each of Q positions."""
 
-    offset: NDArray[np.float64]  # (Q,), its depth less the place's; inf where none is
+    offset: NDArray[np.float64]  # (Q,), its depth less the position's; inf where none is
     found: NDArray[np.int64]  # (Q,), its row
     share: NDArray[np.float32]  # (Q, 2), the weights of its second and third corner
 
 
 @compiled
 def nearest_layer(
-    places: PlacesByPixel,
+    positions: PositionsByPixel,
     corners: NDArray[np.float64],
     faces: NDArray[np.uint32],
     is_parallel: bool,
     hits: LayerHits,
 ) -> None:
-    """Find for each place of a picture the triangle over it whose depth differs least from its own.
+    """Find for each position of a picture the triangle over it whose depth differs least from its own.
 
     corners: (V, 3), column, row, and depth in a parallel projection, else one over it, of which faces (F, 3)
     are made.
     """
-    pixels, depth, order, first, width, height = places
+    pixels, depth, order, first, width, height = positions
     offset, found, share = hits
     for face in range(len(faces)):
         a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]

@@ -44,24 +44,26 @@ class RangeSurface:
         return Bounds(self.points.min(axis=0), self.points.max(axis=0))
 
     def rays(self, points: Rays) -> Rays:
-        """The directions in which the pod sees places (N, 3), as long as brings them one unit of depth on."""
+        """The directions in which the pod sees positions (N, 3), as long as brings them one unit of depth
+        on."""
         if self.view.kind == "height":
             return np.broadcast_to(-self.view.world_to_camera[2, :3], points.shape)
         return (points - self.view.eye) / self.depths(points)[:, None]
 
     def depths(self, points: Rays) -> NDArray[np.float64]:
-        """How far places (N, 3) are along the pod's view axis, (N,), scan units."""
+        """How far positions (N, 3) are along the pod's view axis, (N,), scan units."""
         matrix = self.view.world_to_camera
         return -(points @ matrix[2, :3] + matrix[2, 3])
 
     def spacing(self, points: Rays, normals: NDArray[np.floating]) -> NDArray[np.float64]:
-        """How far apart, (N,), scan units, the pod measures a surface at these places with these normals."""
+        """How far apart, (N,), scan units, the pod measures a surface at these positions with these
+        normals."""
         focal = min(self.view.fx, self.view.fy)
         away = 1.0 if self.view.kind == "height" else np.maximum(self.depths(points), 0)
         return away / focal / np.maximum(self.cosines(points, normals), LEAST_COSINE)
 
     def cosines(self, points: Rays, normals: NDArray[np.floating]) -> NDArray[np.float64]:
-        """The cosines between unit normals (N, 3) at places (N, 3) and the directions to the pod, (N,)."""
+        """The cosines between unit normals (N, 3) at positions (N, 3) and the directions to the pod, (N,)."""
         rays = self.rays(points)
         with np.errstate(invalid="ignore", divide="ignore"):  # at the eye
             return np.nan_to_num(-(rays * normals).sum(axis=1) / np.linalg.norm(rays, axis=1))
@@ -106,22 +108,23 @@ class Meeting:
 
 def meet(
     seen: RangeSurface,
-    places: Rays,
+    positions: Rays,
     other: RangeSurface,
     weights: NDArray[np.floating] | None = None,
     faces: NDArray[np.bool_] | None = None,
 ) -> Meeting:
-    """Find where places (Q, 3) near a view's surface meet another's along its rays.
+    """Find where positions (Q, 3) near a view's surface meet another's along its rays.
 
     Triangles of the other that face away from the pod have no part: they are of the back of something. So
-    nothing that lies behind or before the place counts as the same but by the caller's measure of distance.
-    weights: (N,), of the other's points, else 1. faces: (F,), which of the other's triangles take part.
+    nothing that lies behind or before the position counts as the same but by the caller's measure of
+    distance. weights: (N,), of the other's points, else 1. faces: (F,), which of the other's triangles take
+    part.
     """
-    from .layer_kernels import LayerHits, PlacesByPixel, nearest_layer
+    from .layer_kernels import LayerHits, PositionsByPixel, nearest_layer
 
     height, width = seen.view.depth.shape
-    pixels, _ = seen.view.project(places)
-    depth = seen.depths(places)
+    pixels, _ = seen.view.project(positions)
+    depth = seen.depths(positions)
     column, row = np.clip(np.nan_to_num(pixels), 0, (width - 1, height - 1)).astype(np.intp).T
     pixel = row * width + column
     order = np.argsort(pixel, kind="stable")
@@ -131,11 +134,13 @@ def meet(
         takes_part &= faces
     rows = np.flatnonzero(takes_part)
     hits = LayerHits(
-        np.full(len(places), np.inf), np.full(len(places), -1), np.zeros((len(places), 2), np.float32)
+        np.full(len(positions), np.inf),
+        np.full(len(positions), -1),
+        np.zeros((len(positions), 2), np.float32),
     )
-    by_pixel = PlacesByPixel(pixels, depth, order, first, width, height)
+    by_pixel = PositionsByPixel(pixels, depth, order, first, width, height)
     nearest_layer(by_pixel, corners, other.faces[rows], seen.view.kind == "height", hits)
-    return _met(seen, places, other, hits._replace(found=np.append(rows, -1)[hits.found]), weights)
+    return _met(seen, positions, other, hits._replace(found=np.append(rows, -1)[hits.found]), weights)
 
 
 def _in_picture(seen: RangeSurface, other: RangeSurface) -> tuple[Rays, NDArray[np.bool_]]:
@@ -154,25 +159,25 @@ def _in_picture(seen: RangeSurface, other: RangeSurface) -> tuple[Rays, NDArray[
 
 def _met(
     seen: RangeSurface,
-    places: Rays,
+    positions: Rays,
     other: RangeSurface,
     hits: LayerHits,
     weights: NDArray[np.floating] | None,
 ) -> Meeting:
-    """The meeting of places (Q, 3) with the triangles of a surface that are found for them."""
+    """The meeting of positions (Q, 3) with the triangles of a surface that are found for them."""
     hit = np.flatnonzero(hits.found >= 0)
     faces, share = other.faces[hits.found[hit]], hits.share[hit]
     shares = np.column_stack([1 - share.sum(axis=1), share])
     normal = (other.normals[faces] * shares[:, :, None]).sum(axis=1)
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     normal /= np.where(length > 0, length, 1)
-    rays, change = seen.rays(places[hit]), hits.offset[hit]
-    there = places[hit] + change[:, None] * rays
-    spacing = (seen.spacing(places[hit], normal) + other.spacing(there, normal)) / 2
+    rays, change = seen.rays(positions[hit]), hits.offset[hit]
+    there = positions[hit] + change[:, None] * rays
+    spacing = (seen.spacing(positions[hit], normal) + other.spacing(there, normal)) / 2
     weight = np.ones(len(hit)) if weights is None else (weights[faces] * shares).sum(axis=1)
 
     def spread(values: NDArray) -> NDArray[np.float64]:
-        whole = np.full((len(places), *values.shape[1:]), np.nan)
+        whole = np.full((len(positions), *values.shape[1:]), np.nan)
         whole[hit] = values
         return whole
 
