@@ -16,8 +16,8 @@ from ...scan.demo import DemoSource
 from ...scan.open import find_source
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
+from ...scan.sources import FrameSource
 from ...scan.spacing import typical_spacing
-from ...scan.timeline import Timeline
 from ...scan.times import DEFAULT_FPS, paced_times
 from ..truth import tessellation
 from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
@@ -130,7 +130,7 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
     return _Scene(make, (f"sequences/{folder}",), counts=True)
 
 
-def _frame(source: Timeline, index: int) -> Mesh:
+def _frame(source: FrameSource, index: int) -> Mesh:
     """The mesh of a frame."""
     points = source.load(index)
     assert isinstance(points, PointCloud), "formats with faces also hold points"
