@@ -35,7 +35,7 @@ def numbers(text: str, counts: Collection[int] | None, what: str) -> tuple[float
 
 
 def given(args: Namespace, names: Iterable[str]) -> list[str]:
-    """Those of some arguments that the user has given, as they are written: `--size`."""
+    """The arguments that the user has given, as the command line writes them: `--size`."""
     values = {name: getattr(args, name) for name in names}
     # By identity: 0 is a value, which equals False.
     return [f"--{name}" for name, it in values.items() if it is not None and it is not False and it != []]
