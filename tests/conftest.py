@@ -6,15 +6,17 @@ import gc
 import itertools
 import os
 import re
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 from command_line import Done, Run
 from hypothesis import HealthCheck, settings
+from moderngl import Buffer
 
 from viewer import cli
 from viewer.backends import backends
@@ -75,6 +77,24 @@ def numpy_errors_raise() -> Iterator[None]:
     """Overflow, invalid values and division by zero fail the test; underflow to zero is fine."""
     with np.errstate(all="raise", under="ignore"):
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def only_staging_reads() -> Iterator[None]:
+    """Reading a GPU buffer fails everywhere in Scan4D but in `viewer.gpu.staging`; tests may read."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("read", "read_into"):
+            patch.setattr(Buffer, name, _reading(getattr(Buffer, name)))
+        yield
+
+
+def _reading(function: Callable[..., Any]) -> Callable[..., Any]:
+    def read(*args: Any, **kwargs: Any) -> Any:
+        caller = sys._getframe(1).f_globals["__name__"]
+        assert not caller.startswith("viewer.") or caller == "viewer.gpu.staging", f"{caller} reads a buffer"
+        return function(*args, **kwargs)
+
+    return read
 
 
 @pytest.fixture

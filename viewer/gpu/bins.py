@@ -60,7 +60,7 @@ class Bins:
 
     def length(self) -> int:
         """How many entries all lists have, once they are counted; waits for the GPU."""
-        return int.from_bytes(self.starts.buffer.read(4, offset=4 * self.cells), "little")
+        return int(self._gpu.read(self.starts.buffer, "u4", 1, 4 * self.cells)[0])
 
     def reserve(self, entries: int) -> None:
         """Make room for so many entries, and give up much more room than that."""

@@ -66,7 +66,7 @@ class IndexList:
 
     def __len__(self) -> int:
         """How many invocations that is; waits for the GPU."""
-        return int(struct.unpack("4I", self._dispatch.read())[3])
+        return int(self._gpu.read(self._dispatch, np.uint32)[3])
 
     def release(self) -> None:
         """Delete both buffers."""

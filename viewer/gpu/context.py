@@ -11,6 +11,9 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
 import moderngl
+import numpy as np
+from numpy import typing as npt
+from numpy.typing import NDArray
 
 from ..errors import InputError, NoOpenGLError, Scan4DError
 from ..native import give_memory_back
@@ -20,6 +23,7 @@ from .blocks import BlockBuffer, Values
 from .constants import GROUP, GROUP_LIMIT
 from .shader import ShaderError, Source, shader_error
 from .shader_cache import shader_cache
+from .staging import Staging
 from .timers import Timers
 
 T = TypeVar("T")
@@ -91,6 +95,7 @@ class Gpu:
         self.driver: str = ctx.info["GL_VERSION"]
         self.software = any(word in self.device.lower() for word in _SOFTWARE)
         self.timers = Timers(ctx, self.software)
+        self.staging = Staging(ctx, self.software)
         self.max_storage_bytes = gl.max_storage_block_bytes()
         self.max_pixels = self.max_storage_bytes // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
@@ -184,6 +189,16 @@ class Gpu:
         made = self.ctx.buffer(data, reserve=reserve, dynamic=dynamic)
         self.check_memory(made)
         return made
+
+    def read(
+        self, buffer: moderngl.Buffer, dtype: npt.DTypeLike = np.uint8, count: int = -1, offset: int = 0
+    ) -> NDArray:
+        """Numbers of a buffer, (count,); waits for the GPU. count: -1: all from the offset on. offset: in
+        bytes. Nothing else reads a buffer (see `staging`)."""
+        kind = np.dtype(dtype)
+        nbytes = buffer.size - offset if count < 0 else count * kind.itemsize
+        self.activate()
+        return self.staging.read(buffer, nbytes, offset).view(kind)
 
     def check_memory(self, *made: Resource) -> None:
         """Release what was just made, and raise Scan4DError, where there was no memory for it: drivers only

@@ -34,7 +34,9 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
     GL_3_0,
     GL_3_1,
     GL_3_2,
+    GL_4_2,
     GL_4_3,
+    GL_4_4,
 )
 from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
 
@@ -56,6 +58,7 @@ _RED_INTEGER = 0x8D94
 _RED = 0x1903
 _UNSIGNED_INT = 0x1405
 _FLOAT = 0x1406
+_COPY_READ_BUFFER = 0x8F36
 _COPY_WRITE_BUFFER = 0x8F37
 _PIXEL_PACK_BUFFER = 0x88EB
 _TEXTURE_BUFFER = 0x8C2A
@@ -175,6 +178,46 @@ def clear_words(buffer: moderngl.Buffer, word: int, count: int | None = None) ->
     GL_4_3.glClearBufferSubData(
         _COPY_WRITE_BUFFER, R32UI, 0, size, _RED_INTEGER, _UNSIGNED_INT, ctypes.c_void_p(value.ctypes.data)
     )
+
+
+def get_buffer(buffer: moderngl.Buffer, offset: int, out: np.ndarray) -> None:
+    """Copy bytes of a buffer from an offset on into an array; waits for the GPU."""
+    GL_1_5.glBindBuffer(_COPY_READ_BUFFER, buffer.glo)
+    GL_1_5.glGetBufferSubData(_COPY_READ_BUFFER, offset, out.nbytes, ctypes.c_void_p(out.ctypes.data))
+
+
+def has_mapped_buffers(ctx: moderngl.Context) -> bool:
+    """Whether buffers may stay mapped while the GPU uses them."""
+    return ctx.version_code >= 440 or "GL_ARB_buffer_storage" in ctx.extensions
+
+
+class MappedBuffer:
+    """A buffer in the memory of the host that stays mapped, for the GPU to copy into.
+
+    address: where the CPU reads it, once the GPU has finished.
+    """
+
+    def __init__(self, nbytes: int) -> None:
+        name, self.nbytes = ctypes.c_uint(0), nbytes
+        GL_1_5.glGenBuffers(1, ctypes.byref(name))
+        self._glo = name.value
+        GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, self._glo)
+        access = GL_3_0.GL_MAP_READ_BIT | GL_4_4.GL_MAP_PERSISTENT_BIT | GL_4_4.GL_MAP_COHERENT_BIT
+        GL_4_4.glBufferStorage(_COPY_WRITE_BUFFER, nbytes, None, access | GL_4_4.GL_CLIENT_STORAGE_BIT)
+        self.address: int = GL_3_0.glMapBufferRange(_COPY_WRITE_BUFFER, 0, nbytes, access)
+        if not self.address:
+            raise MemoryError(f"no memory to map {nbytes:,} bytes of a buffer")
+
+    def take(self, source: moderngl.Buffer, offset: int, nbytes: int, at: int = 0) -> None:
+        """Have the GPU copy bytes of another buffer. at: where they come to lie."""
+        GL_1_5.glBindBuffer(_COPY_READ_BUFFER, source.glo)
+        GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, self._glo)
+        GL_3_1.glCopyBufferSubData(_COPY_READ_BUFFER, _COPY_WRITE_BUFFER, offset, at, nbytes)
+        GL_4_2.glMemoryBarrier(GL_4_4.GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT)
+
+    def release(self) -> None:
+        """Delete it."""
+        GL_1_5.glDeleteBuffers(1, ctypes.byref(ctypes.c_uint(self._glo)))
 
 
 class BufferTexture:

@@ -96,8 +96,8 @@ class Image:
     def read(self) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """All samples, (H, W, channels), and weights, (H, W); waits for the GPU."""
         width, height = self.size
-        samples = np.frombuffer(self.samples.buffer.read(), np.float32)
-        weights = np.frombuffer(self.weights.buffer.read(), np.float32)
+        samples = self._gpu.read(self.samples.buffer, np.float32)
+        weights = self._gpu.read(self.weights.buffer, np.float32)
         return samples.reshape(height, width, self.channels), weights.reshape(height, width)
 
     def release(self) -> None:

@@ -201,7 +201,7 @@ class CellSums:
 
     def read(self, fixed: FixedPoint) -> NDArray[np.float64]:
         """All sums, (cells, channels); waits for the GPU."""
-        sums = np.frombuffer(self.buffer.read(), np.int32, self.cells * self.channels)
+        sums = self._gpu.read(self.buffer, np.int32, self.cells * self.channels)
         return sums.reshape(self.cells, self.channels) * np.array(fixed.steps)
 
     def release(self) -> None:

@@ -105,12 +105,13 @@ class Surface(RenderTarget):
 
     def texel(self, x: int, y: int) -> Texel:
         """One pixel, without copying the others. x: from the left, y: from the top."""
-        self.gpu.activate()
         offset = 4 * (y * self.size[0] + x)
-        depth = np.frombuffer(self.depths.buffer.read(4, offset=offset), np.float32)[0]
-        row = np.frombuffer(self.rows.buffer.read(4, offset=offset), np.uint32)[0]
-        level = self._own["level"].buffer.read(4, offset=offset) if self.is_own("level") else bytes(4)
-        return Texel(float(depth), int(row), int(_levels(depth, row, np.frombuffer(level, np.uint32)[0])))
+        (depth,) = self.gpu.read(self.depths.buffer, np.float32, 1, offset)
+        (row,) = self.gpu.read(self.rows.buffer, np.uint32, 1, offset)
+        level = np.uint32(0)
+        if self.is_own("level"):
+            (level,) = self.gpu.read(self._own["level"].buffer, np.uint32, 1, offset)
+        return Texel(float(depth), int(row), int(_levels(depth, row, level)))
 
     def depth_around(self, x: int, y: int, reach: int) -> NDArray[np.float32]:
         """(2 reach + 1, 2 reach + 1) float32: `depth` round pixel (x, y), in terms of its view; +inf
@@ -125,14 +126,13 @@ class Surface(RenderTarget):
 
     def _around(self, buffer: moderngl.Buffer, empty: np.generic, x: int, y: int, reach: int) -> NDArray:
         """Words of the pixels round one, in one read; `empty` outside the picture."""
-        self.gpu.activate()
         width, height = self.size
         top, bottom = max(y - reach, 0), min(y + reach + 1, height)
-        lines = buffer.read(4 * width * (bottom - top), offset=4 * width * top)
+        lines = self.gpu.read(buffer, empty.dtype, width * (bottom - top), 4 * width * top)
         left, right = max(x - reach, 0), min(x + reach + 1, width)
         around = np.full((2 * reach + 1, 2 * reach + 1), empty)
         rows, columns = slice(top - y + reach, bottom - y + reach), slice(left - x + reach, right - x + reach)
-        around[rows, columns] = np.frombuffer(lines, empty.dtype).reshape(-1, width)[:, left:right]
+        around[rows, columns] = lines.reshape(-1, width)[:, left:right]
         return around
 
     @property
@@ -190,9 +190,8 @@ class Surface(RenderTarget):
         """The number of a row, by name, that the backend gave; empty where it gave none."""
         if self._given is None:
             return {}
-        self.gpu.activate()
         name, texels = self._given
-        return {name: float(np.frombuffer(texels.buffer.read(4, offset=4 * row), np.float32)[0])}
+        return {name: float(self.gpu.read(texels.buffer, np.float32, 1, 4 * row)[0])}
 
     @property
     def scan(self) -> PointCloud:
@@ -211,10 +210,7 @@ class Surface(RenderTarget):
     # --- inside -----------------------------------------------------------------------
 
     def _read(self, buffer: moderngl.Buffer, dtype: type) -> NDArray:
-        self.gpu.activate()
-        out = np.empty(buffer.size, np.uint8)
-        buffer.read_into(out)
-        return out.view(dtype).reshape(self.size[1], -1)
+        return self.gpu.read(buffer, dtype).reshape(self.size[1], -1)
 
     def _read_texels(self, name: str, dtype: type) -> NDArray:
         """Read what the backend wrote for each pixel, or else what the rows have, (H, W, channels)."""

@@ -198,7 +198,7 @@ class RenderTarget(PictureBuffers, Coloring):
         stride = -(-max(self.size) // _SAMPLED)
         texels = gl.BufferTexture(self.gpu.buffer(reserve=4 * self._count(stride)), gl.R32F)
         self._resolve("value", texels, stride)
-        values = np.frombuffer(texels.buffer.read(), np.float32)
+        values = self.gpu.read(texels.buffer, np.float32)
         self.gpu.discard(texels)
         return robust_range(values)
 

@@ -54,7 +54,7 @@ class DrawnTiles:
             self.counts = self._gpu.buffer(reserve=nbytes)
 
     def _read(self) -> list[int]:
-        return np.frombuffer(self.counts.read(), np.uint32).tolist()
+        return self._gpu.read(self.counts, np.uint32).tolist()
 
     def release(self) -> None:
         """Delete everything."""

@@ -108,7 +108,7 @@ class ChunkBoxes:
 
     def seen(self, surface: RenderTarget) -> NDArray[np.uint32]:
         """Read what the last step told of each, bits, (C,); waits for the GPU."""
-        return np.frombuffer(surface.cached(SeenChunks).of(self).read(), np.uint32)
+        return self._gpu.read(surface.cached(SeenChunks).of(self), np.uint32)
 
     @property
     def nbytes(self) -> int:

@@ -191,7 +191,7 @@ class _Search:
         return _SPARE * self._read()
 
     def _read(self) -> NDArray[np.float32]:
-        return np.frombuffer(self._radii.buffer.read(), np.float32)
+        return self._gpu.read(self._radii.buffer, np.float32)
 
     def _fit(self) -> tuple[_Grid, float]:
         """Find cells in which as many points are together as suits the search, and count; how many are."""
@@ -201,7 +201,7 @@ class _Search:
         for _ in range(_TRIALS):
             grid = _Grid.of(size, self._extent, self._lists)
             self._bins.count(self._visits(grid))
-            counts = np.diff(np.frombuffer(self._bins.starts.buffer.read(), np.uint32)).astype(np.float64)
+            counts = np.diff(self._gpu.read(self._bins.starts.buffer, np.uint32)).astype(np.float64)
             shared = float(np.square(counts).sum() / counts.sum())
             if _LEAST <= shared <= _MOST or self._count < _MOST:
                 break

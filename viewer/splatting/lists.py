@@ -122,8 +122,8 @@ class TileLists:
             self._find_work(bins, "work", second)
             if both:
                 self._find_work(bins, "rest", second)
-            words = self._buffer("large").read(_LARGE_HEAD)
-            large, self.length, longest, sent, discs, away = struct.unpack("6I", words)
+            words = gpu.read(self._buffer("large"), np.uint32, 6).tolist()
+            large, self.length, longest, sent, discs, away = words
             if not second:
                 self.large, self.away, self.sent, self.discs = large, away, sent, discs
                 self._longest = longest
@@ -194,7 +194,7 @@ class TileLists:
 
     def large_points(self, points: Points) -> Points:
         """The points that are left to the rasteriser."""
-        rows = np.frombuffer(self._buffer("large").read(4 * self.large, offset=_LARGE_HEAD), np.uint32)
+        rows = self._gpu.read(self._buffer("large"), np.uint32, self.large, _LARGE_HEAD)
         self._gpu.discard(self._large_rows)
         # Ascending, so that ties fall to the lowest row.
         self._large_rows = gl.BufferTexture(self._gpu.buffer(np.sort(rows)), gl.R32UI)
@@ -232,7 +232,7 @@ class TileLists:
     def shown_again(self) -> dict[str, int]:
         """How many tiles of those that discs reach were shown again; waits for the GPU."""
         worked, again = (
-            int.from_bytes(self._buffer(name).read(4, offset=12), "little") for name in ("work", "again")
+            int(self._gpu.read(self._buffer(name), np.uint32, 1, 12)[0]) for name in ("work", "again")
         )
         return {"in": worked, "again": again}
 

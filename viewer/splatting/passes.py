@@ -117,7 +117,7 @@ def _farthest_first(points: Points, surface: Surface) -> Points:
     """Points from back to front, by their centres: sorted on the CPU, for each picture."""
     rows = np.arange(len(points.pose.cloud), dtype=np.uint32)
     if points.rows is not None:
-        rows = np.frombuffer(points.rows.buffer.read(), np.uint32)[: points.count]
+        rows = surface.gpu.read(points.rows.buffer, np.uint32, points.count)
     depths = surface.view.depths(points.pose.cloud.positions[rows])
     rows = rows[np.argsort(-depths, kind="stable")]
     order = gl.BufferTexture(surface.gpu.buffer(rows if rows.size else bytes(4)), gl.R32UI)

@@ -207,12 +207,12 @@ class Candidates:
 
     def visible_rows(self) -> NDArray[np.uint32]:
         """The rows that are visible, ascending; waits for the GPU."""
-        flags = np.frombuffer(self.visible.buffer.read(), np.uint32, self.points)
+        flags = self._gpu.read(self.visible.buffer, np.uint32, self.points)
         return np.flatnonzero(flags).astype(np.uint32)
 
     def count(self) -> dict[str, int]:
         """How many points and sectors there are, and became visible or occupied; waits for the GPU."""
-        rows = np.frombuffer(self.rows.buffer.read(), np.uint32, self.sectors.count)
+        rows = self._gpu.read(self.rows.buffer, np.uint32, self.sectors.count)
         return {
             "in": self.looked_at,
             "visible": len(self.visible_rows()),

@@ -221,7 +221,7 @@ class Covering:
 
     def visible_rows(self) -> NDArray[np.uint32]:
         """The rows that are visible, ascending; waits for the GPU."""
-        flags = np.frombuffer(self.visible.buffer.read(), np.uint32, self.points)
+        flags = self._gpu.read(self.visible.buffer, np.uint32, self.points)
         return np.flatnonzero(flags).astype(np.uint32)
 
     def _texels(self, name: str, count: int, texel_format: int, words: int) -> gl.BufferTexture:

@@ -9,7 +9,6 @@ others two.
 from __future__ import annotations
 
 import math
-import struct
 import weakref
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -139,8 +138,8 @@ class Neighborhoods:
         """A buffer as an array of a number of words each, (N, words); waits for the GPU."""
         if name not in self._texels:  # nothing was seen yet
             return np.empty((0, words), dtype)
-        content: NDArray = np.frombuffer(self[name].buffer.read(), dtype)
-        return content[: len(content) // words * words].reshape(-1, words)
+        content = self._gpu.read(self[name].buffer, np.uint32)
+        return content[: len(content) // words * words].reshape(-1, words).view(dtype)
 
     def find(
         self,
@@ -424,7 +423,7 @@ class Neighborhoods:
             self[name].buffer.bind_to_storage_buffer(binding)
 
     def _read_totals(self) -> tuple[int, int]:
-        return struct.unpack("2I", self._totals.read())
+        return tuple(self._gpu.read(self._totals, np.uint32, 2).tolist())
 
     def _reserve(self, name: str, nbytes: int, texel_format: int) -> bool:
         """Make room for so many bytes, and give up what something much larger has left; whether it is new."""

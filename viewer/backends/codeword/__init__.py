@@ -164,7 +164,7 @@ class _Sampled:
             self.release()
             return _Part(pose.pose.with_cloud(pose.cloud))
         if self._part is None or self._of is None or self._of[0] is not pose.cloud or self._of[1] != share:
-            rows = np.frombuffer(texels.buffer.read(4 * count), np.uint32)
+            rows = surface.gpu.read(texels.buffer, np.uint32, count)
             sampled = Pose(0, 0.0, "sample", pose.cloud.of_rows(rows))
             self._of, self._part = (pose.cloud, share), _Part(sampled, rows, count / len(pose.cloud))
         return self._part

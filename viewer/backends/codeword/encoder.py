@@ -79,9 +79,9 @@ class ElementSpread:
     largest: int
 
     @classmethod
-    def read(cls, buffer: moderngl.Buffer) -> ElementSpread:
+    def read(cls, gpu: Gpu, buffer: moderngl.Buffer) -> ElementSpread:
         """The spread that codeword/project.comp found; waits for the GPU. See codeword/element.glsl."""
-        least, most, largest = _SPREAD.unpack(buffer.read(_SPREAD.size))
+        least, most, largest = _SPREAD.unpack(gpu.read(buffer, count=_SPREAD.size).tobytes())
         if least > most:
             return cls(1.0, 1.0, 0)
         bits = [word ^ _SIGN if word & _SIGN else ~word & 0xFFFF_FFFF for word in (least, most)]
@@ -125,14 +125,14 @@ def encode_points(
     given = _encoding(view, params, light, uniform_radius)
     with gpu.timers.measure("project"):
         _project(points, words, given, materials)
-    spread = ElementSpread.read(words.reserve("spread", _SPREAD.size).buffer)
+    spread = ElementSpread.read(gpu, words.reserve("spread", _SPREAD.size).buffer)
     lines = -(-view.size[0] // given.stride) * view.size[1]
     with gpu.timers.measure("count"):
         starts = words.reserve("starts", 4 * (lines + 1)).buffer
         gl.clear_words(starts, 0)
         _emit(points, words, given, spread, 0, starts)
         prefix_sums(gpu, starts, lines + 1)
-    line_starts = np.frombuffer(starts.read(4 * (lines + 1)), np.uint32)
+    line_starts = gpu.read(starts, np.uint32, lines + 1)
     if (total := int(line_starts[-1])) > MOST_WORDS or 8 * total > gpu.max_storage_bytes:
         raise InputError(
             f"one picture would need {total:,} code words",
