@@ -147,7 +147,8 @@ def _note_times(stats: Stats, poses: Set[GpuPose], start: float) -> None:
     stats.derive_ms = sum(each.derive_ms for each in spent)
     stats.uploaded_bytes = sum(each.nbytes for each in spent)
     stats.shared = tuple(name for each in spent for name in each.shared)
-    stats.passes = next(iter(poses)).gpu.timers.passes()
+    timers = next(iter(poses)).gpu.timers
+    stats.frame_ms, stats.passes = timers.frame_ms(), timers.passes()
     stats.gpu_ms = sum(ms for _, ms in stats.passes)
     stats.cpu_ms = (time.perf_counter() - start) * 1e3
 

@@ -34,6 +34,7 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
     GL_3_0,
     GL_3_1,
     GL_3_2,
+    GL_3_3,
     GL_4_2,
     GL_4_3,
     GL_4_4,
@@ -69,6 +70,7 @@ _DEPTH_ATTACHMENT = 0x8D00
 _DEPTH_COMPONENT32F = 0x8CAC
 _MAX_TEXTURE_BUFFER_SIZE = 0x8C2B
 _MAX_SHADER_STORAGE_BLOCK_SIZE = 0x90DE
+_MAX_SHADER_STORAGE_BUFFER_BINDINGS = 0x90DD
 _MAX_UNIFORM_BLOCK_SIZE = 0x8A30
 _MAX_TEXTURE_SIZE = 0x0D33
 _MAX_RENDERBUFFER_SIZE = 0x84E8
@@ -90,6 +92,11 @@ def max_texture_buffer_texels() -> int:
 def max_storage_block_bytes() -> int:
     """How many bytes of a buffer a shader may see as a storage block."""
     return integer(_MAX_SHADER_STORAGE_BLOCK_SIZE)
+
+
+def storage_bindings() -> int:
+    """How many binding points of storage blocks there are."""
+    return integer(_MAX_SHADER_STORAGE_BUFFER_BINDINGS)
 
 
 def max_uniform_block_bytes() -> int:
@@ -171,13 +178,32 @@ def debug_messages() -> Iterator[list[str]]:
 
 
 def clear_words(buffer: moderngl.Buffer, word: int, count: int | None = None) -> None:
-    """Fill a buffer with one 32-bit word. count: only so many words of it, the first ones."""
+    """Fill a buffer with one 32-bit word by the driver. count: of its first words."""
     value = np.array([word], np.uint32)
     size = buffer.size if count is None else 4 * count
     GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, buffer.glo)
     GL_4_3.glClearBufferSubData(
         _COPY_WRITE_BUFFER, R32UI, 0, size, _RED_INTEGER, _UNSIGNED_INT, ctypes.c_void_p(value.ctypes.data)
     )
+
+
+def new_queries(count: int) -> list[int]:
+    """Names of new queries."""
+    names = (ctypes.c_uint * count)()
+    GL_1_5.glGenQueries(count, names)
+    return list(names)
+
+
+def stamp(query: int) -> None:
+    """Have a query hold the time when the GPU has done everything so far."""
+    GL_3_3.glQueryCounter(query, GL_3_3.GL_TIMESTAMP)
+
+
+def stamped_ns(query: int) -> int:
+    """The time that a query holds, nanoseconds; waits for it."""
+    value = ctypes.c_uint64(0)
+    GL_3_3.glGetQueryObjectui64v(query, GL_1_5.GL_QUERY_RESULT, ctypes.byref(value))
+    return value.value
 
 
 def get_buffer(buffer: moderngl.Buffer, offset: int, out: np.ndarray) -> None:

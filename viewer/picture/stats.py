@@ -12,7 +12,8 @@ class Stats:
 
     backend: the one that drew. upload_ms, derive_ms: what this frame spent on preparing its pose, estimates
     included. uploaded_bytes: of arrays of its points that came to the GPU. shared: names of those that were
-    there already, as another pose has the same. passes: (name, gpu_ms), empty while timers are off.
+    there already, as another pose has the same. passes: (name, ms on the GPU), empty while timers are off.
+    gpu_ms: of all passes. frame_ms: from the frame's start to its end on the GPU, 0 while timers are off.
     skipped: what was not computed -> why. counted: what was looked at, as tiles -> a function that reads
     how many of it became what; it waits for the GPU, and tells of the last picture of its surface. chosen:
     parameter -> what "auto" stood for. samples: of each pixel, whose mean the picture shows (see
@@ -26,6 +27,7 @@ class Stats:
 
     backend: str = ""
     gpu_ms: float = 0.0
+    frame_ms: float = 0.0
     cpu_ms: float = 0.0
     upload_ms: float = 0.0
     derive_ms: float = 0.0
