@@ -9,7 +9,7 @@ from viewer.backends import backends
 from viewer.camera import Camera
 from viewer.drawing.renderer import Renderer
 from viewer.gpu import gl, staging
-from viewer.gpu.staging import Reading, Staging
+from viewer.gpu.staging import Staging
 from viewer.testing.scenes import draw, sphere
 
 COUNT = 5000

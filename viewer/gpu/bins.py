@@ -48,10 +48,10 @@ class Bins:
         """
         gpu = self._gpu
         with gpu.timers.measure("count"):
-            gl.clear_words(self.starts.buffer, 0)
+            self._gpu.clear(self.starts.buffer, 0)
             if self.ordered:
                 self._cursors = self._at_least(self._cursors, 4 * visits.count)
-                gl.clear_words(self._cursors, 0)
+                self._gpu.clear(self._cursors, 0)
             self._send(visits, 0, self.starts.buffer, self._cursors)
         with gpu.timers.measure("scan"):
             prefix_sums(gpu, self.starts.buffer, self.cells + 1)
@@ -112,7 +112,7 @@ class Bins:
         shifts = range(0, max((self.cells - 1).bit_length(), 1), _DIGIT_BITS)
         for shift in shifts:
             last = shift == shifts[-1]
-            gl.clear_words(offsets, 0)
+            self._gpu.clear(offsets, 0)
             for step in range(2):
                 program = gpu.compute("bins/sort.comp", {"STEP": step, "LAST": int(last), "RUN": f"{_RUN}u"})
                 gpu.set(program, pair_count=length, shift=shift)

@@ -43,7 +43,7 @@ class IndexList:
 
     def clear_slots(self, count: int) -> None:
         """Make it `count` slots, to be filled by their numbers; 0xFFFFFFFF, which is no index, in each."""
-        gl.clear_words(self.texels.buffer, NOTHING, count)
+        self._gpu.clear(self.texels.buffer, NOTHING, count)
         self._write_length(count)
 
     def write(self, indices: NDArray[np.uint32]) -> None:

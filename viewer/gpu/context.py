@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, NoOpenGLError, Scan4DError
 from ..native import give_memory_back
 from . import gl
-from .bindings import UniformBlock
+from .bindings import Storage, UniformBlock
 from .blocks import BlockBuffer, Values
 from .constants import GROUP, GROUP_LIMIT
 from .shader import ShaderError, Source, shader_error
@@ -32,6 +32,7 @@ Uniform = bool | int | float | tuple[float, ...]
 REQUIRED_VERSION = 430
 _OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
+_FILLED = 4  # words that an invocation fills
 _MUCH = 64 << 20  # bytes to be given back at once
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
 
@@ -96,6 +97,8 @@ class Gpu:
         self.software = any(word in self.device.lower() for word in _SOFTWARE)
         self.timers = Timers(ctx, self.software)
         self.staging = Staging(ctx, self.software)
+        self._spare_binding = gl.storage_bindings() - 1
+        self.clears_by_shader = not self.software and self._spare_binding > max(Storage)
         self.max_storage_bytes = gl.max_storage_block_bytes()
         self.max_pixels = self.max_storage_bytes // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
@@ -199,6 +202,22 @@ class Gpu:
         nbytes = buffer.size - offset if count < 0 else count * kind.itemsize
         self.activate()
         return self.staging.read(buffer, nbytes, offset).view(kind)
+
+    def clear(self, buffer: moderngl.Buffer, word: int, count: int | None = None) -> None:
+        """Fill a buffer with one 32-bit word. count: only so many words of it, the first ones.
+
+        By a shader, in a fortieth of the time of what drivers of graphics cards do; software drivers do it
+        faster themselves.
+        """
+        words = buffer.size // 4 if count is None else count
+        with self.timers.measure("clear", only_alone=True):
+            if not self.clears_by_shader or buffer.size > self.max_storage_bytes:
+                gl.clear_words(buffer, word, words)
+            elif words:
+                program = self.compute("common/fill.comp", {"FILLED": self._spare_binding})
+                self.set(program, word=int(word), words=words)
+                buffer.bind_to_storage_buffer(self._spare_binding)
+                self.dispatch(program, -(-words // _FILLED))
 
     def check_memory(self, *made: Resource) -> None:
         """Release what was just made, and raise Scan4DError, where there was no memory for it: drivers only

@@ -246,8 +246,8 @@ class RangeSamples:
             )
         known = self._normals
         if known.filter != self.filter:
-            gl.clear_words(known.words.buffer, 0)
-            gl.clear_words(known.rows, 0)
+            self._gpu.clear(known.words.buffer, 0)
+            self._gpu.clear(known.rows, 0)
             known.filter, known.complete = self.filter, False
         if known.complete:
             return known.words

@@ -74,8 +74,8 @@ def scatter(
     nothing went. hits: is filled with the cells that were hit; all of them are clear then.
     """
     if hits is None:
-        gl.clear_words(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
-        gl.clear_words(best.buffer, NOTHING)
+        gpu.clear(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
+        gpu.clear(best.buffer, NOTHING)
     take_keys(gpu, visits, keys)
     take_items(gpu, visits, keys, best, hits)
 
@@ -183,7 +183,7 @@ class CellSums:
 
     def clear(self) -> None:
         """Set all sums to zero."""
-        gl.clear_words(self.buffer, 0)
+        self._gpu.clear(self.buffer, 0)
 
     def add(self, visits: Visits, fixed: FixedPoint) -> None:
         """Add what items give to cells: the file of `visits` calls `add(cell, numbers)`, as

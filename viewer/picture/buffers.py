@@ -87,7 +87,7 @@ class PictureBuffers:
                 self.covered.run(program)
         else:
             self.clear()
-            gl.clear_words(self.picture, picture_word(background))
+            self.gpu.clear(self.picture, picture_word(background))
         self._clear_as, self._slots_known = background, True
         return self.covered
 
@@ -99,7 +99,7 @@ class PictureBuffers:
     def clear_picture(self, background: str) -> None:
         """Make the picture this colour, at least where nothing is shown."""
         if self._clear_as != background:
-            gl.clear_words(self.picture, picture_word(background))
+            self.gpu.clear(self.picture, picture_word(background))
             self._clear_as = background if self._slots_known else None
 
     def list_shown(self) -> IndexList:
@@ -117,8 +117,8 @@ class PictureBuffers:
 
     def clear(self) -> None:
         """Nothing anywhere."""
-        gl.clear_words(self.depths.buffer, NO_DEPTH)
-        gl.clear_words(self.rows.buffer, NOTHING)
+        self.gpu.clear(self.depths.buffer, NO_DEPTH)
+        self.gpu.clear(self.rows.buffer, NOTHING)
 
     def raster(self) -> gl.Raster:
         """The framebuffer of backends that rasterise; `take_raster` makes it the Surface.

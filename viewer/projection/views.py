@@ -113,7 +113,7 @@ class ViewSource:
         gpu, tiles, defines = self._pose.gpu, self._tiles, self.defines([])
         program = gpu.compute("pyramidal/views/tiles.comp", {**defines, **_causes()}, params=self.params)
         with gpu.timers.measure("tiles"):
-            gl.clear_words(tiles.counts, 0)
+            surface.gpu.clear(tiles.counts, 0)
             tiles.listed.clear()
             tiles.listed.bind()
             tiles.counts.bind_to_storage_buffer(Storage.TILE_COUNTS)

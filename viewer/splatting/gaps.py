@@ -157,7 +157,7 @@ class _Search:
         self._lists = 1 << max((count - 1).bit_length(), 8)
         self._bins, self._listed = Bins(gpu, self._lists + 2), IndexList(gpu, count)
         self._radii = gl.BufferTexture(gpu.buffer(reserve=4 * count), gl.R32F)
-        gl.clear_words(self._radii.buffer, 0)
+        self._gpu.clear(self._radii.buffer, 0)
         self._bins.reserve(count + count // 16)
         self._grid, shared = self._fit()
         self.crowded = shared > _MOST

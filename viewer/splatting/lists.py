@@ -162,7 +162,7 @@ class TileLists:
             self._bind_storage("centers", "forms", "disc_looks")
 
         if purpose.numbered:
-            gl.clear_words(self._buffer("numbers"), NOTHING, points.count)
+            self._gpu.clear(self._buffer("numbers"), NOTHING, points.count)
         homes = {**given, "NUMBERED": int(purpose.numbered)}
         bins.fill(Visits("surfels/tiles/homes.glsl", discs, bind_homes, homes), entries)
         listed = {**given, "LOOKS": int(purpose.looks)}
@@ -226,7 +226,7 @@ class TileLists:
     def start_again(self) -> None:
         """Empty, and bind, the list of tiles that are to be shown again."""
         self._buffer("again").write(struct.pack("4I", 0, 0, 1, 0))
-        gl.clear_words(self.farthest, 0)
+        self._gpu.clear(self.farthest, 0)
         self._bind_storage("again")
 
     def shown_again(self) -> dict[str, int]:

@@ -293,7 +293,7 @@ def _close(points: Points, surface: Surface, splats: Splats) -> None:
     if surface.row_values is not None:
         surface.resolve("value")  # of the splats that fill, as their colours and normals
     with gpu.timers.measure("level"):
-        gl.clear_words(surface.own("level").buffer, 0)
+        surface.gpu.clear(surface.own("level").buffer, 0)
         surface.bind_own("level")
         run(2)
 

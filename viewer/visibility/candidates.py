@@ -116,7 +116,7 @@ class Candidates:
         """
         self.sectors, self.steps, self.state = sectors, steps, object()
         gpu, shift = self._gpu, self._cell_shift(_EMPTY_BELOW if among is None else _EMPTY_AMONG_VISIBLE)
-        gl.clear_words(self._occupied.buffer, 0)
+        self._gpu.clear(self._occupied.buffer, 0)
 
         def bind(program: Program) -> None:
             positions.bind(Texture.POSITIONS)
@@ -191,7 +191,7 @@ class Candidates:
             gpu.compute(f"hpr/{name}.comp", {**sampled, **self.defines}, params=self.sectors)
             for name in ("near", "visible")
         )
-        gl.clear_words(self.visible.buffer, 0)
+        self._gpu.clear(self.visible.buffer, 0)
         with gpu.timers.measure("visible"):
             self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
             self.homes.bind(Texture.HOMES)

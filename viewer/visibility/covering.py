@@ -140,7 +140,7 @@ class Covering:
 
         defines = {"FILTERED": 0, "CELLS": 0, **sampled}
         visits = Visits("hpr/candidates.glsl", self.looked_at, bind, defines, cells)
-        gl.clear_words(keys.buffer, NO_DEPTH)
+        self._gpu.clear(keys.buffer, NO_DEPTH)
         take_keys(gpu, visits, keys)
         program = gpu.compute(
             "hpr/front.comp", {"CUBE": sampled["CUBE"], "ROOM": _BEHIND if front else 1e30}, params=cells
@@ -164,7 +164,7 @@ class Covering:
         near.clear()
         near.bind()
         if sample is not None:
-            gl.clear_words(self.visible.buffer, 0)  # of those that are not looked at
+            self._gpu.clear(self.visible.buffer, 0)  # of those that are not looked at
         self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
         self._held["homes"].bind(Texture.HOMES)
         self._held["sector_positions"].bind(Texture.SPOTS)
@@ -196,7 +196,7 @@ class Covering:
         self._bins.fill(visits, near.capacity)
         discs = self._texels("discs", near.capacity, gl.RGBA32F, 4)
         windows = self._texels("windows", faces * (edge // _BLOCK + 1) ** 2, gl.R32I, 1)
-        gl.clear_words(windows.buffer, 0)
+        self._gpu.clear(windows.buffer, 0)
         program = gpu.compute(
             "hpr/cover_discs.comp", {"REACH": REACH, "WINDOW": _WINDOW, **defines}, params=cells
         )

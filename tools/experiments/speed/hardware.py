@@ -14,10 +14,12 @@ moved    messages of the driver in ten frames that a buffer moved from the memor
 sketch, GL_POINTS and CUDA draw the same points with nothing beside: a plain compute shader in the same
 context, points of OpenGL, a kernel by CuPy. Rows whose name begins with "new" bring other points with each
 picture, which are on the CPU already. "cold" is the time to the first picture in a process of its own, once
-without and once with what the process before stored.
+without and once with what the process before stored. "frame" is the time of a frame on the GPU with what is in
+no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
-ends the run after so many seconds; what is measured by then is printed. --json prints each row as it comes.
+ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
+copy, get and map for buffers that the CPU reads, and --clearing one of shader and driver.
 """
 
 from __future__ import annotations
@@ -186,6 +188,7 @@ class Drawn:
     def gpu_ms(self, step: int) -> dict[str, float]:
         """Milliseconds of its passes on the GPU."""
         (found,) = pass_ms(renderer(), self.request(step), self.surface, 1)
+        self.frame_ms = self.surface.stats.frame_ms
         return {name: float(ms) for name, ms in found.items()}
 
     def finish(self) -> None:
@@ -248,6 +251,7 @@ def orbit(options: Namespace) -> Iterator[Row]:
     """Each backend and each sketch, from a new view in each picture."""
     limit = Limit(options)
     _threads_at_rest()
+    _choose(options)
     for points in _sizes(options):
         for name, case in CASES.items():
             is_drawn = points <= case.most and (case.most != _ONE_SIZE or points == _one_size(options))
@@ -263,6 +267,7 @@ def orbit(options: Namespace) -> Iterator[Row]:
 def new_pose(options: Namespace) -> Iterator[Row]:
     """Each backend with other points in each picture."""
     limit, points = Limit(options), _one_size(options)
+    _choose(options)
     for name, case in NEW.items():
         if limit.wants(f"new {name}"):
             yield from _guarded(f"new {name}", points, partial(_series, case, points, options))
@@ -288,6 +293,15 @@ def cold(options: Namespace) -> Iterator[Row]:
                 "context, ms": second["context"],
                 "second picture, ms": second["second"],
             }
+
+
+def _choose(options: Namespace) -> None:
+    """Take the ways of reading and clearing that are to be measured."""
+    gpu = renderer().gpu
+    if options.reading:
+        gpu.staging.reading = options.reading
+    if options.clearing:
+        gpu.clears_by_shader = options.clearing == "shader"
 
 
 def _sizes(options: Namespace) -> list[int]:
@@ -365,6 +379,7 @@ def _figures(drawn: Contender, options: Namespace, limit: Limit) -> Row:
     return {
         **parts,
         "GPU, ms": float(np.median([sum(each.values()) for each in passes])),
+        "frame, ms": getattr(drawn, "frame_ms", None),
         "first, ms": first,
         "longest, ms": longest,
         **counts,
@@ -548,6 +563,8 @@ EXPERIMENT = Script(
         "pictures": 25,
         "rows": [],
         "limit": 0.0,
+        "reading": "",
+        "clearing": "",
     },
 )
 

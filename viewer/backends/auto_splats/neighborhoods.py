@@ -195,7 +195,7 @@ class Neighborhoods:
             self._divide(search, visible, pose, border)
             self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
             if self._reserve("extents", 4 * len(pose.cloud), gl.R32F):
-                gl.clear_words(self["extents"].buffer, 0)
+                self._gpu.clear(self["extents"].buffer, 0)
             self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
             for name, nbytes, texel in (
                 ("drawn", 4, gl.R32UI),
@@ -273,8 +273,8 @@ class Neighborhoods:
         """Find how near each coarse cell sees anything; how many see any."""
         self._reserve("nearest", 4 * grids.coarse_cells, gl.R32UI)
         with self._gpu.timers.measure("nearest"):
-            gl.clear_words(self["nearest"].buffer, NO_DEPTH)
-            gl.clear_words(self._totals, 0)
+            self._gpu.clear(self["nearest"].buffer, NO_DEPTH)
+            self._gpu.clear(self._totals, 0)
             program = self._gpu.compute("auto_splats/nearest.comp", params=grids)
             self["depths"].bind(Texture.DEPTHS)
             self._bind_storage(nearest=Storage.KEYS)
@@ -311,7 +311,7 @@ class Neighborhoods:
         self._reserve("slots", _SLOT * self.participants, gl.RGBA32UI)
         self._reserve("counts", 4 * self._grids.coarse_cells, gl.R32UI)
         with self._gpu.timers.measure("arrange"):
-            gl.clear_words(self["counts"].buffer, 0)
+            self._gpu.clear(self["counts"].buffer, 0)
             self._searched.clear()
             self._bins.items.bind(Texture.LISTED)
             self._bind_storage(slots=Storage.SLOTS, counts=Storage.COUNTS)
@@ -321,7 +321,7 @@ class Neighborhoods:
         """Find the usual radius in each coarse cell; how many participants the fullest one has."""
         self._reserve("usual", 4 * self._grids.coarse_cells, gl.R32F)
         with self._gpu.timers.measure("usual"):
-            gl.clear_words(self._totals, 0)
+            self._gpu.clear(self._totals, 0)
             defines = {"K": search.k, "ENOUGH": f"{_ENOUGH}u"}
             program = self._gpu.compute("auto_splats/usual.comp", defines, params=self._grids)
             self["counts"].bind(Texture.COUNTS)

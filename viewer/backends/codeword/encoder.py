@@ -129,7 +129,7 @@ def encode_points(
     lines = -(-view.size[0] // given.stride) * view.size[1]
     with gpu.timers.measure("count"):
         starts = words.reserve("starts", 4 * (lines + 1)).buffer
-        gl.clear_words(starts, 0)
+        gpu.clear(starts, 0)
         _emit(points, words, given, spread, 0, starts)
         prefix_sums(gpu, starts, lines + 1)
     line_starts = gpu.read(starts, np.uint32, lines + 1)

@@ -41,7 +41,7 @@ class FaceLists:
         if self.joined.buffer.size != 4 * points:
             self._gpu.discard(self.joined)
             self.joined = _flags(self._gpu, points)
-        gl.clear_words(self.joined.buffer, 0)
+        self._gpu.clear(self.joined.buffer, 0)
         self.small.clear()
         self.large.clear()
 
@@ -103,8 +103,8 @@ def draw_faces(
     for listed in (lists.small, lists.large):
         given = {"LANES": listed.each, **defines}
         drawn.append(Visits("hpr/face_pixels.glsl", 0, partial(bind_listed, listed), given, sectors, listed))
-    gl.clear_words(surface.depths.buffer, NOTHING)  # behind all that is behind faces
-    gl.clear_words(surface.rows.buffer, NOTHING)
+    gpu.clear(surface.depths.buffer, NOTHING)  # behind all that is behind faces
+    gpu.clear(surface.rows.buffer, NOTHING)
     for visits in drawn:
         take_keys(gpu, visits, surface.depths)
     for visits in drawn:

@@ -102,7 +102,7 @@ class SectorSplats:
         with gpu.timers.measure("circulation"):
             sums.clear()
             sums.add(visits("hpr/circulation.glsl"), fixed)
-        gl.clear_words(self["keys"].buffer, NO_DEPTH)
+        self._gpu.clear(self["keys"].buffer, NO_DEPTH)
         take_keys(gpu, visits("hpr/sizes.glsl"), self["keys"])
         with gpu.timers.measure("splats"):
             has_colors = pose.cloud.colors is not None

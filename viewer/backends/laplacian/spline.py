@@ -149,7 +149,7 @@ class _Spline:
         look = self._gpu.compute("laplacian/look.comp", defines, params=self._source.params)
         for turn, view in enumerate(views):
             with self._gpu.timers.measure(f"view {view}"):
-                gl.clear_words(pictures.views[turn].buffer, 0)
+                self._gpu.clear(pictures.views[turn].buffer, 0)
                 self._source.bind()
                 surface.bind_textures()
                 for name in self._channels:
@@ -166,7 +166,7 @@ class _Spline:
         with gpu.timers.measure("differences"):
             for picture in pictures.views[: len(views)]:
                 self._differ(picture, whole=False)
-        gl.clear_words(pictures.merged_bands.buffer, 0)
+        self._gpu.clear(pictures.merged_bands.buffer, 0)
         if self._bands.captured:
             self._add_captured(views)
         else:
@@ -201,7 +201,7 @@ class _Spline:
     def _add_captured(self, views: Sequence[int]) -> None:
         """Add up the bands of captured images: of as many levels as all views have from the one that fits."""
         pictures, gpu, splats = self._pictures, self._gpu, self._surface.cached(CapturedLevels)
-        gl.clear_words(splats.finest.buffer, 0)
+        self._gpu.clear(splats.finest.buffer, 0)
         source, bands = self._source, self._bands
         fits = max(levels_that_fit(self._surface, view, source.params.detail)[1] for view in views)
         count = min(len(self._levels) + 1, max(source.samples.levels - max(fits, 0), 1))
