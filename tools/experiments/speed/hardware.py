@@ -14,8 +14,8 @@ moved    messages of the driver in ten frames that a buffer moved from the memor
 sketch, GL_POINTS and CUDA draw the same points with nothing beside: a plain compute shader in the same
 context, points of OpenGL, a kernel by CuPy. Rows whose name begins with "new" bring other points with each
 picture, which are on the CPU already. "cold" is the time to the first picture in a process of its own, once
-without and once with what the process before stored. "frame" is the time of a frame on the GPU with what is in
-no pass.
+without and once with what the process before stored. "frame" is the time of a frame on the GPU, with what is
+in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
