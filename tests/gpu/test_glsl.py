@@ -248,6 +248,8 @@ def draw_chunks(renderer: Renderer) -> None:
 def use_primitives(gpu: Gpu) -> None:
     """What backends may use of each primitive, whether one does or not."""
     gpu.activate()
+    gpu.clears_by_shader = True
+    gpu.clear(gpu.buffer(reserve=64), 0)
     flagged(gpu, np.arange(5000) % 3 == 0)
     for ordered in (False, True):
         filled(gpu, some_visits(100, 30), 30, ordered)
