@@ -194,12 +194,12 @@ def new_queries(count: int) -> list[int]:
     return list(names)
 
 
-def stamp(query: int) -> None:
+def record_time(query: int) -> None:
     """Have a query hold the time when the GPU has done everything so far."""
     GL_3_3.glQueryCounter(query, GL_3_3.GL_TIMESTAMP)
 
 
-def stamped_ns(query: int) -> int:
+def recorded_ns(query: int) -> int:
     """The time that a query holds, nanoseconds; waits for it."""
     value = ctypes.c_uint64(0)
     GL_3_3.glGetQueryObjectui64v(query, GL_1_5.GL_QUERY_RESULT, ctypes.byref(value))

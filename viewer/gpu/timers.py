@@ -99,5 +99,5 @@ class Timers:
         if self._used == len(self._queries):
             self._queries += gl.new_queries(16)
         query, self._used = self._queries[self._used], self._used + 1
-        gl.stamp(query)
-        return lambda: gl.stamped_ns(query) * 1e-6
+        gl.record_time(query)
+        return lambda: gl.recorded_ns(query) * 1e-6
