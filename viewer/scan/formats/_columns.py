@@ -15,9 +15,10 @@ from numpy.typing import DTypeLike, NDArray
 
 from ...errors import InputError
 from ...task import checkpoint
+from ..contents import Deferred
 from ..points import PointCloud
 from ._admission import LONGEST_LINE
-from ._deferred import Deferred, cloud_of
+from ._deferred import cloud_of
 from ._precision import is_enough
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..contents import Deferred
 from ..points import PointCloud, choose_origin, finite_rows
 from ._admission import admit
 
@@ -14,21 +15,6 @@ _FINAL = {"normals": 12, "colors": 4, "radii": 4}  # bytes of a point in a Point
 _WORK = 20 << 20  # bytes of the points that are worked on together
 _SPLAT = 20  # bytes of a half-axis and its radius
 _IDS, _ID = 12, 4  # bytes of a point's number while it is found, and then
-
-
-class Deferred:
-    """An array that is made when numpy asks for it, once.
-
-    dtype: of its values as they are read, width: how many a point has.
-    """
-
-    def __init__(self, make: Callable[[], NDArray], dtype: np.dtype, width: int = 1) -> None:
-        self._make = make
-        self.dtype = dtype
-        self.size = dtype.itemsize * width  # bytes of a point
-
-    def __array__(self, dtype: object = None, copy: object = None) -> NDArray:
-        return self._make()
 
 
 def cloud_of(
