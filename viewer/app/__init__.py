@@ -62,7 +62,7 @@ def run(
         with uncollected():
             from ..folders import user_folder  # only now: a wrong name is told without waiting for ImGui
             from . import settings
-            from .app import App, Stated
+            from .app import App, StatedOptions
             from .loop import Loop
             from .window import Window
             from .window_look import stored_placement
@@ -76,7 +76,7 @@ def run(
             raise
         try:
             with uncollected():  # tools are imported
-                stated = Stated(start.unit, start.fps, start.up)
+                stated = StatedOptions(start.unit, start.fps, start.up)
                 app = App(window, found, timeline, stored, stated, start.session)
             try:
                 for note in notes:

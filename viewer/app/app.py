@@ -31,7 +31,7 @@ from .window import Window
 log = logging.getLogger(__name__)
 
 
-class Stated(NamedTuple):
+class StatedOptions(NamedTuple):
     """The unit, rate and up axis that the command line states for all scans; None: it states none."""
 
     unit: str | None = None
@@ -48,7 +48,7 @@ class App:
         scans: Sequence[str],
         timeline: Timeline,
         stored: Mapping[str, Any],
-        stated: Stated,
+        stated: StatedOptions,
         session: SavedSession | None = None,
     ) -> None:
         """stored: name of a part -> the values that come back, as JSON has them. session: to open the first
