@@ -75,7 +75,7 @@ class StatedCamera:
 
 @dataclass(frozen=True, kw_only=True)
 class Stated:
-    """What a file states about itself; None where it is silent.
+    """Facts that a file states about itself; None where it is silent.
 
     unit:      of length, perhaps any text
     axes:      an anatomical space or an up axis, as the file words it

@@ -132,7 +132,7 @@ CORRECTED = {
 
 @dataclass(frozen=True)
 class Corrections(Mapping[str, Any]):
-    """What a user corrects: key -> parsed value.
+    """Corrections of a user: key -> parsed value.
 
     columns:       tuple of roles        separator, encoding, colors, normals, texture, splats, axes: str
     decimal:       "." or ","            skip: int              depth-scale: float
@@ -167,7 +167,7 @@ class Corrections(Mapping[str, Any]):
         return hash(tuple(sorted(self.texts.items())))
 
     def amended(self, texts: Mapping[str, object]) -> Corrections:
-        """These, and others that win where both correct the same. Raises InputError as `parse`."""
+        """Return these corrections with others, which win where both correct the same key. Raises InputError as `parse`."""
         return Corrections.parse({**self.texts, **texts})
 
     def decision(self, key: str, value: Any = None) -> Decision | None:

@@ -75,17 +75,17 @@ class Decision:
 
     @property
     def label(self) -> str:
-        """Its name as the panel shows it."""
+        """The name that the panel shows."""
         return KEYS[self.key]
 
     @property
     def shown(self) -> str:
-        """Its value as people read it."""
+        """The value as people read it."""
         return shown_value(self.value)
 
     @property
     def shown_source(self) -> str:
-        """Its source as people read it: the file's name where there is one."""
+        """The source as people read it: the file's name where there is one."""
         return self.where or _SOURCES[self.source]
 
     def to_json(self) -> dict[str, Any]:
@@ -167,7 +167,7 @@ class Reading:
         return tuple(key for key, one in self.decisions.items() if one.is_marked)
 
     def short(self) -> list[str]:
-        """What the decisions about the file's contents come to, one text each, for one line."""
+        """Return the decisions about the file's contents, one text each, for one line."""
         shown = [self.decisions[key] for key in _SHORT if self.decisions[key].value not in (None, "")]
         return [one.shown if one.key == "format" else f"{one.label.lower()} {one.shown}" for one in shown]
 
