@@ -167,7 +167,7 @@ class Corrections(Mapping[str, Any]):
         return hash(tuple(sorted(self.texts.items())))
 
     def amended(self, texts: Mapping[str, object]) -> Corrections:
-        """Return these corrections with others, which win where both correct the same key. Raises InputError as `parse`."""
+        """Return these corrections with others, which win for keys of both. Raises InputError."""
         return Corrections.parse({**self.texts, **texts})
 
     def decision(self, key: str, value: Any = None) -> Decision | None:
