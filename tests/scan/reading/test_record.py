@@ -73,7 +73,7 @@ def test_lines_say_all_and_the_short_form_one_line() -> None:
     assert texts["left aside"] == "f002 - Copy.ply: copy of f002.ply"
     assert texts["not used"] == "45 harmonics"
     assert "take1" in texts["take"]
-    assert texts["contradiction"].startswith("frame 4")
+    assert texts["contradiction"].startswith("frame 5")
 
 
 def test_without_names_no_file_is_named() -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Literal, get_args
 
 from ...errors import InputError, shortened, unknown_name
+from ..times import frame_in_words
 
 Source = Literal["file", "neighbour", "folder", "user", "assumed"]
 
@@ -186,7 +187,7 @@ class Reading:
             *(("take", f"{take.name}: {take.frames} frames, {take.pattern}") for take in self.takes),
             *(("left aside", f"{aside.file}: {aside.why}") for aside in self.aside),
             *(("not used", text) for text in self.unused),
-            *(("contradiction", f"frame {one.frame}: {one.what}") for one in self.contradictions),
+            *(("contradiction", f"{frame_in_words(one.frame)}: {one.what}") for one in self.contradictions),
         ]
 
     def without_names(self) -> Reading:
