@@ -14,9 +14,9 @@ from range_scenes import sphere_view
 from viewer.bounds import Bounds
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.guessed_unit import guess_unit
 from viewer.scan.open import open_scan
 from viewer.scan.range_view import RangeView, merge
+from viewer.scan.reading.unit import guess_unit
 from viewer.scan.units import UNIT_WORDS, Scale, checked_unit, conversion, is_length, usable_unit
 
 

@@ -12,9 +12,9 @@ from ...backends import backend
 from ...files import printable
 from ...geometry import AXES
 from ...output.legend import number
-from ...scan.guessed_unit import guess_unit
 from ...scan.points import UNKNOWN_UNIT
 from ...scan.pose import Pose
+from ...scan.reading.unit import guess_unit
 from ...scan.times import FPS_LIMITS, TIMES_FILE
 from ...scan.units import UNIT_WORDS, is_length
 from .. import widgets

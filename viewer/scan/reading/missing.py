@@ -1,0 +1,118 @@
+"""Which values mean "not measured": points at exactly (0, 0, 0), and numbers such as -9999 or 65504.
+
+Scanners and exporters write them for pixels that saw nothing. A value counts only where many points share
+it and nothing else lies near it, so that a real point at the origin stays.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..points import strided
+from .corrections import NOTHING_CORRECTED, Corrections
+from .record import Decision
+
+KEY = "missing"
+ZEROS = "0 0 0"  # how the record names rows of zeros
+NONE = "none"  # the correction that retains all points
+_LEAST = 8  # points that share a value
+_SHARE = 0.02  # of the points, at (0, 0, 0)
+_FAR = 10.0  # spacings from the origin to the nearest measured point
+_SENTINELS = (9999.0, -9999.0, 32767.0, -32768.0, 65504.0, 65535.0, 99999.0, -99999.0)
+_HUGE = 1e10  # renderers write this and more where a ray hits nothing
+
+
+class Unmeasured(NamedTuple):
+    """Rows that were not measured. value: what marks them, as the record names it. rows: (N,) bool."""
+
+    value: str
+    rows: NDArray[np.bool_]
+
+
+def unmeasured_points(points: NDArray) -> Unmeasured | None:
+    """The rows of points (N, 3) that were not measured; None where there are none."""
+    rows = zero_rows(points)
+    if rows is not None:
+        return Unmeasured(ZEROS, rows)
+    depth = points[:, 2]
+    value = unmeasured_value(depth)
+    return None if value is None else Unmeasured(f"{value:g}", depth == depth.dtype.type(value))
+
+
+def zero_rows(points: NDArray) -> NDArray[np.bool_] | None:
+    """The rows of points (N, 3) at exactly (0, 0, 0), (N,) bool, where these were not measured, else None.
+
+    They are at least 8 and 2 % of the points, and every other point is more than 10 spacings away from zero.
+    """
+    least = max(_LEAST, _SHARE * len(points))
+    for axis in (2, 0, 1):  # most clouds have no such rows: the first look is enough
+        if len(points) - np.count_nonzero(points[:, axis]) < least:
+            return None
+    rows = (points[:, 0] == 0) & (points[:, 1] == 0) & (points[:, 2] == 0)
+    zeros = int(np.count_nonzero(rows))
+    if zeros < least or zeros == len(points):
+        return None
+    others = points[~rows].astype(np.float64)
+    others = others[np.isfinite(others).all(axis=1)]
+    if not len(others):
+        return None
+    low, high = np.quantile(strided(others), [0.02, 0.98], axis=0)
+    spacing = float((high - low).max()) / math.sqrt(len(others))  # of a surface, roughly
+    nearest = math.sqrt(float(np.einsum("ij,ij->i", others, others).min()))
+    return rows if nearest > _FAR * spacing else None
+
+
+def unmeasured_value(values: NDArray) -> float | None:
+    """The number that means "not measured" among depths or heights of any shape; None where none does.
+
+    It is one that programs use for that, at least 8 values have it, it is the largest or the smallest, and
+    it is farther from the others than these are from each other.
+    """
+    if not values.size:
+        return None
+    for value in (float(values.max()), float(values.min())):
+        if math.isnan(value):
+            finite = values[np.isfinite(values)]
+            return unmeasured_value(finite) if finite.size else None
+        if math.isinf(value) or not (value in _SENTINELS or value >= _HUGE):
+            continue
+        rows = values == values.dtype.type(value)
+        others = values[~rows]
+        others = others[np.isfinite(others) & (others != 0)] if others.dtype.kind == "f" else others
+        if np.count_nonzero(rows) < _LEAST or not others.size:
+            continue
+        low, high = float(others.min()), float(others.max())
+        gap = value - high if value > high else low - value
+        if gap > high - low:
+            return value
+    return None
+
+
+def rows_with(points: NDArray, value: float | tuple[float, float, float]) -> Unmeasured:
+    """The rows of points (N, 3) that the user declares not measured: one point, or one value of z."""
+    wanted = np.array(value, points.dtype)
+    rows = (points == wanted).all(axis=1) if wanted.ndim else points[:, 2] == wanted
+    return Unmeasured(" ".join(f"{number:g}" for number in np.atleast_1d(wanted)), rows)
+
+
+def find(points: NDArray, corrections: Corrections = NOTHING_CORRECTED) -> Unmeasured | None:
+    """The rows of points (N, 3) that were not measured, as the user says or else the points tell."""
+    stated = corrections.get(KEY)
+    if stated is None:
+        return unmeasured_points(points)
+    return None if stated == NONE else rows_with(points, stated)
+
+
+def decide(found: Unmeasured | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
+    """Which value means "not measured" in a scan, and how many points of a frame it removes; else null."""
+    removed = 0 if found is None else int(np.count_nonzero(found.rows))
+    why = f"Scan4D leaves out {removed:,} points that have this value" if removed else ""
+    if KEY in corrections:
+        return Decision(KEY, NONE if found is None else found.value, "user", "--read", why)
+    if found is None:
+        return Decision(KEY, None, "file")
+    return Decision(KEY, found.value, "assumed", why=why, alternatives=(NONE,))

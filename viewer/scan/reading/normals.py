@@ -1,0 +1,70 @@
+"""Whether the normals of a file can be used: programs that have none write zeros or NaN in their place."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .corrections import NOTHING_CORRECTED, Corrections
+from .record import Decision
+
+KEY = "normals"
+STORED, PARTLY, DROPPED, NONE = "stored", "partly", "dropped", "none"
+_AT_ONCE = 1 << 18  # rows
+
+
+class NormalsFound(NamedTuple):
+    """Normals that can be used, and how many of the file's cannot.
+
+    normals: (N, 3) as stored, of any length, bad rows 0; None where no row is good. bad: how many rows are
+    zero or not finite. count: N.
+    """
+
+    normals: NDArray | None
+    bad: int
+    count: int
+
+
+def usable_normals(normals: NDArray) -> NormalsFound:
+    """Check normals (N, 3) of any real type: bad rows become 0, and where all are bad there are none."""
+    bad = bad_rows(normals)
+    if not len(bad):
+        return NormalsFound(normals, 0, len(normals))
+    if len(bad) == len(normals):
+        return NormalsFound(None, len(bad), len(normals))
+    cleaned = normals.copy()
+    cleaned[bad] = 0
+    return NormalsFound(cleaned, len(bad), len(normals))
+
+
+def bad_rows(normals: NDArray) -> NDArray[np.intp]:
+    """The rows of normals (N, 3) that are zero or not finite, (B,)."""
+    found = [np.empty(0, np.intp)]
+    for start in range(0, len(normals), _AT_ONCE):
+        part = normals[start : start + _AT_ONCE]
+        if part.dtype.kind != "f" or part.dtype.itemsize < 4:
+            part = part.astype(np.float32)
+        with np.errstate(all="ignore"):
+            squares = np.einsum("ij,ij->i", part, part)
+            if (squares > 0).all() and (squares < np.inf).all():
+                continue
+            largest = np.abs(part).max(axis=1)  # squares of tiny normals are 0, those of huge ones infinite
+        found.append(start + np.flatnonzero(~((largest > 0) & (largest < np.inf))))
+    return np.concatenate(found)
+
+
+def decide(found: NormalsFound | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
+    """What became of the normals of a file. found: None where it has none, and then the value is null."""
+    if corrections.get(KEY) == NONE:
+        return Decision(KEY, NONE, "user", "--read", "Scan4D estimates normals instead")
+    if found is None or not found.count:
+        return Decision(KEY, None, "file")
+    if found.normals is None:
+        why = f"All {found.count:,} normals are zero or not finite, so Scan4D estimates normals"
+        return Decision(KEY, DROPPED, "file", why=why)
+    if found.bad:
+        why = f"{found.bad:,} of {found.count:,} normals are zero or not finite"
+        return Decision(KEY, PARTLY, "file", why=why)
+    return Decision(KEY, STORED, "file")
