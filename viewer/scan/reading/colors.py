@@ -25,7 +25,7 @@ _MOSTLY = 0.5  # share of values with a fraction, by which such colours differ f
 
 
 class ColorEvidence(NamedTuple):
-    """What the colours of one frame tell about their scale.
+    """Evidence from the colours of one frame about their scale.
 
     kind: numpy's code of their type, such as "u2". top: the largest finite value. fractions: the share of
     values that are no whole numbers, 0..1; 0 where the type or `top` makes it irrelevant.
@@ -44,7 +44,7 @@ class ColorScale(NamedTuple):
 
 
 def evidence_of(colors: NDArray) -> ColorEvidence:
-    """What colours (N, C) tell about their scale."""
+    """Evidence from colours (N, C) about their scale."""
     kind = colors.dtype.str[1:]
     if colors.dtype.itemsize == 1:
         return ColorEvidence(kind, 255.0)

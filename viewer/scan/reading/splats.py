@@ -114,7 +114,7 @@ def decide(found: SplatColumns | None, corrections: Corrections = NOTHING_CORREC
 
 
 def unused(found: SplatColumns | None) -> tuple[str, ...]:
-    """What a file of splats holds and Scan4D does not use: one text, or none."""
+    """One text about the harmonics that a file of splats holds and Scan4D does not use; () without any."""
     if found is None or not found.higher:
         return ()
     degree = round((len(found.higher) / 3 + 1) ** 0.5) - 1
