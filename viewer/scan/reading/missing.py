@@ -108,7 +108,7 @@ def find(points: NDArray, corrections: Corrections = NOTHING_CORRECTED) -> Unmea
 
 
 def decide(found: Unmeasured | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
-    """Decide which value means "not measured" in a scan, and how many points of a frame it removes; else null."""
+    """Decide which value means "not measured", and count the points of a frame that it removes; else null."""
     removed = 0 if found is None else int(np.count_nonzero(found.rows))
     why = f"Scan4D leaves out {removed:,} points that have this value" if removed else ""
     if KEY in corrections:

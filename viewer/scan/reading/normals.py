@@ -56,7 +56,7 @@ def bad_rows(normals: NDArray) -> NDArray[np.intp]:
 
 
 def decide(found: NormalsFound | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
-    """Decide what becomes of the normals of a file. found: None where it has none, and then the value is null."""
+    """Decide what becomes of the normals of a file. found: None where it has none: the value is null."""
     if corrections.get(KEY) == NONE:
         return Decision(KEY, NONE, "user", "--read", "Scan4D estimates normals instead")
     if found is None or not found.count:
