@@ -19,12 +19,12 @@ class NormalsFound(NamedTuple):
     """Normals that can be used, and how many of the file's cannot.
 
     normals: (N, 3) as stored, of any length, bad rows 0; None where no row is good. bad: how many rows are
-    zero or not finite. count: N.
+    zero or not finite. points: N.
     """
 
     normals: NDArray | None
     bad: int
-    count: int
+    points: int
 
 
 def usable_normals(normals: NDArray) -> NormalsFound:
@@ -59,12 +59,12 @@ def decide(found: NormalsFound | None, corrections: Corrections = NOTHING_CORREC
     """Decide what becomes of the normals of a file. found: None where it has none: the value is null."""
     if corrections.get(KEY) == NONE:
         return Decision(KEY, NONE, "user", "--read", "Scan4D estimates normals instead")
-    if found is None or not found.count:
+    if found is None or not found.points:
         return Decision(KEY, None, "file")
     if found.normals is None:
-        why = f"All {found.count:,} normals are zero or not finite, so Scan4D estimates normals"
+        why = f"All {found.points:,} normals are zero or not finite, so Scan4D estimates normals"
         return Decision(KEY, DROPPED, "file", why=why)
     if found.bad:
-        why = f"{found.bad:,} of {found.count:,} normals are zero or not finite"
+        why = f"{found.bad:,} of {found.points:,} normals are zero or not finite"
         return Decision(KEY, PARTLY, "file", why=why)
     return Decision(KEY, STORED, "file")
