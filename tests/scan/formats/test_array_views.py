@@ -10,7 +10,7 @@ from range_scenes import LENSES, camera_points, shape_view
 
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.formats._admission import READ_VARIABLE
+from viewer.scan.admission import READ_VARIABLE
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import RangeView

@@ -14,7 +14,7 @@ from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.formats._admission import READ_VARIABLE
+from viewer.scan.admission import READ_VARIABLE
 from viewer.scan.open import open_scan
 from viewer.scan.range_view import RangeView
 

@@ -17,7 +17,7 @@ from whole_folders import FOLDERS
 from viewer.commands.info import scan_facts
 from viewer.errors import InputError
 from viewer.files import named_inside
-from viewer.scan.formats._admission import admit, opened, shared
+from viewer.scan.admission import admit, opened, shared
 from viewer.scan.open import find_source, open_scan
 from viewer.scan.range_folders.tum import nearest_once
 

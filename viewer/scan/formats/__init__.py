@@ -32,12 +32,12 @@ from numpy.typing import NDArray
 from ...errors import InputError, Scan4DError, explained, shortened, unknown_name
 from ...extensions import load_modules, package_of
 from ...files import whole_file
+from ..admission import admit
 from ..faces import Faces
 from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
 from ..times import frame_in_words
-from ._admission import admit
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
 _CONVERT = {  # what is not read, and what turns it into what is

@@ -28,13 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..admission import admit
 from ..grids import is_seen_from_behind, view_of_camera, view_of_grid
 from ..image_poses import IMAGE_AXES, UPRIGHT, from_camera_to_world, from_world_to_camera
 from ..points import UNKNOWN_UNIT
 from ..range_view import DepthKind, RangeView, assumed_pinhole, mask_of
 from ..terrain import METRE, Ground, are_degrees, terrain_view
 from ..units import usable_unit
-from ._admission import admit
 from ._stored import StoredArray
 
 _IMAGES = ("depth", "xyz", "elevation")  # of which one makes a view

@@ -15,9 +15,9 @@ from numpy.typing import DTypeLike, NDArray
 
 from ...errors import InputError
 from ...task import checkpoint
+from ..admission import LONGEST_LINE
 from ..contents import Deferred
 from ..points import PointCloud
-from ._admission import LONGEST_LINE
 from ._deferred import cloud_of
 from ._precision import is_enough
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from ..admission import admit
 from ..contents import Deferred
 from ..points import PointCloud, choose_origin, finite_rows
-from ._admission import admit
 
 _FINAL = {"normals": 12, "colors": 4, "radii": 4}  # bytes of a point in a PointCloud
 _WORK = 20 << 20  # bytes of the points that are worked on together

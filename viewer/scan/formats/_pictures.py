@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError, explained
 from ...native import LIBTIFF, unsaid
-from ._admission import admit, opened, size_of
+from ..admission import admit, opened, size_of
 from ._stored import QUIETLY
 
 if TYPE_CHECKING:

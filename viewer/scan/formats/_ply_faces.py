@@ -11,8 +11,8 @@ import numpy as np
 
 from ...errors import InputError
 from ...task import checkpoint
+from ..admission import too_few
 from ..faces import Faces
-from ._admission import too_few
 from ._columns import batches, text_lines, whole_numbers
 from ._ply_header import ENDIAN, TYPES, Element, negative_list
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, unknown_name
-from ._admission import MOST_COLUMNS, check_count
+from ..admission import MOST_COLUMNS, check_count
 
 LONGEST_HEADER = 1 << 20  # bytes looked at
 _LONGEST_WORD = 40  # of a file, in a message

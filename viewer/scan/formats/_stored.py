@@ -14,7 +14,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ._admission import MOST_FRAMES, check_count
+from ..admission import MOST_FRAMES, check_count
 
 _CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
 _LONGEST_HEADER = 10_000  # bytes, as numpy has it

@@ -33,11 +33,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...native import OPENEXR, unsaid
+from ..admission import MOST_MEMBERS, admit, check_count, opened, read_exactly, size_of
 from ..colors import linear_from_srgb8, srgb8_from_linear
 from ..points import UNKNOWN_UNIT
 from ..range_view import DepthKind, RangeView, mask_of, memory_of_merging
 from ..units import usable_unit
-from ._admission import MOST_MEMBERS, admit, check_count, opened, read_exactly, size_of
 from ._exr_renders import rendered_eyes, view_of_eye
 
 TITLE = "EXR"

@@ -24,8 +24,8 @@ from ...errors import InputError
 from ...helper import start_python
 from ...task import checkpoint
 from ...unfinished import temporary_folder
+from ..admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
 from ..points import PointCloud
-from ._admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
 from ._columns import cloud_from_columns, named
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ import math
 from pathlib import Path
 from typing import BinaryIO
 
+from ..admission import admit, opened, size_of
 from ..points import PointCloud
-from ._admission import admit, opened, size_of
 from ._deferred import cloud_of
 from ._stored import StoredArray
 

@@ -26,11 +26,11 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..admission import MOST_MEMBERS, admit, check_count, opened, size_of
 from ..contents import Deferred
 from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ..pose import Scanned
-from ._admission import MOST_MEMBERS, admit, check_count, opened, size_of
 from ._array_views import makes_views, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
 from ._deferred import cloud_of

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..admission import opened
 from ..faces import Faces
 from ..points import PointCloud
-from ._admission import opened
 from ._columns import batches, bounded_lines, parse_table, whole_numbers
 from ._topology import with_topology
 

@@ -23,12 +23,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened, unknown_name
 from ...rigid import rigid_matrix
-from ..grids import view_of_camera
-from ..image_poses import from_camera_to_world, rotation_of
-from ..points import UNKNOWN_UNIT, PointCloud
-from ..pose import Scanned
-from ..range_view import RangeView
-from ._admission import (
+from ..admission import (
     MOST_COLUMNS,
     admit,
     check_count,
@@ -39,6 +34,11 @@ from ._admission import (
     too_few,
     whole_number,
 )
+from ..grids import view_of_camera
+from ..image_poses import from_camera_to_world, rotation_of
+from ..points import UNKNOWN_UNIT, PointCloud
+from ..pose import Scanned
+from ..range_view import RangeView
 from ._columns import (
     Columns,
     cloud_from_columns,

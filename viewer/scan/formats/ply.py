@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...task import checkpoint
+from ..admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
 from ..faces import Faces
 from ..points import PointCloud
-from ._admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
 from ._columns import (
     Columns,
     cloud_from_columns,

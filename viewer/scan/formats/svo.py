@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from ...bounds import Bounds
 from ...errors import InputError
 from ...task import checkpoint
+from ..admission import admit, check_count, opened, read_exactly, size_of
 from ..octree.build import Stop, build
 from ..octree.cube import Cube
 from ..octree.leaves import leaf_points
@@ -37,7 +38,6 @@ from ..octree.storage import (
 )
 from ..points import PointCloud
 from ..pose import Pose
-from ._admission import admit, check_count, opened, read_exactly, size_of
 
 TITLE = "SVO"
 SUFFIXES = (".svo",)

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..admission import MOST_COLUMNS, check_count, opened, whole_number
 from ..points import PointCloud
-from ._admission import MOST_COLUMNS, check_count, opened, whole_number
 from ._columns import bounded_lines, cloud_from_columns, first_repeated, named, parse_table
 from ._matrices import camera_matrices
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError
-from ..formats._admission import opened
+from ..admission import opened
 from ..formats._pictures import COLOR_KINDS, DEPTH_KINDS, numbers_of_picture, opened_picture, srgb_of_picture
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, mask_of

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...files import printable
+from ..admission import admit, check_count, shared
 from ..faces import Faces
 from ..formats import one_message
-from ..formats._admission import admit, check_count, shared
 from ..range_view import RangeView, memory_of_merging
 
 MOST_VIEWS = 256  # of a frame

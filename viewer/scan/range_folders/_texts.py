@@ -9,8 +9,8 @@ import numpy as np
 
 from ...errors import InputError, explained, shortened
 from ...files import parsed_json, read_text
+from ..admission import admit
 from ..formats import one_message
-from ..formats._admission import admit
 
 _MOST_BYTES = 64 << 20  # of a log of poses, some hours long
 _WORD_BYTES, _ROW_BYTES = 64, 200  # of memory for a word, and beside the words for a line

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
 from ...files import named_inside
-from ..formats._admission import admit
+from ..admission import admit
 from ..image_poses import UPRIGHT, from_camera_to_world
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView

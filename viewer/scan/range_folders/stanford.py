@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ...errors import InputError, shortened
 from ...files import named_inside
 from ...rigid import rigid_matrix
-from ..formats._admission import check_count
+from ..admission import check_count
 from ..formats.npz import read_arrays
 from ..formats.ply import read_range_grid
 from ..grids import view_of_grid

@@ -19,9 +19,9 @@ from range_scenes import sphere_view
 from scenes import rarely_together
 
 from viewer.errors import InputError
-from viewer.scan import formats
-from viewer.scan.formats import _admission, exr, ply
-from viewer.scan.formats._admission import READ_VARIABLE, admit, most_memory, opened, read_exactly
+from viewer.scan import admission, formats
+from viewer.scan.admission import READ_VARIABLE, admit, most_memory, opened, read_exactly
+from viewer.scan.formats import exr, ply
 from viewer.scan.open import find_source
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import RangeView, merge
@@ -187,7 +187,7 @@ def test_what_reading_is_said_to_take_is_what_it_takes(
 def test_the_memory_that_may_be_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(READ_VARIABLE, raising=False)
     assert most_memory(1 << 20) == (180 + 10) << 20
-    assert most_memory(1 << 50) == _admission._half_of_memory()
+    assert most_memory(1 << 50) == admission._half_of_memory()
     monkeypatch.setenv(READ_VARIABLE, "7")
     assert most_memory(1 << 50) == 7 << 20
     admit(1, 7 << 20)
@@ -259,7 +259,7 @@ def test_a_file_cut_while_it_is_read_gives_no_partial_frame(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     cloud = PointCloud.from_arrays(np.random.default_rng(0).random((3000, 3)))
-    size_of = _admission.size_of
+    size_of = admission.size_of
     for path in write_all_kinds(tmp_path, cloud):
         formats.read(path)
         uncut = path.stat().st_size
@@ -270,12 +270,12 @@ def test_a_file_cut_while_it_is_read_gives_no_partial_frame(
                 os.truncate(path, size // 2)
             return size
 
-        monkeypatch.setattr(_admission, "size_of", cut_after_the_first_look)
+        monkeypatch.setattr(admission, "size_of", cut_after_the_first_look)
         with pytest.raises(Exception) as caught:  # noqa: PT011  the door makes one message of any
             formats._readable(path).read(path)
         assert path.stat().st_size == uncut // 2
         assert str(caught.value)
-        monkeypatch.setattr(_admission, "size_of", size_of)
+        monkeypatch.setattr(admission, "size_of", size_of)
 
 
 def test_faces_that_end_while_they_are_read_are_none(tmp_path: Path) -> None:

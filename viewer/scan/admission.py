@@ -26,9 +26,9 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, shortened
-from ...files import open_plain
-from ..cache import megabytes
+from ..errors import InputError, shortened
+from ..files import open_plain
+from .cache import megabytes
 
 READ_VARIABLE = "SCAN4D_READ_MB"
 MOST_COLUMNS = 4096  # the longest descriptors of points in use have 1344 values
