@@ -1,7 +1,8 @@
 // Which chunks of points the picture may show (viewer/splatting/culling.py). A chunk is hidden where all that it can cover has
 // nearer depths already, from the points that were drawn before: what is seen is 0 of chunks that no picture showed.
 // STEP 0: finds those in view that are drawn first. 1: finds out of all whether this picture may show them, and those that
-// it may and that were not drawn first. 2: finds all that this one may show. LISTS: these are listed.
+// it may and that were not drawn first. 2: finds all that this one may show. 3: finds all in view, and nothing else.
+// LISTS: these are listed.
 // First come those that the last picture showed; SPLATS, which are drawn anew where that was not all: those that it did not
 // find to be hidden, not even where they moved a little.
 #include "common/item.glsl"
@@ -116,7 +117,7 @@ void main() {
     uint chunk = item();
     if (chunk >= item_count) return;
     uint before = seen[chunk];
-#if STEP < 2
+#if STEP != 2
     vec3 low = texelFetch(boxes, 2 * int(chunk)).xyz, high = texelFetch(boxes, 2 * int(chunk) + 1).xyz;
     Reach reach = reach_of(chunk, low, high);
 #endif
@@ -136,8 +137,10 @@ void main() {
 #if SPLATS
     if (may_show && !shown && is_hidden(reach, spare_pixels)) seen[chunk] |= HIDDEN;
 #endif
-#else
+#elif STEP == 2
     bool listed = (before & NOW) != 0u;
+#else
+    bool listed = reach.in_view;
 #endif
 #if LISTS
     if (listed) list[reserve(uint(CHUNK)) / uint(CHUNK)] = chunk;

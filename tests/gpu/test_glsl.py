@@ -6,10 +6,12 @@ import re
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from dataclasses import replace
 from functools import partial
 from itertools import islice, product
 from pathlib import Path
+from typing import Any
 
 import filling
 import finding
@@ -44,8 +46,10 @@ from viewer.picture.surface import Surface
 from viewer.resources import resource_path
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting import culling
 from viewer.splatting.amplify import FEEDS
 from viewer.splatting.packed import VARIANTS, draw_splats
+from viewer.task import Task
 
 TESTS_OWN = str(Path(__file__).resolve().parents[1])  # where tests have shaders of their own
 SIZE = (96, 64)
@@ -220,6 +224,13 @@ def draw_packed(renderer: Renderer, whole: bool) -> None:
                 render_frame(renderer, Request(pose, camera, packed.backend(few, drawing, ellipses)), surface)
 
 
+def at_once(_: Task, work: Callable[[], Any]) -> Future[Any]:
+    """Work that is done before the next picture."""
+    future: Future[Any] = Future()
+    future.set_result(work())
+    return future
+
+
 def draw_chunks(renderer: Renderer) -> None:
     """Pictures of points of which chunks are left out, in the order of the file and in another one."""
     cloud, (_, rich, *_) = sphere(1500), clouds()
@@ -229,6 +240,8 @@ def draw_chunks(renderer: Renderer) -> None:
             patched.setattr(chunks, "_SCATTERED", 2.0)
             patched.setattr(chunks, "_LOOSE", 2.0)
             patched.setattr(chunks, "in_file_order", ordered)
+            for module in (chunks, culling):
+                patched.setattr(module, "in_background", at_once)
             pose, surface = Pose(0, 0.0, "test", cloud), Surface(renderer.gpu, (40, 30))
             camera = Camera.orbit(pose.bounds, **CAMERA)
             for shown in (False, False, True):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import threading
 import time
 from dataclasses import replace
 
@@ -15,12 +16,13 @@ from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
-from viewer.gpu import chunks
+from viewer.gpu import arrays, chunks
 from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting import culling
+from viewer.view import View
 
 COUNT, SIZE = 60_000, (120, 80)
 MIDDLE = np.array([1e6, 0, -1e6])
@@ -110,6 +112,63 @@ def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, ord
         assert (found != expected).sum(axis=1).max() <= 2, "but for what float32 rounds"
         kinds |= set(zip(*found.tolist(), strict=True))
     assert kinds == {(False, False), (True, False), (True, True)}
+
+
+def test_the_drawing_thread_neither_orders_points_nor_tests_chunks(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It uploads a slice in each picture, and pictures are the same all the while."""
+    threads, pictures = set(), []
+    for owner, name in ((chunks, "best_order"), (chunks, "in_coarse_order")):
+        function = getattr(owner, name)
+        monkeypatch.setattr(
+            owner, name, lambda cloud, do=function: (threads.add(threading.current_thread()), do(cloud))[1]
+        )
+    monkeypatch.setattr(View, "may_show", lambda *_: pytest.fail("chunks are tested on the CPU"))
+    monkeypatch.setattr(arrays, "_SLICE", 1 << 16)
+    monkeypatch.setattr(culling, "UPLOAD_SECONDS", 0.0)
+    cloud = shells("chance")
+    request = request_of(cloud, looking(cloud, 0), 1)
+    surface, far = Surface(renderer.gpu, SIZE), looking(cloud, 70, 0.45)
+    written: list[int] = []
+    write = arrays.GpuArray.write
+    monkeypatch.setattr(
+        arrays.GpuArray, "write", lambda array, *end: (written.append(1), write(array, *end))[1]
+    )
+    end = time.monotonic() + 60
+    while "chunks" not in surface.stats.counted and time.monotonic() < end:
+        written.clear()
+        render_frame(renderer, replace(request, camera=far), surface)
+        pictures.append(surface.row)
+        if len(pictures) > 1:
+            assert len(written) <= 2, "of rows or positions, a slice"
+        time.sleep(0.002)
+    assert "chunks" in surface.stats.counted
+    assert len(pictures) > (4 + 12) * COUNT >> 16, "as many as there are slices"
+    assert all((picture == pictures[0]).all() for picture in pictures)
+    assert threads
+    assert threading.current_thread() not in threads
+
+
+def test_chunks_in_view_are_counted_on_the_gpu(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where few points are in view these are drawn alone; where many are, some pictures do not look."""
+    cloud = shells("chance")
+    size = 4 * SIZE[0], 4 * SIZE[1]
+    request, surface = request_of(cloud, looking(cloud, 0), 1), Surface(renderer.gpu, size)
+    in_order(renderer, request, surface)
+    monkeypatch.setattr(View, "may_show", lambda *_: pytest.fail("chunks are tested on the CPU"))
+    chunks_in = renderer.resident(request.pose).cached(culling.CulledChunks)
+    for camera, is_few in ((looking(cloud, 70, 0.1), True), (looking(cloud, 70, 0.8), False)):
+        chunks_in._looks_again_in = 0
+        near, alone = replace(request, camera=camera), Surface(renderer.gpu, size)
+        reads = renderer.gpu.staging.reads
+        for _ in range(3):
+            render_frame(renderer, near, surface)
+        assert renderer.gpu.staging.reads - reads == (3 if is_few else 2)
+        assert ("out of view" in surface.stats.skipped.get("points", "")) == is_few
+        render_frame(renderer, replace(near, pose=Pose(1, 0.0, "", replace(cloud))), alone)
+        assert (surface.row == alone.row).all()
+        assert (surface.image() == alone.image()).all()
 
 
 @pytest.mark.parametrize("order", ["bands", "chance"])

@@ -115,15 +115,25 @@ def _boxes(positions: NDArray[np.float32], chunk: int) -> tuple[NDArray[np.float
     return np.minimum.reduceat(positions, starts, axis=0), np.maximum.reduceat(positions, starts, axis=0)
 
 
+def best_order(cloud: PointCloud) -> Ordered:
+    """The order of the file, unless chunks are large in it: then the coarse one."""
+    order = in_file_order(cloud)
+    if order.is_loose:
+        order = in_coarse_order(cloud)
+    _ = order.looseness  # now, on the worker's thread
+    return order
+
+
 class Chunks:
-    """The chunks of a pose that is drawn."""
+    """The chunks of a pose. A worker finds their order, once the pose is drawn a second time."""
 
     nbytes = 0
 
     def __init__(self, pose: GpuPose) -> None:
         self._pose = weakref.proxy(pose)  # which keeps this
         self._order: Ordered | None = None
-        self._coarse: Future[Ordered] | None = None
+        self._finding: Future[Ordered] | None = None
+        self._was_drawn = False
         self._found: tuple[object, NDArray[np.uint32] | None] = None, None
 
     def rows_in(self, view: View, margin: float, reach: float = 0.0) -> NDArray[np.uint32] | None:
@@ -135,7 +145,12 @@ class Chunks:
         cloud = pose.cloud
         if len(cloud) < LEAST or view.holds(pose.bounds.corners() - view.origin):
             return None
+        if not self._was_drawn:
+            self._was_drawn = True  # there may be no second picture
+            return None
         order = self._known_order(cloud)
+        if order is None:
+            return None
         found_for = (order, view.key, margin, reach)
         if self._found[0] != found_for:
             shown = self.shown_in(order, view, margin, reach)
@@ -160,7 +175,7 @@ class Chunks:
         if len(self._pose.cloud) < LEAST:
             return None
         order = self._known_order(self._pose.cloud)
-        return None if order.is_scattered or order.is_loose else order
+        return None if order is None or order.is_scattered else order
 
     @property
     def known(self) -> Ordered:
@@ -168,14 +183,12 @@ class Chunks:
         assert self._order is not None, "call take_order first"
         return self._order
 
-    def _known_order(self, cloud: PointCloud) -> Ordered:
-        if self._order is None:
-            self._order = in_file_order(cloud)
-        elif self._coarse is not None:
-            if self._coarse.done():
-                self._order, self._coarse = self._coarse.result(), None
-        elif self._order.is_loose:
-            self._coarse = in_background(Task("Ordering points"), lambda: in_coarse_order(cloud))
+    def _known_order(self, cloud: PointCloud) -> Ordered | None:
+        """The order; None while a worker looks for it, which the first call begins."""
+        if self._order is None and self._finding is None:
+            self._finding = in_background(Task("Ordering points"), lambda: best_order(cloud))
+        if self._finding is not None and self._finding.done():
+            self._order, self._finding = self._finding.result(), None
         return self._order
 
     def release(self) -> None:

@@ -358,6 +358,7 @@ class Timeline:
         """Read a pose outside the lock and note what came of it; the future gets the pose or the error."""
         try:
             pose = self._shared(self._read(index))
+            pose.drawn_bounds()  # which the first picture needs: found here, on the thread that reads
             self.finish(pose)
         except BaseException as error:
             with self._state:

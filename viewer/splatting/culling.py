@@ -8,7 +8,9 @@ splats in `splat_culling.py`.
 
 from __future__ import annotations
 
+import time
 import weakref
+from concurrent.futures import Future
 from dataclasses import dataclass
 
 import moderngl
@@ -16,19 +18,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gpu import gl
+from ..gpu.arrays import GpuArray
 from ..gpu.bindings import Storage, Texture
 from ..gpu.chunks import Chunks
 from ..gpu.compact import IndexList
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..picture.target import RenderTarget
-from ..view import View
+from ..task import Task, in_background
 
 _TILE = 16  # pixels along an edge, whose farthest depth hides chunks
 _MOST_TILES = 1024  # that are looked at for one chunk; one that is larger in the picture counts as shown
 SLACK = 1.0  # pixels, for what float32 rounds
 _ROUNDING = 1e-5  # of the pose's size, by which boxes are larger for the same reason
-START, FIND, _GIVE = range(3)  # steps of chunks/cull.comp
+START, FIND, _GIVE, VIEW = range(4)  # steps of chunks/cull.comp
+UPLOAD_SECONDS = 0.004  # that one picture spends on uploading what is in order
+_MOST_PICTURES = 15  # until the chunks in view are counted again
 LAST, NOW, IN_VIEW, FACES_AWAY = 1, 2, 4, 8  # bits of what is seen, as it has them
 
 
@@ -58,16 +63,27 @@ class Margins:
 
 def culled_chunks(pose: GpuPose) -> CulledChunks | None:
     """The chunks of a pose whose points are in an order of use; None where they are not, or few."""
-    counted_alike = (pose.origin == pose.cloud.origin).all()
-    is_of_use = counted_alike and pose.cached(Chunks).take_order() is not None
-    return pose.cached(CulledChunks) if is_of_use else None
+    if not may_order(pose):
+        return None
+    chunks = pose.cached(CulledChunks)
+    return chunks if chunks.upload(time.perf_counter() + UPLOAD_SECONDS) else None
+
+
+def may_order(pose: GpuPose) -> bool:
+    """Whether chunks of a pose are of use: it has many points, in an order in which chunks are small."""
+    return is_centered(pose) and pose.cached(Chunks).take_order() is not None
+
+
+def is_centered(pose: GpuPose) -> bool:
+    """Whether positions on the GPU are relative to the cloud's own origin, as chunks are."""
+    return bool((pose.origin == pose.cloud.origin).all())
 
 
 class ChunkBoxes:
     """The boxes of a pose's chunks on the GPU.
 
-    order: of the points. count: of these. size: points of a chunk. chunks: how many. rows: the row of each
-    point, in that order; None where it is that of the file. boxes: two RGB32F texels a chunk, its corners.
+    order: of the points. count: of these. size: points of a chunk. chunks: how many. boxes: two RGB32F texels
+    a chunk, its corners.
     """
 
     def __init__(self, pose: GpuPose, size: int | None = None) -> None:
@@ -79,10 +95,17 @@ class ChunkBoxes:
         corners = np.stack([order.low, order.high], axis=1)
         if size is None:
             self.boxes.buffer.write(corners)
-        self.rows: gl.BufferTexture | None = None
-        if order.rows is not None:
-            self.rows = gl.BufferTexture(gpu.buffer(order.rows), gl.R32UI)
+        self._rows = None if order.rows is None else GpuArray(gpu, order.rows, gl.R32UI)
         self.slack = _ROUNDING * float(np.abs(corners).max())
+
+    @property
+    def rows(self) -> gl.BufferTexture | None:
+        """The row of each point in this order; None if that is the order of the file."""
+        return None if self._rows is None else self._rows.texels
+
+    def upload(self, end: float) -> bool:
+        """Upload rows until that time of the performance counter; whether all are there."""
+        return self._rows is None or self._rows.write(end)
 
     def test(self, surface: RenderTarget, step: int, margins: Margins, **defines: object) -> None:
         """Run a step of chunks/cull.comp on all of them. defines: of its variants."""
@@ -113,11 +136,12 @@ class ChunkBoxes:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        return self.boxes.buffer.size + (self.rows.buffer.size if self.rows else 0)
+        return self.boxes.buffer.size + (self._rows.nbytes if self._rows else 0)
 
     def release(self) -> None:
         """Delete what it holds on the GPU."""
-        self._gpu.discard(self.boxes, self.rows)
+        self._gpu.discard(self.boxes)
+        self._rows = None
 
 
 class SeenChunks:
@@ -151,11 +175,27 @@ class CulledChunks:
         self._gpu = gpu = pose.gpu
         self._boxes = boxes = ChunkBoxes(pose)
         self.count, self._size = boxes.count, boxes.size
-        self._lists = [IndexList(gpu, boxes.chunks, self._size) for _ in range(3)]
-        self._positions = None
-        if boxes.order.rows is not None:
-            in_order = pose.cloud.positions.take(boxes.order.rows, axis=0)
-            self._positions = gl.BufferTexture(gpu.buffer(in_order), gl.RGB32F)
+        self._lists = [IndexList(gpu, boxes.chunks, self._size) for _ in range(4)]
+        self._positions: GpuArray | None = None
+        self._gathering: Future[NDArray[np.float32]] | None = None
+        rows, positions = boxes.order.rows, pose.cloud.positions
+        if rows is not None:
+            self._gathering = in_background(Task("Ordering points"), lambda: positions.take(rows, axis=0))
+        self._looks_again_in = 0  # pictures, until the chunks in view are counted again
+
+    def upload(self, end: float) -> bool:
+        """Upload rows and positions until that time of the performance counter; whether all are there."""
+        if not self._boxes.upload(end):
+            return False
+        if self._gathering is not None and self._gathering.done():
+            self._positions = GpuArray(self._gpu, self._gathering.result(), gl.RGB32F)
+            self._gathering = None
+        if self._positions is None:
+            return self._gathering is None
+        if not self._positions.write(end):
+            return False
+        self._positions.values = None
+        return True
 
     @property
     def defines(self) -> dict[str, object]:
@@ -164,20 +204,29 @@ class CulledChunks:
 
     def bind(self, pose: GpuPose) -> None:
         """Bind the positions and rows of the pose's points, in the order of chunks."""
-        (self._positions or pose.array("positions")).bind(Texture.POSITIONS)
+        (pose.array("positions") if self._positions is None else self._positions.texels).bind(
+            Texture.POSITIONS
+        )
         if self._boxes.rows is not None:
             self._boxes.rows.bind(Texture.DRAWN_ROWS)
 
-    def few(self, pose: GpuPose, view: View, margin: float, most: float) -> tuple[IndexList, int] | None:
-        """The chunks that a view may show, and how many points that are, where these are at most so many: so
-        few that looking for hidden ones would take longer. margin: as in `start`."""
-        if view.holds(pose.bounds.corners() - view.origin):
+    def few(self, surface: RenderTarget, margin: float, most: float) -> tuple[IndexList, int] | None:
+        """The chunks in view, and how many points they have, the last chunk counted as a whole one, if these
+        are at most so many: so few that looking for hidden ones would take longer. margin: as in `start`.
+
+        The GPU lists the chunks, and the CPU waits for their number. After many, some pictures do without.
+        """
+        view = surface.view
+        if view.holds(surface.pose.bounds.corners() - view.origin):
             return None
-        found = pose.cached(Chunks).shown_in(self._boxes.order, view, margin)
-        if (points := min(len(found) * self._size, self.count)) > most:
+        if self._looks_again_in:
+            self._looks_again_in -= 1
             return None
-        listed = self._lists[0]
-        listed.write(found.astype(np.uint32))
+        self._margins = Margins(self._boxes.slack, margin + SLACK)
+        listed = self._list(surface, VIEW)
+        if (points := len(listed)) > most:
+            self._looks_again_in = min(int(points / most), _MOST_PICTURES)
+            return None
         return listed, points
 
     def start(self, surface: RenderTarget, margin: float) -> IndexList:
@@ -205,12 +254,13 @@ class CulledChunks:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        own = 0 if self._positions is None else self._positions.buffer.size
+        own = 0 if self._positions is None else self._positions.nbytes
         return own + self._boxes.nbytes + sum(listed.nbytes for listed in self._lists)
 
     def release(self) -> None:
         """Delete what it holds on the GPU."""
-        self._gpu.discard(self._boxes, self._positions, *self._lists)
+        self._gpu.discard(self._boxes, *self._lists)
+        self._positions = None
 
 
 def counts_of(seen: NDArray[np.uint32]) -> dict[str, int]:

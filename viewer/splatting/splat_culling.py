@@ -9,6 +9,7 @@ last is always whole, and by the same passes, whichever way splats are drawn: th
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..gpu import gl
 from ..gpu.bindings import Storage, Texture
-from ..gpu.chunks import Chunks, chunk_size
+from ..gpu.chunks import chunk_size
 from ..gpu.compact import IndexList, list_flagged
 from ..gpu.context import Gpu, Program
 from ..gpu.pose import GpuPose
@@ -34,11 +35,13 @@ from .culling import (
     NOW,
     SLACK,
     START,
+    UPLOAD_SECONDS,
     ChunkBoxes,
     Margins,
     SeenChunks,
     counts_of,
     find_farthest,
+    may_order,
 )
 from .splats import Splats
 
@@ -72,8 +75,8 @@ def splat_margins(splats: Splats, largest: float, slack: float, trusts: bool, sp
 
 
 def may_cull(pose: GpuPose) -> bool:
-    """Whether chunks of a pose can be left out: it has many points, in an order in which these are small."""
-    return bool((pose.origin == pose.cloud.origin).all()) and pose.cached(Chunks).take_order() is not None
+    """Whether chunks of a pose can be left out, which each call brings nearer."""
+    return may_order(pose) and pose.cached(SplatChunks).boxes.upload(time.perf_counter() + UPLOAD_SECONDS)
 
 
 def draw_unhidden(

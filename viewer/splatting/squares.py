@@ -22,7 +22,7 @@ from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import sparse_spacing, typical_spacing
 from ..view import View
-from .culling import CulledChunks, culled_chunks
+from .culling import CulledChunks, culled_chunks, is_centered
 from .kept import ClosedGaps, KeptPoints, stride_of
 
 # Points can list the pixels that they hit, in slots that each has; below this share of the pixels that takes
@@ -72,7 +72,8 @@ def draw_squares(
     if before is not None and shown is None and share < 1:
         _draw_kept(pose, surface, size, share, before)
         return True
-    rows, count = surface.take_sample(share, margin=LARGEST_SQUARE / 2)
+    by_chunks = share >= 1 and is_centered(pose)  # from the second picture on, on the GPU
+    rows, count = surface.take_sample(share, margin=None if by_chunks else LARGEST_SQUARE / 2)
     surface.stats.known = surface.stats.share
     if surface.stats.share < 1:
         size = _enlarged(size, pose, surface)
@@ -161,11 +162,10 @@ def _draw_chunks(
         return Visits("points/cells.glsl", count, bind, defines, given, listed)
 
     margin = size / 2
-    if found := chunks.few(pose, surface.view, margin, few):
+    if found := chunks.few(surface, margin, few):
         _draw_listed(surface, visits(*found), size)
-        surface.stats.skipped["points"] = (
-            f"{chunks.count - found[1]:,} of {chunks.count:,} are in chunks out of view"
-        )
+        left_out = max(chunks.count - found[1], 0)
+        surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} are in chunks out of view"
         return
     surface.clear()
     take_keys(pose.gpu, visits(chunks.start(surface, margin)), surface.depths)
