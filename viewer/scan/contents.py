@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .faces import Faces
+from .range_view import DepthKind
 
 
 class Deferred:
@@ -55,10 +56,12 @@ class StatedCamera:
     """A pinhole camera as a file states it, in pixels; the centre of the first pixel is at (0, 0).
 
     distortion:    4, 5 or 8 coefficients as OpenCV has them, see `viewer/scan/lens.py`; none: ()
+    kind:          of depth, as `RangeView` has it; None: not stated
     width, height: of the pictures that it is for; None: not stated
     depth_scale:   steps of a stored depth in one `unit`; None: not stated
     unit:          of depth, as stated, perhaps any text; None: not stated
     where:         the name of the file, or of the field, that states it
+    is_color:      whether it is the camera of the colours
     """
 
     fx: float
@@ -66,11 +69,13 @@ class StatedCamera:
     cx: float
     cy: float
     distortion: tuple[float, ...] = ()
+    kind: DepthKind | None = None
     width: int | None = None
     height: int | None = None
     depth_scale: float | None = None
     unit: str | None = None
     where: str = ""
+    is_color: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
