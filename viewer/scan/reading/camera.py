@@ -120,7 +120,7 @@ def decide_camera(
 
 
 def scaled(camera: StatedCamera, size: Size) -> StatedCamera:
-    """The same camera for pictures of another size and the same aspect ratio."""
+    """The camera for pictures of another size that have the aspect ratio of its own."""
     assert camera.width is not None
     right = size[0] / camera.width
     down = right if camera.height is None else size[1] / camera.height
@@ -135,7 +135,7 @@ def scaled(camera: StatedCamera, size: Size) -> StatedCamera:
     )
 
 
-def fitted(camera: StatedCamera, size: Size, of_color: Size | None = None) -> StatedCamera | str:
+def camera_for(camera: StatedCamera, size: Size, of_color: Size | None = None) -> StatedCamera | str:
     """The camera for a picture of this size, scaled if need be; else a clause that says why it cannot be."""
     if camera.kind == "height":
         return camera
@@ -177,10 +177,10 @@ def _pinhole(sources: CameraSources, size: Size, of_color: Size | None) -> tuple
         width=size[0], height=size[1],
     )  # fmt: skip
     if sources.default is not None:
-        camera = fitted(sources.default, size)
-        if not isinstance(camera, str):
+        default = camera_for(sources.default, size)
+        if not isinstance(default, str):
             why = f"No file states the camera, so Scan4D takes the default camera of {sources.kind}"
-            return camera, _decision(camera, sources.default, "assumed", "", why, (_as_text(guess),)), ""
+            return default, _decision(default, sources.default, "assumed", "", why, (_as_text(guess),)), ""
         words += f", as the default camera of {sources.kind} is for {_of(sources.default)}"
     others = () if sources.default is None else (_as_text(scaled_alike(sources.default, size)),)
     return guess, _decision(guess, guess, "assumed", "", words, others), f"{words}. {_STATE_IT}"
@@ -210,7 +210,7 @@ def _fitting(
     """The first of the cameras that can be the picture's, as stated and as fitted. Raises InputError."""
     reasons: list[tuple[str, StatedCamera]] = []
     for stated in cameras:
-        camera = fitted(stated, size, of_color)
+        camera = camera_for(stated, size, of_color)
         if not isinstance(camera, str):
             return stated, camera
         reasons.append((camera, stated))
@@ -275,3 +275,9 @@ def _of(camera: StatedCamera) -> str:
 
 def _shown(size: Size) -> str:
     return f"{size[0]} x {size[1]}"
+
+
+def corrected_camera(numbers: Sequence[float]) -> StatedCamera:
+    """The camera of `--read camera=`: fx, fy, cx, cy, and the coefficients of the lens or none."""
+    fx, fy, cx, cy, *lens = numbers
+    return StatedCamera(fx=fx, fy=fy, cx=cx, cy=cy, distortion=tuple(lens), where="--read")

@@ -162,15 +162,15 @@ def _of_text(name: str, text: str) -> Iterator[StatedCamera]:
         yield from (_of_colmap(row) for row in words if len(row) > 4 and row[1] in _COLMAP)
     elif named := _named_values(rows):
         yield from _of_object(named)
-    elif name.lower().endswith(".pincam"):
-        numbers = [float(word) for row in words for word in row]
-        width, height, *pinhole = numbers[:6]
-        yield _checked({"width": width, "height": height} | dict(zip(PINHOLE, pinhole, strict=False)))
     else:
-        width, height = _STRAY_SIZE if name.lower() == "camera_matrix.csv" else (None, None)
-        yield replace(
-            _of_numbers([[float(word) for word in row] for row in words]), width=width, height=height
-        )
+        numbers = [[float(word) for word in row] for row in words]
+        if name.lower().endswith(".pincam"):  # of ARKitScenes: the size comes first
+            (row,) = numbers
+            yield _checked(dict(zip(("width", "height", *PINHOLE), row, strict=True)))
+        elif name.lower() == "camera_matrix.csv":
+            yield replace(_of_numbers(numbers), width=_STRAY_SIZE[0], height=_STRAY_SIZE[1])
+        else:
+            yield _of_numbers(numbers)
 
 
 def _named_values(rows: Sequence[str]) -> dict[str, Any]:
