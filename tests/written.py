@@ -32,6 +32,16 @@ def film(path: Path) -> tuple[list[NDArray[np.uint8]], float]:
         return frames, float(stream.average_rate)
 
 
+def film_times(path: Path) -> tuple[list[float], float]:
+    """When the pictures of a film begin, and how long it is, seconds: as a player decodes them."""
+    import av
+
+    with av.open(str(path)) as container:
+        stream = container.streams.video[0]
+        stamps = [float(frame.time) for frame in container.decode(stream)]
+        return stamps, float(stream.duration * stream.time_base)
+
+
 def write_mesh(
     path: Path, points: NDArray[np.floating], faces: Sequence[Sequence[int]], binary: bool = True
 ) -> None:

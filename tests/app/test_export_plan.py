@@ -81,12 +81,37 @@ def test_a_film_of_frames_keeps_their_pace() -> None:
     choices, entries, seconds = made(what="frames", first=3, last=9, step=2, format="mp4")
     assert [entry.pose for entry in entries] == [2, 4, 6, 8]
     assert [entry.time for entry in entries] == [TIMES[i] for i in (2, 4, 6, 8)]
-    assert choices.rate(TIMES) == pytest.approx(12.5)
+    assert choices.even_rate(TIMES) == pytest.approx(12.5)
     assert [entry.at for entry in entries] == pytest.approx([0, 0.08, 0.16, 0.24])
     assert seconds == pytest.approx(0.32)
     assert choices.out() == Path("a.mp4")
-    assert made(what="frames", format="mp4", fps=50.0)[2] == pytest.approx(0.2)
-    assert replace(choices, last=3).rate(TIMES) == 25
+    assert replace(choices, last=3).even_rate(TIMES) == 25
+
+
+def test_an_even_film_lasts_as_long_as_its_frames() -> None:
+    _, entries, seconds = made(what="frames", format="mp4", fps=50.0)
+    assert [entry.at for entry in entries] == pytest.approx(TIMES)
+    assert seconds == pytest.approx(0.4)
+
+
+def test_a_film_of_frames_keeps_their_gaps() -> None:
+    times = np.array([3.0, 3.04, 3.2])
+    choices = replace(VIEW, what="frames", format="mp4")
+    found = recording(choices, SHOWN, MARKS, times, None, lambda _: STILL)
+    assert [entry.at for entry in found.entries] == pytest.approx([0, 0.04, 0.2])
+    assert found.seconds == pytest.approx(0.36)
+
+
+def test_a_film_of_a_turntable_is_even() -> None:
+    assert [entry.at for entry in made(what="turntable", pictures=3, format="mp4")[1]] == [0, 0.04, 0.08]
+    assert made(what="turntable", pictures=3, format="mp4", fps=10.0)[2] == pytest.approx(0.3)
+
+
+def test_a_film_of_days_is_refused_at_its_times() -> None:
+    choices = replace(VIEW, what="frames", format="mp4")
+    found = problems(choices, np.arange(4) * 86_400.0, 100_000_000)
+    assert list(found) == ["fps"]
+    assert "96.0 hours" in found["fps"]
 
 
 def test_without_a_last_frame_it_goes_to_the_end() -> None:
@@ -121,14 +146,14 @@ def test_without_a_last_frame_it_goes_to_the_end() -> None:
     ],
 )
 def test_a_wrong_value_is_said_at_its_field(changes: dict[str, object], field: str, words: str) -> None:
-    found = problems(replace(VIEW, **changes), len(TIMES), 100_000_000)  # type: ignore[arg-type]
+    found = problems(replace(VIEW, **changes), TIMES, 100_000_000)  # type: ignore[arg-type]
     assert list(found) == [field]
     assert words in found[field]
 
 
 def test_good_choices_have_no_problems() -> None:
     for what in ("view", "turntable", "frames"):
-        assert problems(replace(VIEW, what=what), len(TIMES), 100_000_000) == {}
+        assert problems(replace(VIEW, what=what), TIMES, 100_000_000) == {}
 
 
 def test_files_that_are_there_are_found(tmp_path: Path) -> None:
@@ -158,5 +183,5 @@ def test_a_free_name_is_suggested(tmp_path: Path) -> None:
 def test_wrong_values_break_nothing_while_they_are_edited() -> None:
     for changes in ({"first": -7}, {"last": 99}, {"step": 0}, {"first": 9, "last": 2}, {"pictures": -1}):
         choices = replace(VIEW, what="frames", format="mp4", **changes)  # type: ignore[arg-type]
-        assert 0 < choices.rate(TIMES) <= 240
+        assert 0 < choices.even_rate(TIMES) <= 240
         assert all(0 <= index < len(TIMES) for index in choices.indices(len(TIMES)))

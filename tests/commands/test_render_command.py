@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import re
+import shutil
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +15,7 @@ import pytest
 from command_line import Run
 from depth_folders import write_color, write_depth, write_matrix
 from small_scans import FRAMES, SMALL, front, names, stored
-from written import bits, film, picture
+from written import bits, film, film_times, picture
 
 import viewer
 from viewer.app.scene.extent import Extent
@@ -173,6 +175,44 @@ def test_a_film_plays_at_the_pace_of_the_scan(
     assert len(frames) == (3 if "--poses" in options else FRAMES)
     assert {frame.shape for frame in frames} == {(64, 96, 3)}
     assert names(tmp_path) == ["a.mp4"]
+
+
+@pytest.fixture
+def gap(scans: Path, tmp_path: Path) -> Path:
+    """A folder of frames 1, 2 and 6, at 0, 0.04 and 0.2 s."""
+    folder = tmp_path / "gap"
+    folder.mkdir()
+    for number in (1, 2, 6):
+        shutil.copy(scans / "sequence" / f"f{min(number, FRAMES) - 1:02d}.npz", folder / f"f{number:03d}.npz")
+    return folder
+
+
+@pytest.mark.parametrize("more", [(), ("--no-gl",), ("--turntable", 4)])
+def test_a_film_shows_each_pose_until_the_next(
+    more: tuple[object, ...], gap: Path, run: Run, tmp_path: Path
+) -> None:
+    assert run("render", gap, "--all", "-o", tmp_path / "a.mp4", *SMALL[:2], *more).code == 0
+    stamps, length = film_times(tmp_path / "a.mp4")
+    assert [*stamps, length] == pytest.approx([0, 0.04, 0.2, 0.36], abs=1e-4)
+
+
+def test_an_even_film_repeats_a_pose_over_a_gap(gap: Path, run: Run, tmp_path: Path) -> None:
+    (gap / "times.csv").write_text("f001.npz,5\nf002.npz,5.04\nf006.npz,5.2\n")
+    even = (*SMALL, "--fps", 10, "--stats", tmp_path / "s.json")
+    assert run("render", gap, "--all", "-o", tmp_path / "a.mp4", *even).code == 0
+    assert film_times(tmp_path / "a.mp4")[0] == pytest.approx([0, 0.1, 0.2, 0.3], abs=1e-4)
+    frames, _ = film(tmp_path / "a.mp4")
+    same = [np.abs(a.astype(int) - b).max() < 8 for a, b in itertools.pairwise(frames)]
+    assert same == [False, False, True]
+    drawn = json.loads((tmp_path / "s.json").read_text())["frames"]
+    assert [row["pose"] for row in drawn] == [0, 1, 2], "each is drawn once"
+
+
+def test_a_film_at_a_rate_that_no_player_shows_is_refused(scans: Path, run: Run, tmp_path: Path) -> None:
+    done = run("render", scans / "sequence", "--all", "-o", tmp_path / "a.mp4", "--fps", 1000)
+    assert done.code == 2
+    assert "1 to 240" in done.err
+    assert names(tmp_path) == []
 
 
 def test_a_turntable_goes_round_and_never_cuts(run: Run, tmp_path: Path) -> None:

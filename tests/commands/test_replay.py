@@ -15,7 +15,7 @@ import pytest
 from command_line import Run
 from hostile_values import variants
 from scenes import sphere
-from written import bits, film, picture
+from written import bits, film, film_times, picture
 
 from viewer.backends import backend
 from viewer.camera import Camera
@@ -174,6 +174,14 @@ def test_a_film_keeps_the_time_stamps(run: Run) -> None:
     # Each entry is drawn once, however long it is shown; the last one at the size of the film.
     assert [f["pose"] for f in json.loads(Path("s.json").read_text())["frames"]] == [0, 1, 2, 2, 2]
     assert {frame.shape for frame in frames} == {(64, 96, 3)}
+
+
+def test_a_film_changes_at_the_stamps_of_the_recording(run: Run) -> None:
+    recording = recorded(Path("a.json"))
+    assert run("render", "--replay", "a.json", "-o", "a.mp4").code == 0
+    stamps, length = film_times(Path("a.mp4"))
+    assert stamps == pytest.approx([entry.at for entry in recording.entries], abs=1e-4)
+    assert length == pytest.approx(recording.seconds, abs=1e-4)
 
 
 def test_a_film_of_a_picture_is_one_picture(run: Run) -> None:

@@ -181,25 +181,6 @@ def test_the_recorder_notes_what_changes_and_when() -> None:
 # --- its pace -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("stamps", "seconds", "fps", "shown"),
-    [
-        ([0.0], 0.0, 25, [0]),
-        ([0.0, 0.52, 1.5], 2.0, 4, [0, 0, 0, 1, 1, 1, 2, 2]),
-        ([0.0, 0.04, 0.08, 0.12], 0.16, 25, [0, 1, 2, 3]),
-        ([0.0, 0.1, 0.12, 0.2], 0.3, 10, [0, 1, 3]),  # one that came and went in between is left out
-        ([0.0, 0.1, 0.21], 0.21, 10, [0, 1, 1, 2]),  # the last one is always shown
-        ([0.0, 0.001, 0.333, 0.667], 1.0, 3, [0, 2, 3]),  # rounded stamps fall on thirds
-    ],
-)
-def test_a_film_shows_what_was_shown_then(
-    stamps: list[float], seconds: float, fps: float, shown: list[int]
-) -> None:
-    entries = tuple(replace(FIRST, pose=number, at=at) for number, at in enumerate(stamps))
-    paced = Recording(entries, seconds).paced(fps)
-    assert [entry.pose for entry in paced] == shown
-
-
 # --- what is refused -----------------------------------------------------------------------------
 
 

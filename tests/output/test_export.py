@@ -9,19 +9,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scenes import sphere
-from written import bits, film, picture
+from written import bits, picture
 
 from viewer import files
 from viewer.camera import Camera
 from viewer.errors import InputError
 from viewer.look import Look
 from viewer.output import export
+from viewer.output.film import FILM_SUFFIX
 from viewer.picture.surface import NOTHING, Surface
 
 SIZE = (61, 43)  # odd on purpose
-ALL_SUFFIXES = (*export.PICTURE_SUFFIXES, export.FILM_SUFFIX)
+ALL_SUFFIXES = (*export.PICTURE_SUFFIXES, FILM_SUFFIX)
 
 
 @pytest.fixture
@@ -82,70 +82,6 @@ def test_npz_holds_the_surface(surface: Surface, tmp_path: Path) -> None:
         assert (stored["id"] == NOTHING).any()
 
 
-# --- films ----------------------------------------------------------------------------------
-
-
-def moving_bar(frames: int, size: tuple[int, int]) -> list[NDArray[np.uint8]]:
-    images = np.full((frames, size[1], size[0], 4), (26, 28, 32, 255), np.uint8)
-    for index, image in enumerate(images):
-        image[:, 8 * index : 8 * index + 8] = (200, 60, 40, 255)
-    return list(images)
-
-
-@pytest.mark.parametrize("size", [(96, 64), (95, 64), (96, 63), (95, 63)])
-def test_a_film_plays_back_its_images(size: tuple[int, int], tmp_path: Path) -> None:
-    images = moving_bar(7, size)
-    with export.film(tmp_path / "a.mp4", size, 12.5) as add:
-        for image in images:
-            add(image)
-    frames, rate = film(tmp_path / "a.mp4")
-    assert (len(frames), rate) == (7, 12.5)
-    width, height = size[0] + size[0] % 2, size[1] + size[1] % 2
-    for frame, image in zip(frames, images, strict=True):
-        assert frame.shape == (height, width, 3)
-        # Away from edges, which half-size chroma blurs, colours survive within a few levels.
-        error = np.abs(frame[: size[1], : size[0]].astype(int) - image[..., :3])
-        assert np.median(error) <= 2
-        assert np.quantile(error, 0.8) <= 6
-    assert np.abs(frames[0][20, 3].astype(int) - (200, 60, 40)).max() <= 8
-
-
-def test_a_film_needs_no_h264(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import av
-
-    monkeypatch.setattr(av, "codecs_available", av.codecs_available - {"libx264"})
-    with export.film(tmp_path / "a.mp4", (95, 63), 25) as add:
-        for image in moving_bar(3, (95, 63)):
-            add(image)
-    with av.open(str(tmp_path / "a.mp4")) as container:
-        assert container.streams.video[0].codec_context.name == "mpeg4"
-    assert len(film(tmp_path / "a.mp4")[0]) == 3
-
-
-@pytest.mark.parametrize(("asked", "got"), [(0.01, 1), (29.97, 29.97), (10000, 240)])
-def test_the_rate_of_a_film_stays_playable(asked: float, got: float, tmp_path: Path) -> None:
-    with export.film(tmp_path / "a.mp4", (32, 32), asked) as add:
-        for image in moving_bar(3, (32, 32)):
-            add(image)
-    assert film(tmp_path / "a.mp4")[1] == pytest.approx(got, rel=1e-3)
-
-
-def test_a_film_that_fails_leaves_the_old_one(tmp_path: Path) -> None:
-    path = tmp_path / "a.mp4"
-    path.write_bytes(b"old")
-    with pytest.raises(KeyboardInterrupt), export.film(path, (32, 32), 25) as add:  # noqa: PT012
-        add(moving_bar(1, (32, 32))[0])
-        raise KeyboardInterrupt
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
-
-
-def test_a_film_too_large_for_its_codec_is_one_message(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="--size"), export.film(tmp_path / "a.mp4", (20000, 16), 25) as add:
-        add(np.zeros((16, 20000, 4), np.uint8))
-    assert list(tmp_path.iterdir()) == []
-
-
 # --- files ----------------------------------------------------------------------------------
 
 
@@ -180,6 +116,7 @@ def test_a_full_disk_is_one_message_and_leaves_nothing(suffix: str, tmp_path: Pa
 import resource, numpy as np
 from viewer import files
 from viewer.output import export
+from viewer.output.film import FilmTimes
 class Noise:
     def image(self): return np.random.default_rng(0).integers(0, 255, (480, 640, 4), np.uint8)
     def arrays(self):
@@ -187,9 +124,9 @@ class Noise:
         three = np.stack([one] * 3, axis=2)
         return dict(color=three, normal=three, depth=one, coverage=one, value=one, id=one, level=one)
 resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
-with export.pictures(export.Path({str(tmp_path / ("a" + suffix))!r}), (640, 480), 25) as put:
+with export.pictures(export.Path({str(tmp_path / ("a" + suffix))!r}), (640, 480), FilmTimes()) as put:
     for number in range(30):
-        put(Noise(), number, None, None)
+        put(Noise(), number, number / 25, None, None)
 """
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[2]

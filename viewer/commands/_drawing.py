@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
+from itertools import compress
 from pathlib import Path
 
 from ..backends import backend as find_backend
@@ -21,13 +22,13 @@ from ..errors import InputError
 from ..gpu.context import headless
 from ..look import COLOR_BY, Look, drawable, is_open_range, with_range
 from ..output.export import numbered
+from ..output.film import FILM_SUFFIX, PICTURE_RATE, FilmTimes
 from ..output.legend import Legend
 from ..picture.surface import Surface
 from ..scan.pods import first_camera
 from ..scan.pose import Pose
 from ..scan.ranges import ValueRanges
 from ..scan.timeline import Timeline
-from ..scan.times import typical_rate
 from ..scan.upright import Upright
 from ._scans import frame_title, framing
 
@@ -36,33 +37,59 @@ from ._scans import frame_title, framing
 class Plan:
     """Pictures to draw.
 
-    count: how many are drawn. size: of the first one, and of a film. fps: of a film.
-    pictures: number of the file, request, entry that tells all of it, and legend of its marks; where one
-    request comes several times in a row, its picture is put several times and drawn once.
+    count: how many there are. size: of the first one, and of a film. times: of a film, None without one.
+    pictures: number of the file, request, entry that describes it with its start in a film, and legend of its
+    marks.
     """
 
     count: int
     size: tuple[int, int]
-    fps: float
+    times: FilmTimes | None
     pictures: Iterator[tuple[int, Request, Entry, Legend]]
 
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture. number: its file's. pose: an index. azimuth: degrees on the turntable."""
+    """One picture. number: its file's. pose: an index. start: when a film shows it, seconds.
+    azimuth: degrees on the turntable."""
 
     number: int
     pose: int
+    start: float
     azimuth: float = 0.0
 
 
-def shots(indices: Sequence[int], turntable: int | None = None) -> list[Shot]:
-    """The pictures of these poses. turntable: how many make a turn; a single pose gets a whole one."""
-    if turntable is None:
-        return [Shot(index, index) for index in indices]
-    if len(indices) == 1:
-        return [Shot(k, indices[0], 360 * k / turntable) for k in range(turntable)]
-    return [Shot(index, index, 360 * k / turntable) for k, index in enumerate(indices)]
+def shots(timeline: Timeline, indices: Sequence[int], args: Namespace) -> list[Shot]:
+    """The pictures of these poses. A film shows each from its time until that of the next one.
+
+    args.turntable: how many make a turn; a single pose gets a whole one, at args.fps.
+    """
+    turn = args.turntable
+    if turn and len(indices) == 1:
+        rate = args.fps or PICTURE_RATE
+        return [Shot(k, indices[0], k / rate, 360 * k / turn) for k in range(turn)]
+    times = timeline.times - timeline.times[indices[0]]
+    return [
+        Shot(index, index, float(times[index]), 360 * k / turn if turn else 0.0)
+        for k, index in enumerate(indices)
+    ]
+
+
+def film_times(shots: Sequence[Shot], args: Namespace) -> FilmTimes | None:
+    """The times of a film of these pictures, even ones with --fps; None where there is no film.
+
+    Raises InputError where no player shows such a film.
+    """
+    if args.out.suffix.lower() != FILM_SUFFIX:
+        return None
+    return FilmTimes.of([shot.start for shot in shots], args.fps)
+
+
+def shown_shots(shots: list[Shot], times: FilmTimes | None) -> list[Shot]:
+    """The pictures that a film shows; an even one may pass over some."""
+    if times is None:
+        return shots
+    return list(compress(shots, times.are_shown([shot.start for shot in shots])))
 
 
 def outputs(out: Path, numbers: Iterable[int], stats: Path | None = None) -> list[Path]:
@@ -138,13 +165,6 @@ def ranged(look: Look, timeline: Timeline, indices: Sequence[int]) -> Look:
     ranges = ValueRanges(len(poses))
     ranges.gather(timeline, look, poses)
     return with_range(look, ranges.range(look))
-
-
-def film_rate(timeline: Timeline, indices: Sequence[int], fps: float | None) -> float:
-    """Pictures a second: `fps` where given, else as fast as the poses follow each other."""
-    if fps is not None:
-        return fps
-    return typical_rate(timeline.times[list(indices)])
 
 
 def renderer(device: int | None) -> Renderer:

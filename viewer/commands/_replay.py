@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
-from itertools import groupby
+from itertools import compress, groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -23,12 +23,13 @@ from ..document.recording import (
 )
 from ..drawing.request import Request
 from ..errors import InputError
-from ..output.export import FILM_SUFFIX, FRAME_RATES, OUTPUT_SUFFIXES, check_output
+from ..output.export import OUTPUT_SUFFIXES, check_output
+from ..output.film import FILM_SUFFIX, FilmTimes
 from ..output.legend import Legend, marks_of
 from ..scan.inputs import scan_inputs
 from ..scan.open import is_demo, open_scan
 from ..scan.timeline import Timeline
-from ..scan.times import DEFAULT_FPS, frame_in_words
+from ..scan.times import frame_in_words
 from . import _arguments as arguments
 from . import _drawing as drawing
 from ._console import warn
@@ -49,13 +50,14 @@ def planned(args: Namespace) -> Iterator[Plan]:
     recording = Recording.load(args.replay)
     entries: Sequence[Entry] = recording.entries
     check_output(args.out, OUTPUT_SUFFIXES, several=len(entries) > 1)
-    fps = DEFAULT_FPS if args.fps is None else args.fps
+    times = None
     if args.out.suffix.lower() == FILM_SUFFIX:
-        entries = _film(recording, fps)
+        times = FilmTimes(recording.seconds, args.fps)
+        entries = _of_film(entries, times)
     outputs = drawing.outputs(args.out, range(len(entries)), args.stats)
     claim(outputs, [args.replay, *_scan_files(entries, args)], args.force)
     with closing(_pictures(entries, args)) as pictures:
-        yield Plan(len(set(map(id, entries))), entries[0].size, fps, pictures)
+        yield Plan(len(entries), entries[0].size, times, pictures)
 
 
 def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
@@ -73,40 +75,31 @@ def _check_arguments(args: Namespace) -> None:
         raise InputError(f"--replay takes no {', '.join(given)}", args.replay, hint)
 
 
-def _film(recording: Recording, fps: float) -> Sequence[Entry]:
-    """The entries at the film's pace, all of the size of the first."""
-    low, high = FRAME_RATES
-    if not low <= fps <= high:
-        raise InputError(
-            f"Scan4D cannot use {fps:g} pictures per second", "--fps", f"Use {low:g} to {high:g}"
-        )
-    size = recording.entries[0].size
-    resized = Recording(tuple(replace(e, size=size) for e in recording.entries), recording.seconds)
-    return resized.paced(fps)
+def _of_film(entries: Sequence[Entry], times: FilmTimes) -> Sequence[Entry]:
+    """The entries that a film shows, all of the size of the first."""
+    size, are_shown = entries[0].size, times.are_shown([entry.at for entry in entries])
+    return [replace(entry, size=size) for entry in compress(entries, are_shown)]
 
 
 def _pictures(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int, Request, Entry, Legend]]:
-    """Number, request, entry and legend of each; an entry that stays makes one request.
+    """Number, request, entry and legend of each.
 
     Broken frames among several are reported and left out. Raises InputError where none is left.
     """
-    source, failed, drawn = None, None, False
+    failed, drawn = None, False
     for number, entry, opened in _opened(entries, args):
-        if entry is not source:
-            source, request = entry, None
-            try:
-                request, failed = _request(entry, args, opened.timeline), None
-            except InputError as error:
-                if not _may_be_left_out(entry, opened.timeline, entries):
-                    raise
-                if str(error) != str(failed):
-                    warn(f"{opened.timeline.name}: Scan4D leaves out {frame_in_words(entry.pose)}: {error}")
-                failed = error
-            else:
-                shown = _completed(entry, request, args, opened)
-        if request is not None:
-            drawn = True
-            yield number, request, shown, shown.legend(opened.timeline, request.pose)
+        try:
+            request = _request(entry, args, opened.timeline)
+        except InputError as error:
+            if not _may_be_left_out(entry, opened.timeline, entries):
+                raise
+            if str(error) != str(failed):
+                warn(f"{opened.timeline.name}: Scan4D leaves out {frame_in_words(entry.pose)}: {error}")
+            failed = error
+            continue
+        failed, drawn = None, True
+        shown = _completed(entry, request, args, opened)
+        yield number, request, shown, shown.legend(opened.timeline, request.pose)
     if failed and not drawn:
         raise failed
 

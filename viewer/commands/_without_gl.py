@@ -20,7 +20,8 @@ from ..codewords.stream import SUFFIX, WordStream, read_stream, write_stream
 from ..drawing.request import Request, view_of
 from ..errors import InputError
 from ..look import Look, drawable, value_source
-from ..output.export import FILM_SUFFIX, check_output, film, numbered, write_arrays, write_png
+from ..output.export import check_output, numbered, write_arrays, write_png
+from ..output.film import FILM_SUFFIX, FilmTimes, film
 from ..params import parse
 from ..scan.estimate import estimate
 from ..scan.inputs import scan_inputs
@@ -81,8 +82,9 @@ def _replay(args: Namespace, path: Path) -> None:
     claim([numbered(args.out, 0)], [path, *_given(args.behind)], args.force)
     stream = read_stream(path)
     draw = partial(draw_words, background=_background(args.behind, stream.size))
-    with _written(args.out, stream.size, args.fps or 1.0, draw) as put, progress(1, args.progress) as tick:
-        put(0, stream, None)
+    times = FilmTimes(fps=args.fps) if args.out.suffix.lower() == FILM_SUFFIX else None
+    with _written(args.out, stream.size, times, draw) as put, progress(1, args.progress) as tick:
+        put(drawing.Shot(0, 0, 0.0), stream, None)
         tick()
 
 
@@ -92,18 +94,19 @@ def _draw(args: Namespace) -> None:
     camera = Camera.load(args.camera) if args.camera else None
     with open_timeline(args, args.scan or DEMO) as timeline:
         indices, size = chosen_poses(args, timeline) or [0], args.size or _SIZE
-        shots = drawing.shots(indices, args.turntable)
+        shots = drawing.shots(timeline, indices, args)
         check_output(args.out, _SUFFIXES, several=len(shots) > 1)
+        times = drawing.film_times(shots, args)
+        shots = drawing.shown_shots(shots, times)
         upright = stated_upright(args, timeline, indices)
         if "up" not in dict(args.look):
             look = replace(look, up=upright.up)
         inputs = [*scan_inputs(timeline), *_given(args.camera), *_given(args.behind)]
         claim(drawing.outputs(args.out, [shot.number for shot in shots]), inputs, args.force)
         look = drawing.ranged(look, timeline, indices)
-        fps = drawing.film_rate(timeline, indices, args.fps)
         camera_of = None if camera is None else lambda shot: camera
         draw = partial(draw_words, window=params.window, background=_background(args.behind, size))
-        with _written(args.out, size, fps, draw) as put, progress(len(shots), args.progress) as tick:
+        with _written(args.out, size, times, draw) as put, progress(len(shots), args.progress) as tick:
             for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
                 camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
                 known = _with_estimates(pose, params)
@@ -111,7 +114,7 @@ def _draw(args: Namespace) -> None:
                 for shot in shots:
                     if shot.pose == pose.index:
                         view = view_of(Request(pose, camera_of(shot)), size)
-                        put(shot.number, words_of(known, view, own, params), pose)
+                        put(shot, words_of(known, view, own, params), pose)
                         tick()
 
 
@@ -167,17 +170,20 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
 
 @contextmanager
 def _written(
-    out: Path, size: tuple[int, int], fps: float, draw: Callable[[WordStream], CodePicture]
-) -> Iterator[Callable[[int, WordStream, Pose | None], None]]:
-    """A function that puts a stream, with its number and the pose that it is of, where the path says."""
+    out: Path, size: tuple[int, int], times: FilmTimes | None, draw: Callable[[WordStream], CodePicture]
+) -> Iterator[Callable[[drawing.Shot, WordStream, Pose | None], None]]:
+    """A function that writes a stream to the file, the numbered file or the film that the path names.
+
+    It takes the shot, its stream and its pose. times: of a film.
+    """
     suffix = out.suffix.lower()
-    if suffix == FILM_SUFFIX:
-        with film(out, size, fps) as add:
-            yield lambda number, stream, pose: add(draw(stream).image)
+    if times is not None:
+        with film(out, size, times) as add:
+            yield lambda shot, stream, pose: add(draw(stream).image, shot.start)
         return
 
-    def put(number: int, stream: WordStream, pose: Pose | None) -> None:
-        path = numbered(out, number)
+    def put(shot: drawing.Shot, stream: WordStream, pose: Pose | None) -> None:
+        path = numbered(out, shot.number)
         if suffix == SUFFIX:
             write_stream(stream, path)
             return

@@ -156,8 +156,10 @@ def _planned(args: Namespace) -> Iterator[Plan]:
     scan, size = args.scan or DEMO, args.size or _SIZE
     with open_timeline(args, scan) as timeline:
         indices = chosen_poses(args, timeline) or [0]
-        shots = drawing.shots(indices, args.turntable)
+        shots = drawing.shots(timeline, indices, args)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)
+        times = drawing.film_times(shots, args)
+        shots = drawing.shown_shots(shots, times)
         outputs = drawing.outputs(args.out, [shot.number for shot in shots], args.stats)
         upright = stated_upright(args, timeline, indices)
         if "up" not in dict(args.look):
@@ -166,7 +168,6 @@ def _planned(args: Namespace) -> Iterator[Plan]:
         claim(outputs, [*scan_inputs(timeline), *([args.camera] if camera else [])], args.force)
         drawing.check_color_source(look, timeline, indices, name)
         look = drawing.ranged(look, timeline, indices)
-        fps = drawing.film_rate(timeline, indices, args.fps)
         salt = new_salt() if args.anonymous else None
         hash = fingerprint(timeline.files, salt) if args.out.suffix.lower() in DESCRIBED_SUFFIXES else None
         marks = marks_of(args.marks)
@@ -178,34 +179,33 @@ def _planned(args: Namespace) -> Iterator[Plan]:
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks, choice=choice)
-                entry = entry.without_names() if args.anonymous else entry
+                entry = replace(entry.without_names() if args.anonymous else entry, at=shot.start)
                 yield shot.number, request, entry, entry.legend(timeline, request.pose)
 
-        yield Plan(len(shots), size, fps, pictures())
+        yield Plan(len(shots), size, times, pictures())
 
 
 def _draw(plan: Plan, args: Namespace) -> None:
     """Draw a plan, and write its pictures and what they took."""
-    frames, drawn = [], None
+    frames = []
     with (
         drawing.canvases(args.device, plan.size) as (renderer, surface_of),
-        pictures(args.out, plan.size, plan.fps) as put,
+        pictures(args.out, plan.size, plan.times) as put,
         progress(plan.count * stats.draw_count(args.repeat), args.progress) as tick,
     ):
         if args.progress:
             say(device=renderer.gpu.device)
         for number, request, entry, legend in plan.pictures:
             surface = surface_of(entry.size, entry.scale)
-            if request is not drawn and args.stats:
+            if args.stats:
                 frames.append(stats.draw_measured(renderer, request, surface, args.repeat, tick))
-            elif request is not drawn:
+            else:
                 draw(renderer, request, surface)
                 tick()
-            if request is not drawn and args.out.suffix.lower() not in UNMARKED_SUFFIXES:
+            if args.out.suffix.lower() not in UNMARKED_SUFFIXES:
                 while supersample(renderer, request, surface):
                     pass
-            drawn = request
-            put(surface, number, entry.description(), legend)
+            put(surface, number, entry.at, entry.description(), legend)
         if args.stats:
             save_json(args.stats, stats.summary(renderer, surface, request, frames, entry.automatic))
 

@@ -20,7 +20,8 @@ from ..drawing.timing import draw
 from ..errors import InputError, NoOpenGLError
 from ..files import output_folder, printable
 from ..look import Look
-from ..output.export import contact_sheet, film, thumbnail, write_png
+from ..output.export import contact_sheet, thumbnail, write_png
+from ..output.film import FilmTimes, film
 from ..scan.inputs import scan_inputs
 from ..scan.listing import is_there, named_scans
 from ..scan.open import DEMO
@@ -159,11 +160,11 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     indices = list(range(len(timeline)))
     upright = stated_upright(args, timeline, indices)
     on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])
-    fps = drawing.film_rate(timeline, indices, args.fps)
+    starts = (timeline.times - timeline.times[0]).tolist()
     thumbnails = []
     with (
         drawing.canvas(args.device, _SIZE) as (renderer, surface),
-        film(f"{name}.mp4", _SIZE, fps) as add,
+        film(f"{name}.mp4", _SIZE, FilmTimes.of(starts)) as add,
         progress(len(indices)) as tick,
     ):
         bounds = framing(timeline, indices)
@@ -173,7 +174,7 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
             draw(renderer, Request(pose, camera, look=Look(up=upright.up)), surface)
             image = surface.image()
             write_png(image, f"{name}_{pose.index:04d}.png")
-            add(image)
+            add(image, starts[pose.index])
             if pose.index in on_sheet:
                 thumbnails.append(thumbnail(image))
             tick()

@@ -18,11 +18,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import os
 import re
 import secrets
-from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -82,7 +80,6 @@ from .schema import (
 FORMAT = 1
 _HASHED_BYTES = 256 * 2**20  # of a file; hashing takes 0.05 to 0.3 s for 100 MB
 _ENDS_OF, _END_BYTES = 64, 2**16  # files, spread evenly, of which both ends are read, and bytes of an end
-_TICK = 0.001  # seconds that time stamps are rounded to
 _EXACT = 1e-6  # how far the rotation of a matrix may be from orthonormal
 
 _Row = tuple[float, float, float, float]
@@ -325,15 +322,6 @@ class Recording:
         read = _read_changes(entries, path)
         seconds = structured(Stamp, data.get("seconds", 0.0), f"{path}, 'seconds'")
         return cls(read, max(seconds, read[-1].at))
-
-    def paced(self, fps: float) -> list[Entry]:
-        """Entries that a film shows: picture k, at k / fps seconds, is the entry that was shown then.
-
-        An entry that was gone before the next picture of the film is left out; the last one is always in it.
-        """
-        starts = [math.ceil((entry.at - _TICK / 2) * fps) for entry in self.entries]
-        count = max(round(self.seconds * fps), starts[-1] + 1)
-        return [self.entries[bisect_right(starts, number) - 1] for number in range(count)]
 
 
 class Recorder:

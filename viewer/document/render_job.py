@@ -41,14 +41,15 @@ def make(
     task: Task,
     recording: Recording,
     out: Path,
-    fps: float,
+    fps: float | None,
     anonymous: bool,
     numbers: Sequence[int] | None = None,
     replaced: Collection[Path] = (),
 ) -> Made:
     """Make the pictures or the film of a recording; this waits for it.
 
-    out: as `scan4d render -o` has it. fps: of a film. anonymous: without the names and paths of scans.
+    out: as `scan4d render -o` has it. fps: of an even film; None: the film shows each entry from its stamp
+    until the next one's. anonymous: without the names and paths of scans.
     numbers: that the entries' files bear, each its own; from 0 where they are not given. replaced: files
     that may be. Files take their names when all are complete; where others have these by then, they are
     all called differently. Raises Cancelled, InputError where they cannot be written, Scan4DError with what
@@ -59,7 +60,8 @@ def make(
         recording.save(reported_once)
         new_folder(made)
         arguments = ["render", "--replay", str(reported_once), "-o", str(made / out.name)]
-        arguments += ["--fps", f"{fps:.17g}", "--progress", *(["--anonymous"] if anonymous else [])]
+        arguments += ["--progress", *(["--anonymous"] if anonymous else [])]
+        arguments += [] if fps is None else ["--fps", f"{fps:.17g}"]
         scan = recording.entries[0].scan
         if scan is not None and remote_location(scan):  # which a recording may not ask for
             arguments += ["--", scan]

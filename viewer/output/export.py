@@ -1,4 +1,4 @@
-"""Writing pictures: PNG, EXR, NPZ, MP4 films, numbered files and contact sheets.
+"""Writing pictures: PNG, EXR, NPZ, numbered files and contact sheets; films are in `film`.
 
 PNG and MP4 show the picture as the look has it, with its marks; EXR and NPZ hold the Surface behind
 it, unshaded and unmarked. PNG and EXR can carry a description, a text that says how they were made.
@@ -14,7 +14,6 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from fractions import Fraction
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +27,7 @@ from ..errors import InputError, MissingPackageError, explained
 from ..files import open_plain, whole_file
 from ..look import Look, rgba
 from ..native import OPENEXR, unsaid
+from .film import FILM_SUFFIX, FilmTimes, film
 from .labels import LabelPlaces, covered_cells
 from .legend import Legend
 from .marked import marked
@@ -36,18 +36,14 @@ if TYPE_CHECKING:
     from ..picture.surface import Surface
 
 PICTURE_SUFFIXES = (".png", ".exr", ".npz")
-FILM_SUFFIX = ".mp4"
 OUTPUT_SUFFIXES = (*PICTURE_SUFFIXES, FILM_SUFFIX)
 DESCRIBED_SUFFIXES = (".png", ".exr")
 UNMARKED_SUFFIXES = (".exr", ".npz")
-FRAME_RATES = (1.0, 240.0)  # what players can be expected to show
 
 _NUMBER = re.compile("%(0?[0-9]*)d")
 _DESCRIPTION = "scan4d"  # the key of a PNG's text, the name of an EXR's attribute
 _THUMBNAIL_WIDTH = 320  # pixels
 _SHEET_GAP = 4  # pixels
-_MPEG4_BIT_RATE = 20_000_000
-_BT709, _LIMITED_RANGE = 1, 1  # as video streams code them
 
 
 # --- where pictures go ----------------------------------------------------------------------
@@ -92,12 +88,12 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
 
 @contextmanager
 def pictures(
-    path: Path, size: tuple[int, int], fps: float
-) -> Iterator[Callable[[Surface, int, str | None, Legend | None], None]]:
-    """A function that puts a surface, with its number, description and legend, where the path says: file,
-    files, film.
+    path: Path, size: tuple[int, int], times: FilmTimes | None
+) -> Iterator[Callable[[Surface, int, float, str | None, Legend | None], None]]:
+    """A function that writes a surface to the file, the numbered file or the film that the path names.
 
-    size: (width, height). fps: of a film. Raises InputError where something cannot be written.
+    It takes the surface, its number, its start in a film in seconds, its description and its legend.
+    size: (width, height). times: of a film. Raises InputError where something cannot be written.
     """
     places = LabelPlaces()
 
@@ -106,12 +102,12 @@ def pictures(
         return None if legend is None else replace(legend, places=places)
 
     if path.suffix.lower() == FILM_SUFFIX:
-        with film(path, size, fps) as add:
-            yield lambda surface, number, description, legend: add(
-                _marked_image(surface, with_places(legend))
+        with film(path, size, times or FilmTimes()) as add:
+            yield lambda surface, number, start, description, legend: add(
+                _marked_image(surface, with_places(legend)), start
             )
     else:
-        yield lambda surface, number, description, legend: write_picture(
+        yield lambda surface, number, start, description, legend: write_picture(
             surface, numbered(path, number), description, with_places(legend)
         )
 
@@ -246,60 +242,6 @@ def _write_npz(arrays: dict[str, NDArray], path: Path) -> None:
         for name, array in arrays.items():
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)
-
-
-# --- films ----------------------------------------------------------------------------------
-
-
-@contextmanager
-def film(
-    path: Path | str, size: tuple[int, int], fps: float
-) -> Iterator[Callable[[NDArray[np.uint8]], None]]:
-    """A function that appends an image, (H, W, 3 or 4) uint8 sRGB without its alpha, to an MP4.
-
-    H.264 where the codec is there, MPEG-4 elsewhere. size: (width, height); odd ones grow by
-    a repeated column or row, since video needs even sizes. fps: images a second, held within
-    1 to 240. Raises InputError where it cannot be written.
-    """
-    import av
-
-    path, (width, height) = Path(path), size
-    odd = ((0, height % 2), (0, width % 2), (0, 0))
-    rate = Fraction(min(max(fps, FRAME_RATES[0]), FRAME_RATES[1])).limit_denominator(1001)
-    try:
-        with whole_file(path) as temporary, av.open(str(temporary), "w", format="mp4") as container:
-            stream = _video_stream(container, rate)
-            stream.width, stream.height = width + width % 2, height + height % 2
-
-            def add(image: NDArray[np.uint8]) -> None:
-                rgb = np.ascontiguousarray(np.pad(image[..., :3], odd, mode="edge"))
-                frame = av.VideoFrame.from_ndarray(rgb, format="rgb24")
-                # Without being told, the converter takes BT.601, and players BT.709.
-                frame = frame.reformat(
-                    format="yuv420p", dst_colorspace=_BT709, dst_color_range=_LIMITED_RANGE
-                )
-                container.mux(stream.encode(frame))
-
-            yield add
-            container.mux(stream.encode(None))
-    except av.FFmpegError as error:
-        raise InputError(f"cannot be written: {error.strerror}", path, "Try a smaller --size") from error
-
-
-def _video_stream(container: Any, rate: Fraction) -> Any:
-    import av
-
-    h264 = "libx264" in av.codecs_available
-    stream = container.add_stream("libx264" if h264 else "mpeg4", rate=rate)
-    stream.pix_fmt = "yuv420p"
-    if h264:
-        stream.options = {"preset": "veryfast", "crf": "18"}
-    else:
-        stream.bit_rate = _MPEG4_BIT_RATE
-    coding = stream.codec_context
-    coding.colorspace = coding.color_primaries = coding.color_trc = _BT709
-    coding.color_range = _LIMITED_RANGE
-    return stream
 
 
 # --- contact sheets -------------------------------------------------------------------------

@@ -21,7 +21,8 @@ from ...document.recording import Entry, Recorder, Recording
 from ...drawing.request import Request
 from ...errors import InputError, explained, failure_in_words
 from ...files import free_file, working_folder
-from ...output.export import FILM_SUFFIX, with_hidden, write_png
+from ...output.export import with_hidden, write_png
+from ...output.film import FILM_SUFFIX
 from ...output.labels import LabelPlaces
 from ...output.legend import Legend, Marks
 from ...output.marked import marked

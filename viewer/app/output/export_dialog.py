@@ -21,6 +21,8 @@ from .exporting import Exporting
 _TITLE, _LEAVING = "Export", "Close Scan4D?"
 _WHAT = {VIEW: "Current view", TURNTABLE: "Turntable", FRAMES: "Image sequence / film"}
 _FORMATS = {PNG: "PNG pictures", EXR: "EXR: depth, normals and colours", MP4: "MP4 film"}
+AS_SCAN, EVEN = "as the scan", "even"
+_TIMES = {AS_SCAN: "As the scan", EVEN: "Even rate"}
 _SIZES = ((1280, 720), (1920, 1080), (3840, 2160))
 _MARKS = {
     "scale_bar": "Scale bar",
@@ -56,7 +58,7 @@ def _draw(exporting: Exporting, quit: Callable[[], None]) -> None:
         if is_drawn:
             choices, problems = exporting.choices, exporting.problems()
             choices = _edit_what(choices, exporting.count, problems)
-            choices = _edit_format(choices, exporting.rate, problems)
+            choices = _edit_format(choices, exporting.even_rate, problems)
             choices = _edit_size(choices, exporting.size, problems)
             choices = _edit_quality(choices, exporting.quality)
             marks = _edit_marks(exporting.marks, choices)
@@ -95,12 +97,18 @@ def _edit_what(choices: Choices, count: int, problems: dict[str, str]) -> Choice
     return choices
 
 
-def _edit_format(choices: Choices, rate: float, problems: dict[str, str]) -> Choices:
+def _edit_format(choices: Choices, even_rate: float, problems: dict[str, str]) -> Choices:
     widgets.label("Format", _HELP["format"])
     choices = replace(choices, format=widgets.combo("format", choices.format, list(_FORMATS), _FORMATS))
-    if choices.format == MP4:
+    if choices.format == MP4 and choices.what == FRAMES:
+        widgets.label("Frame times", "As the scan: each frame until the next one's time")
+        now = EVEN if choices.fps is not None else AS_SCAN
+        chosen = widgets.combo("times", now, list(_TIMES), _TIMES)
+        if chosen != now:
+            choices = replace(choices, fps=round(even_rate, 3) if chosen == EVEN else None)
+    if choices.format == MP4 and (choices.what != FRAMES or choices.fps is not None):
         widgets.label("Frames per second", _HELP["fps"])
-        edited, fps = imgui.input_float("##fps", rate, 0, 0, "%.5g")
+        edited, fps = imgui.input_float("##fps", even_rate, 0, 0, "%.5g")
         choices = replace(choices, fps=round(fps, 3)) if edited else choices
     _draw_problems(problems, "format", "fps")
     return choices

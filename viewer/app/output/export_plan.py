@@ -15,12 +15,13 @@ from ...document.recording import Entry, Recording, matrix_of
 from ...errors import InputError
 from ...geometry import Vector
 from ...look import SAMPLES
-from ...output.export import FRAME_RATES, numbered
+from ...output.export import numbered
+from ...output.film import FRAME_RATES, PICTURE_RATE, FilmTimes
 from ...output.legend import Marks
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...params import describe, param
 from ...rigid import Rigid
-from ...scan.times import DEFAULT_FPS, typical_rate
+from ...scan.times import typical_rate
 
 VIEW, TURNTABLE, FRAMES = "view", "turntable", "frames"
 PNG, EXR, MP4 = "png", "exr", "mp4"
@@ -42,7 +43,7 @@ class Choices:
     step: int = param(1, "1: every frame; 2: every second frame; and so on", low=1, high=100_000)
     format: str = param(PNG, "File format", choices=(PNG, EXR, MP4))
     fps: float | None = param(
-        None, "Frames per second of the film; auto: as the scan",
+        None, "Frames per second of an even film; auto: a film shows each frame until the next one's time",
         low=FRAME_RATES[0], high=FRAME_RATES[1], type=float,
     )  # fmt: skip
     width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
@@ -76,14 +77,23 @@ class Choices:
             return range(indices.start + 1, indices.stop + 1, indices.step)
         return range(1, (self.pictures if self.what == TURNTABLE else 1) + 1)
 
-    def rate(self, times: NDArray[np.float64]) -> float:
-        """Pictures a second of a film. times: (T,) of the scan's frames, seconds."""
+    def even_rate(self, times: NDArray[np.float64]) -> float:
+        """Pictures a second of an even film: as chosen, else a suggestion. times: (T,) of the scan's frames,
+        seconds."""
         if self.fps is not None:
             return self.fps
         if self.what != FRAMES:
-            return DEFAULT_FPS
+            return PICTURE_RATE
         low, high = FRAME_RATES
         return min(max(typical_rate(times[np.array(self.indices(len(times)), int)]), low), high)
+
+    def starts(self, times: NDArray[np.float64]) -> list[float]:
+        """When a film shows its pictures, seconds from the first one on. times: (T,) of the scan's frames,
+        seconds."""
+        if self.what != FRAMES:
+            return [number / (self.fps or PICTURE_RATE) for number in range(len(self.numbers(len(times))))]
+        chosen = times[np.array(self.indices(len(times)), int)]
+        return (chosen - chosen[:1]).tolist()
 
     def out(self) -> Path:
         """The pattern of the files, as `scan4d render -o` has it."""
@@ -91,9 +101,12 @@ class Choices:
         return _folder(self.folder) / f"{self.name}{'_%04d' if several else ''}.{self.format}"
 
 
-def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
-    """Find what is wrong, by the field where it is. count: frames of the scan. most_pixels: of a picture."""
-    found = {}
+def problems(choices: Choices, times: NDArray[np.float64], most_pixels: int) -> dict[str, str]:
+    """Find what is wrong, by the field where it is.
+
+    times: (T,) of the scan's frames, seconds. most_pixels: of a picture.
+    """
+    found, count = {}, len(times)
     for parameter in describe(Choices):
         try:
             parameter.parse(getattr(choices, parameter.name))
@@ -109,6 +122,11 @@ def problems(choices: Choices, count: int, most_pixels: int) -> dict[str, str]:
             found["last"] = f"Choose a last frame from {choices.first} to {count}"
     if choices.format == MP4 and choices.what == VIEW:
         found["format"] = "A film needs a turntable or an image sequence"
+    if choices.format == MP4 and not found.keys() & {"fps", "format", "first", "last", "step", "pictures"}:
+        try:
+            FilmTimes.of(choices.starts(times), choices.fps)
+        except InputError as error:
+            found["fps"] = f"{error.what}. {error.hint}"
     if not os.path.isdir(_folder(choices.folder)):
         found["folder"] = "This folder does not exist"
     if problem := _problem_of_name(choices.name):
@@ -168,9 +186,9 @@ def recording(
         entries = [base]
     if choices.format != MP4:
         return Recording(tuple(entries))
-    rate = choices.rate(times)
-    placed = tuple(replace(entry, at=number / rate) for number, entry in enumerate(entries))
-    return Recording(placed, len(placed) / rate)
+    starts = choices.starts(times)
+    placed = tuple(replace(entry, at=start) for entry, start in zip(entries, starts, strict=True))
+    return Recording(placed, FilmTimes.of(starts, choices.fps).end)
 
 
 def _turned(camera: Camera, angle: float, pivot: Vector | None) -> Camera:

@@ -21,7 +21,6 @@ from ...files import working_folder
 from ...output.legend import Marks
 from ...output.overlays import NOTHING_DRAWN, DrawnMarks
 from ...scan.inputs import found_among, scan_inputs
-from ...scan.times import DEFAULT_FPS
 from ...task import Cancelled, Task, in_background
 from ..commands import Command
 from ..file_dialog import FOLDER, FileDialog
@@ -101,9 +100,9 @@ class Exporting(WindowPart):
         return len(self.playback.timeline)
 
     @property
-    def rate(self) -> float:
-        """Pictures a second of a film, as chosen or as the scan has them."""
-        return self.choices.rate(self.playback.timeline.times)
+    def even_rate(self) -> float:
+        """Pictures a second of an even film, as chosen or suggested."""
+        return self.choices.even_rate(self.playback.timeline.times)
 
     @property
     def size(self) -> tuple[int, int] | None:
@@ -140,7 +139,8 @@ class Exporting(WindowPart):
 
     def problems(self) -> dict[str, str]:
         """Find what is wrong with the choices, by field."""
-        return export_plan.problems(self.choices, self.count, self.viewport.renderer.gpu.max_pixels)
+        most_pixels = self.viewport.renderer.gpu.max_pixels
+        return export_plan.problems(self.choices, self.playback.timeline.times, most_pixels)
 
     def start(self) -> None:
         """Export, unless that would replace files that the user was not asked about; closes the dialog.
@@ -165,14 +165,14 @@ class Exporting(WindowPart):
         recording = export_plan.recording(
             choices, shown, self.marks, timeline.times, pivot, motion_of, self.drawn
         )
-        rate, numbers = self.rate, choices.numbers(self.count)
-        self._begin(choices.name, recording, choices.out(), rate, choices.anonymous, numbers, replaced=there)
+        fps, numbers = choices.fps, choices.numbers(self.count)
+        self._begin(choices.name, recording, choices.out(), fps, choices.anonymous, numbers, replaced=there)
 
     def film(self, recording: Recording, out: Path) -> None:
         """Make a film of a recording, of the size that the view had. out: under another name where that is
         taken."""
         if self.task is None:
-            self._begin(out.name, recording, out, DEFAULT_FPS, False)
+            self._begin(out.name, recording, out, None, False)
         else:
             again = {"Save as film": lambda: self.film(recording, out)}
             self.note_of_work(Offer("An export is running. Wait for it, or cancel it.", again, "recording"))
