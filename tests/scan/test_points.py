@@ -182,3 +182,15 @@ def test_arrays_of_another_cloud_are_taken_where_they_hold_the_same() -> None:
 def test_colours_of_four_bytes_are_taken_as_they_are() -> None:
     colors = np.full((2, 4), 9, np.uint8)
     assert PointCloud.from_arrays(np.zeros((2, 3)), colors=colors).colors is colors
+
+
+def test_rows_that_were_not_measured_are_dropped_and_counted_apart_from_those_that_are_not_finite() -> None:
+    points = np.arange(30.0).reshape(10, 3)
+    points[2], points[5:8], points[7, 0] = np.nan, 0, np.inf
+    cloud = PointCloud.from_arrays(
+        points, colors=np.arange(30).reshape(10, 3), unmeasured=("0 0 0", (points == 0).all(axis=1))
+    )
+    assert cloud.dropped == 4
+    assert cloud.dropped_by == {"not finite": 2, "0 0 0": 2}
+    np.testing.assert_array_equal(cloud.ids, [0, 1, 3, 4, 8, 9])
+    np.testing.assert_array_equal(cloud.colors[:, 0], 3 * cloud.ids)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..bounds import Bounds
 from ..errors import InputError
 from ..task import checkpoint
+from .colors import full_scale, rgba8
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -25,6 +26,7 @@ _ARRAYS = ("positions", "normals", "colors", "radii", "axes", "ids", "remainders
 _SCALAR = "scalar:"  # begins the names of scalars among those of all arrays
 
 NOTHING = 0xFFFFFFFF  # the row, or the number of a face or node, where there is none
+NOT_FINITE = "not finite"  # why points are dropped: a coordinate is NaN or infinite
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
 
 
@@ -56,7 +58,9 @@ class PointCloud:
                length of the other, which is perpendicular to it and to the normal; zeros: round
     scalars:   name -> (N,) array of any real type
     ids:       (N,) uint32, increasing, the index in the file before anything was dropped; None: 0..N-1
-    dropped:   how many points were dropped because a coordinate was NaN or infinite
+    dropped:   how many points were dropped because a coordinate was NaN or infinite, or was not measured
+    dropped_by: reason -> how many points were dropped for it: `NOT_FINITE`, or the value that means "not
+               measured", such as "0 0 0"
     shortened: how many splats were, to a million times the extent of the points
     remainders: (N, 3) float32, scan units, or None: what the coordinates have beyond their float32 offsets,
                which are right to 3e-8 of the extent; None where they have nothing
@@ -75,6 +79,7 @@ class PointCloud:
     scalars: Mapping[str, NDArray[np.generic]] = field(default_factory=dict)
     ids: NDArray[np.uint32] | None = None
     dropped: int = 0
+    dropped_by: Mapping[str, int] = field(default_factory=dict)
     shortened: int = 0
     topology: str | None = None
     remainders: NDArray[np.float32] | None = None
@@ -89,12 +94,14 @@ class PointCloud:
         origin: ArrayLike | None = None,
         precise: bool = True,
         viewpoint: ArrayLike | None = None,
+        unmeasured: tuple[str, NDArray[np.bool_]] | None = None,
         **attributes: Unpack[CloudAttributes],
     ) -> PointCloud:
         """Points with a NaN or infinite coordinate are dropped and counted.
 
         positions: (N, 3) absolute, any real type. origin: (3,); chosen by `choose_origin` if None. precise:
         whether what the coordinates have beyond float32 offsets is stored. viewpoint: (3,) absolute.
+        unmeasured: the value that means "not measured", and the rows that have it, (N,), dropped too.
         Raises InputError where shapes do not fit, and where the viewpoint is not finite; TypeError where an
         argument has another name.
         """
@@ -110,8 +117,7 @@ class PointCloud:
         if points.dtype.kind not in "fiu":
             raise InputError(f"positions are of type {points.dtype}, expected numbers")
         count = len(points)
-        finite = finite_rows(points)
-        retained = count if finite is None else int(np.count_nonzero(finite))
+        finite, dropped_by = retained_rows(points, unmeasured)
 
         def pick(values: ArrayLike | None, name: str, columns: tuple[int, ...]) -> NDArray | None:
             if values is None:
@@ -138,13 +144,14 @@ class PointCloud:
             positions=offsets,
             origin=base,
             normals=None if normals is None else np.ascontiguousarray(normals, np.float32),
-            colors=None if colors is None else _rgba8(colors),
+            colors=None if colors is None else rgba8(colors, full_scale(colors)),
             radii=radii,
             axes=axes,
             scalars={name: np.ascontiguousarray(pick(values, f"values of '{name}'", (1,)))
                      for name, values in (attributes.get("scalars") or {}).items()},
             ids=None if finite is None else np.flatnonzero(finite).astype(np.uint32),
-            dropped=count - retained,
+            dropped=sum(dropped_by.values()),
+            dropped_by=dropped_by,
             shortened=shortened,
             remainders=remainders,
             viewpoint=None if viewpoint is None else checked_viewpoint(viewpoint),
@@ -318,6 +325,26 @@ def finite_rows(points: NDArray) -> NDArray[np.bool_] | None:
     return finite
 
 
+def retained_rows(
+    points: NDArray, unmeasured: tuple[str, NDArray[np.bool_]] | None
+) -> tuple[NDArray[np.bool_] | None, dict[str, int]]:
+    """Mask of the rows that a cloud retains, (N,), None: all; and how many it drops, by reason.
+
+    unmeasured: the value that means "not measured", and the rows of points (N, 3) that have it, (N,).
+    """
+    finite = finite_rows(points)
+    dropped_by = {}
+    if finite is not None:
+        dropped_by[NOT_FINITE] = len(finite) - int(np.count_nonzero(finite))
+    if unmeasured is not None:
+        value, rows = unmeasured
+        retained = ~rows if finite is None else finite & ~rows
+        before = len(points) - dropped_by.get(NOT_FINITE, 0)
+        dropped_by[value] = before - int(np.count_nonzero(retained))
+        finite = retained
+    return finite, dropped_by
+
+
 def _are_same(ours: NDArray, theirs: NDArray) -> bool:
     """Whether two arrays hold the same bits; it ends at the first difference."""
     if ours.shape != theirs.shape or ours.dtype != theirs.dtype:
@@ -421,20 +448,3 @@ def _splats(
         mean[start + rows] = np.sqrt((lengths[:, rows] * factors).prod(axis=0))
         shorter += int((factors < 1).any(axis=0).sum())
     return (mean, retained, shorter) if retained.any() else (radii, None, shortened)
-
-
-def _rgba8(colors: NDArray) -> NDArray[np.uint8]:
-    if colors.dtype == np.uint8 and colors.shape[1] == 4:
-        return np.ascontiguousarray(colors)
-    rgba = np.full((len(colors), 4), 255, np.uint8)
-    for start in range(0, len(colors), _CHUNK):
-        part = colors[start : start + _CHUNK]
-        if part.dtype.kind == "f":
-            part = np.clip(np.rint(np.nan_to_num(part.astype(np.float32)) * np.float32(255)), 0, 255)
-        elif part.dtype == np.uint16:
-            part = part >> 8
-        elif part.dtype != np.uint8:
-            part = np.clip(part, 0, 255)
-        for channel in range(part.shape[1]):  # by columns: numpy is slow along the short axis
-            rgba[start : start + _CHUNK, channel] = part[:, channel]
-    return rgba

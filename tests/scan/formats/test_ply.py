@@ -188,7 +188,10 @@ def test_faces_are_not_taken_for_missing_vertices(path: Path) -> None:
             "element vertex 1\nflat x\nfloat y\nfloat z\nproperty uchar red\n",
             "PLY has no header line 'flat x'",
         ),
-        ("element vertex 1\nproperty triple x\n", "unknown PLY property type 'triple'. Known: char, double"),
+        (
+            "element vertex 1\nproperty triple x\n",
+            "property type 'triple'. Known: bool, char, double",
+        ),
         ("element vertex -1\n" + XYZ, "promises '-1' rows of vertex"),
         ("element vertex 0\n" + XYZ, "holds no vertices"),
         ("element vertex 1\n", "no x, y and z among the columns: none"),
@@ -307,3 +310,36 @@ def test_headers_of_very_many_or_long_names(path: Path) -> None:
     with pytest.raises(InputError, match=r"no x, y and z among the columns: nnnn.*and 88 more") as caught:
         read(save(path, "element vertex 1\n" + long, ""))
     assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize(
+    ("kind", "code", "value"),
+    [
+        ("bool", "u1", 1),
+        ("uint64", "u8", 1 << 52),
+        ("int64", "i8", -(1 << 52)),
+        ("long", "i8", -5),
+        ("ulong", "u8", 5),
+        ("half", "f2", 0.5),
+        ("float16", "f2", -2.0),
+    ],
+)
+def test_types_beyond_the_standard(kind: str, code: str, value: float, encoding: str, path: Path) -> None:
+    endian = ">" if "big" in encoding else "<"
+    rows = np.array(
+        [(1, 2, 3, value), (4, 5, 6, 0)], [*((axis, endian + "f4") for axis in "xyz"), ("v", endian + code)]
+    )
+    text = "".join(" ".join(repr(one) for one in row.tolist()) + "\n" for row in rows)
+    header = f"element vertex 2\n{XYZ}property {kind} v\n"
+    cloud = read(save(path, header, text if encoding == "ascii" else rows.tobytes(), encoding))
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(cloud.scalars["v"], [value, 0])
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian"])
+def test_a_byte_order_mark_in_front_does_no_harm(encoding: str, path: Path) -> None:
+    body = "1 2 3\n4 5 6\n" if encoding == "ascii" else np.array([1, 2, 3, 4, 5, 6], "<f4").tobytes()
+    save(path, f"element vertex 2\n{XYZ}", body, encoding)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    np.testing.assert_array_equal(read(path).world(), [[1, 2, 3], [4, 5, 6]])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -19,6 +20,9 @@ TYPES = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
     "float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2",
     "int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8",
+    # Beyond the standard, as programs write them nevertheless.
+    "bool": "u1", "int64": "i8", "uint64": "u8", "long": "i8", "ulong": "u8", "longlong": "i8",
+    "ulonglong": "u8", "half": "f2", "float16": "f2",
 }  # fmt: skip
 
 
@@ -108,15 +112,19 @@ class PlyHeader:
     encoding: str
     elements: list[Element]
     odd_lines: list[str]  # that mean nothing to us
+    remarks: tuple[str, ...]  # comments and obj_info, without these words
     size: int  # bytes
 
 
 def parse_header(head: bytes) -> PlyHeader:
-    """The header that a file begins with. Raises InputError where it cannot be used."""
+    """The header that a file begins with, perhaps behind a byte-order mark. Raises InputError."""
+    mark = len(BOM_UTF8) if head.startswith(BOM_UTF8) else 0
+    head = head[mark:]
     end = re.search(rb"\nend_header[ \t\r]*(\n|\Z)", head)
     if not re.match(rb"ply\s", head) or end is None:
         raise InputError("is not a PLY file: it does not start with 'ply' or has no 'end_header'")
     encoding, elements, odd_lines = "", [], []
+    remarks: list[str] = []
     for line in head[: end.start()].decode("utf-8", "replace").splitlines()[1:]:
         match line.split():
             case ["format", encoding, *_]:
@@ -124,7 +132,9 @@ def parse_header(head: bytes) -> PlyHeader:
                     raise unknown_name("PLY format", encoding[:_LONGEST_WORD], list(ENDIAN))
             case ["element", name, count]:
                 elements.append(_element(name, count))
-            case ["comment" | "obj_info", *_] | []:
+            case ["comment" | "obj_info", *words]:
+                remarks.append(" ".join(words))
+            case []:
                 pass
             case words:
                 declared = _property(words) if elements else None
@@ -136,7 +146,7 @@ def parse_header(head: bytes) -> PlyHeader:
         check_count(len(element.properties), MOST_COLUMNS, "properties of an element")
     if not encoding:
         raise InputError("the PLY header has no format line")
-    return PlyHeader(encoding, elements, odd_lines, end.end())
+    return PlyHeader(encoding, elements, odd_lines, tuple(remarks), mark + end.end())
 
 
 def _element(name: str, count: str) -> Element:
