@@ -34,7 +34,9 @@ def cloud_of(
     if held is not None:
         admit(held, _memory(positions[0], attributes, scalars, origin, at_hand))
     points = Deferred(positions.pop, positions[0].dtype, 3)
-    return PointCloud.from_arrays(points, **attributes, scalars=scalars, origin=origin, precise=True)
+    return PointCloud.from_arrays(
+        points, **attributes, scalars=scalars, origin=origin, precise=True, unmeasured=None
+    )
 
 
 def _memory(
