@@ -61,8 +61,8 @@ def test_normals_that_do_not_cover_the_vertices_are_left_out(faces: str, path: P
     [
         ("# nothing here\n", "holds no points"),
         ("v 1 2\n", "positions have shape"),
-        ("v 1 2 3\nv 1 2 3 4 5 6\n", "columns changed from 3 to 6"),
-        ("v 1 2 three\n", "could not convert"),
+        ("v 1 2 3\nv 1 2 3 4 5 6\n", "row 2 has 6 values, but the rows above have 3"),
+        ("v 1 2 three\n", "row 1, column 3: 'three' is not a number"),
     ],
 )
 def test_files_that_cannot_be_used(text: str, reason: str, path: Path) -> None:

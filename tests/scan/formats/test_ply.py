@@ -175,7 +175,7 @@ def test_lengths_that_are_no_number_are_told_in_our_words(length: str, path: Pat
 def test_faces_are_not_taken_for_missing_vertices(path: Path) -> None:
     header = "element vertex 3\n" + XYZ + "element face 2\nproperty list uchar int vertex_indices\n"
     save(path, header, "0 0 0\n1 0 0\n3 0 1 1\n3 0 1 1\n")
-    with pytest.raises(InputError, match="columns changed from 3 to 4"):
+    with pytest.raises(InputError, match="row 3 has 4 values, but the rows above have 3"):
         read(path)
 
 

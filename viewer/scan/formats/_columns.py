@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import sys
 from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 from itertools import chain, count, islice
@@ -14,15 +12,14 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import DTypeLike, NDArray
 
 from ...errors import InputError
-from ...task import checkpoint
 from ..admission import LONGEST_LINE
 from ..contents import Deferred
 from ..points import PointCloud
+from ..reading import numbers
 from ._deferred import cloud_of
 from ._precision import is_enough
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
-_ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
 Columns = dict[str, NDArray]  # name -> (N,)
 T = TypeVar("T")
 
@@ -179,32 +176,15 @@ def parse_table(
     delimiter: str | None = None,
     rows: int | None = None,
 ) -> NDArray[np.float64]:
-    """Numbers from lines of text, (N, C) float64; blank lines and comments (`#`, `//`) are skipped.
+    """Numbers from lines of text, (N, C) float64, as `numbers.parse_table` reads them.
 
-    columns: which to take; None: all, and then every row must have the same number (0 rows: 3).
-    rows: how many to read at most. What is allocated follows the text, not `rows`.
-    Raises InputError where something is not a number or a row is too short.
+    delimiter: between the values; None: blanks, or what `numbers.dialect_of` finds, decimal commas too.
     """
-    filled = (line for line in lines if (start := line.lstrip()) and not start.startswith(("#", "//")))
-    wanted = islice(filled, None if rows is None else min(rows, sys.maxsize))
-    table = np.empty((0, len(columns or range(3))))
-    done = 0
-    while first := list(islice(wanted, 1)):
-        checkpoint(done / rows if rows else None)
-        part = _parse_rows(chain(first, islice(wanted, _ROWS_AT_ONCE - 1)), columns, delimiter, done)
-        if not done:
-            table = np.empty((0, part.shape[1]))
-        if part.shape[1] != table.shape[1]:
-            raise InputError(
-                f"not a table of numbers: the number of columns changed from {table.shape[1]} to "
-                f"{part.shape[1]} at row {done + 1} of the points"
-            )
-        if done + len(part) > len(table):  # grown in place, so that there is never a second one
-            table.resize((done + len(part) + done // 8, part.shape[1]), refcheck=False)
-        table[done : done + len(part)] = part
-        done += len(part)
-    table.resize((done, table.shape[1]), refcheck=False)
-    return table
+    if delimiter is None:
+        dialect, lines = numbers.looked_at(lines, rows)
+    else:
+        dialect = numbers.Dialect(delimiter)
+    return numbers.parse_table(lines, columns, dialect, rows)
 
 
 def whole_numbers(rows: Sequence[Sequence[str]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -221,18 +201,6 @@ def batches(items: Iterable[T], size: int) -> Iterator[list[T]]:
     left = iter(items)
     while batch := list(islice(left, size)):
         yield batch
-
-
-def _parse_rows(
-    lines: Iterable[str], columns: Sequence[int] | None, delimiter: str | None, before: int
-) -> NDArray[np.float64]:
-    """At least one row of numbers, `before` rows below the first of the table."""
-    try:
-        return np.loadtxt(lines, usecols=columns, delimiter=delimiter, ndmin=2)
-    except ValueError as error:
-        reason = str(error).split(";")[0].rstrip(".")
-        reason = re.sub(r"(?<=row )\d+", lambda number: str(int(number[0]) + before), reason)
-        raise InputError(f"not a table of numbers: {reason} of the points") from error
 
 
 def declared(name: str, column: NDArray[np.float64], dtype: DTypeLike) -> NDArray:

@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -135,9 +135,10 @@ def is_number(word: str, decimal: str = ".") -> bool:
 class Dialect:
     """How the rows of a table are written.
 
-    separator: "blank", "tab", "comma" or "semicolon". decimal: "." or ",". needs_blank: whether a comma
-    separates only where a blank follows, as in "1,25, 2,50". is_certain: False where each comma could be a
-    mark of thousands.
+    separator:   "blank", "tab", "comma", "semicolon", or the character itself
+    decimal:     "." or ","
+    needs_blank: whether a comma separates only where a blank follows, as in "1,25, 2,50"
+    is_certain:  False where each comma could be a mark of thousands
     """
 
     separator: str = "blank"
@@ -148,7 +149,7 @@ class Dialect:
     @property
     def delimiter(self) -> str | None:
         """The separator as numpy takes it: None for blanks."""
-        return SEPARATORS[self.separator]
+        return SEPARATORS.get(self.separator, self.separator)
 
     def decisions(self, corrected: Iterable[str] = ()) -> tuple[Decision, Decision]:
         """The separator and the decimal mark. corrected: those of the two that the user stated."""
@@ -366,6 +367,14 @@ def parse_table(
         done += len(part)
     table.resize((done, table.shape[1]), refcheck=False)
     return table
+
+
+def looked_at(lines: Iterable[str], most: int | None = None) -> tuple[Dialect, Iterator[str]]:
+    """How the rows of a stream are written, and all its lines. most: lines that may be taken."""
+    lines = iter(lines)
+    head = _batch(lines, _LOOKED_AT if most is None else min(most, _LOOKED_AT))
+    is_plain = not any(mark in line for line in head for mark in ",;")
+    return PLAIN if is_plain else dialect_of(head), chain(head, lines)
 
 
 def _batch(lines: Iterator[str], most: int) -> list[str]:
