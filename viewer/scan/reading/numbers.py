@@ -228,7 +228,7 @@ def dialect_of(lines: Iterable[str], separator: str | None = None, decimal: str 
     scores = [_score(one, sample) for one in candidates]
     most = max((score.lines for score in scores), default=0)
     usable = [(score, one) for score, one in zip(scores, candidates, strict=True) if 2 * score.lines >= most]
-    _, best = max(usable, key=lambda pair: pair[0][1:], default=(None, PLAIN))
+    best = max(usable, key=lambda pair: pair[0][1:])[1] if usable else PLAIN
     if best.decimal == "," and decimal is None and _could_be_thousands(best, sample):
         return Dialect(best.separator, ",", is_certain=False)
     return best
@@ -260,8 +260,8 @@ def _score(dialect: Dialect, sample: Sequence[str]) -> _Score:
             counts.setdefault(len(words), []).append(found)
     if not counts:
         return _Score(0, 0, 0)
-    width, found = max(counts.items(), key=lambda item: (len(item[1]), item[0]))
-    return _Score(len(found), sum(found), sum(found) / (len(found) * width))
+    width, each = max(counts.items(), key=lambda item: (len(item[1]), item[0]))
+    return _Score(len(each), sum(each), sum(each) / (len(each) * width))
 
 
 def _is_spaced(sample: Sequence[str], separator: str | None, decimal: str | None) -> bool:
