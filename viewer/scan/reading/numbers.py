@@ -309,14 +309,14 @@ def check_commas(rows: Iterable[Sequence[str]]) -> None:
 # --- tables -------------------------------------------------------------------------------------
 
 
-class Cells(NamedTuple):
+class TableRow(NamedTuple):
     """The words of a line of a table; numbers have a decimal point. line: its number, from 1."""
 
     line: int
     words: list[str]
 
 
-def cells(lines: Iterable[str], dialect: Dialect | None = None) -> Iterator[Cells]:
+def cells(lines: Iterable[str], dialect: Dialect | None = None) -> Iterator[TableRow]:
     """The words of all lines that are not blank and no comments, numbers with a decimal point.
 
     dialect: found by `dialect_of` where it is None; then all lines are held.
@@ -327,7 +327,7 @@ def cells(lines: Iterable[str], dialect: Dialect | None = None) -> Iterator[Cell
     for number, line in enumerate(lines, 1):
         if line.strip() and not is_comment(line):
             words = words_of(line, dialect)
-            yield Cells(number, [_cell(word, dialect.decimal) for word in words])
+            yield TableRow(number, [_cell(word, dialect.decimal) for word in words])
 
 
 def _cell(word: str, decimal: str) -> str:
