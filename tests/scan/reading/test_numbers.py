@@ -9,7 +9,7 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.reading import numbers
-from viewer.scan.reading.numbers import Dialect, dialect_of, parse_table
+from viewer.scan.reading.numbers import Dialect, dialect_of, parse_numbers
 
 ROWS = [[1.25, -2.5, 1000.75], [4.5, 5.25, 6.125]]
 
@@ -24,7 +24,7 @@ def written(separator: str, decimal: str = ".") -> list[str]:
 def test_separators_and_decimal_marks(separator: str, decimal: str, head: str) -> None:
     lines = written(separator, decimal)
     dialect = dialect_of([head, *lines] if head else lines)
-    np.testing.assert_array_equal(parse_table(lines, dialect=dialect), ROWS)
+    np.testing.assert_array_equal(parse_numbers(lines, dialect=dialect), ROWS)
     assert dialect.decimal == decimal
     assert dialect.is_certain
 
@@ -89,18 +89,18 @@ def test_numbers_with_decimal_commas(word: str, expected: float) -> None:
     ("word", "decimal"), [("1,5", "."), ("1.5", ","), ("six", "."), ("", "."), ("1,2,3", ",")]
 )
 def test_words_that_are_no_numbers(word: str, decimal: str) -> None:
-    assert not numbers.is_number(word, decimal)
+    assert not numbers.is_numeral(word, decimal)
     with pytest.raises(ValueError, match="is not a number"):
         numbers.value(word, decimal)
 
 
 def test_a_sign_inside_a_number_begins_no_comment() -> None:
     lines = ["1 2 1.#QNAN # missing\n", "4 5 -1.#IND // too\n", "# between\n", "\n", "7 8 9\n"]
-    np.testing.assert_array_equal(parse_table(lines), [[1, 2, np.nan], [4, 5, np.nan], [7, 8, 9]])
+    np.testing.assert_array_equal(parse_numbers(lines), [[1, 2, np.nan], [4, 5, np.nan], [7, 8, 9]])
 
 
 def test_cells_that_are_absent() -> None:
-    table = parse_table(["1,,3\n", "NA,5,#N/A\n"], dialect=Dialect("comma"))
+    table = parse_numbers(["1,,3\n", "NA,5,#N/A\n"], dialect=Dialect("comma"))
     np.testing.assert_array_equal(table, [[1, np.nan, 3], [np.nan, 5, np.nan]])
 
 
@@ -114,12 +114,12 @@ def test_cells_that_are_absent() -> None:
 )
 def test_rows_that_cannot_be_read(text: str, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
-        parse_table(text.splitlines(keepends=True))
+        parse_numbers(text.splitlines(keepends=True))
 
 
 def test_counts_between_rows() -> None:
     counts: list[int] = []
-    table = parse_table(["1 2 3\n", "2\n", "4 5 6\n", "7 8 9\n"], (0, 1, 2), counts=counts)
+    table = parse_numbers(["1 2 3\n", "2\n", "4 5 6\n", "7 8 9\n"], (0, 1, 2), counts=counts)
     assert len(table) == 3
     assert counts == [2]
 
@@ -143,7 +143,7 @@ def test_encodings(codec: str, name: str) -> None:
     text = "Höhe x y z\n1 2 3\n"
     data = text.encode(codec)
     assert numbers.encoding_decision(data).value == name
-    assert numbers.text_of(data) == text
+    assert numbers.decoded(data) == text
     assert numbers.codec_of(numbers.encoding_decision(data, "latin-1"), data) == "cp1252"
 
 

@@ -176,7 +176,7 @@ def parse_table(
     delimiter: str | None = None,
     rows: int | None = None,
 ) -> NDArray[np.float64]:
-    """Numbers from lines of text, (N, C) float64, as `numbers.parse_table` reads them.
+    """Numbers from lines of text, (N, C) float64, as `numbers.parse_numbers` reads them.
 
     delimiter: between the values; None: blanks, or what `numbers.dialect_of` finds, decimal commas too.
     """
@@ -184,7 +184,7 @@ def parse_table(
         dialect, lines = numbers.looked_at(lines, rows)
     else:
         dialect = numbers.Dialect(delimiter)
-    return numbers.parse_table(lines, columns, dialect, rows)
+    return numbers.parse_numbers(lines, columns, dialect, rows)
 
 
 def whole_numbers(rows: Sequence[Sequence[str]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

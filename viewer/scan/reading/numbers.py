@@ -70,7 +70,7 @@ def codec_of(encoding: Decision, head: bytes) -> str:
     return _CODECS[encoding.value] if encoding.source == "user" else encoding_of(head)
 
 
-def text_of(data: bytes) -> str:
+def decoded(data: bytes) -> str:
     """A whole text, without a byte-order mark. Bytes that the encoding does not have become U+FFFD."""
     return data.decode(encoding_of(data[:HEAD]), "replace").removeprefix("\ufeff")
 
@@ -117,7 +117,7 @@ def point_form(word: str, decimal: str = ".") -> str:
     return word.replace(",", "") if "," in word and _THOUSANDS.fullmatch(word) else word
 
 
-def is_number(word: str, decimal: str = ".") -> bool:
+def is_numeral(word: str, decimal: str = ".") -> bool:
     """Whether a word is a number as `value` reads them."""
     if "_" in word:  # which Python allows among digits
         return False
@@ -177,7 +177,7 @@ _BETWEEN = re.compile(r"[ \t]*,[ \t]+")
 _WORDS = re.compile(r'"[^"]*"|\S+')
 
 
-def words_of(line: str, dialect: Dialect = PLAIN) -> list[str]:
+def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
     """The words of a line, without quotes and blanks around them, as the file spells them."""
     line = line.strip()
     if dialect.needs_blank:
@@ -253,10 +253,10 @@ class _Score(NamedTuple):
 
 
 def _score(dialect: Dialect, sample: Sequence[str]) -> _Score:
-    rows = [words_of(without_comment(line), dialect) for line in sample]
+    rows = [split_line(without_comment(line), dialect) for line in sample]
     counts: dict[int, list[int]] = {}
     for words in rows:
-        if found := sum(is_number(word, dialect.decimal) for word in words):
+        if found := sum(is_numeral(word, dialect.decimal) for word in words):
             counts.setdefault(len(words), []).append(found)
     if not counts:
         return _Score(0, 0, 0)
@@ -268,7 +268,7 @@ def _is_spaced(sample: Sequence[str], separator: str | None, decimal: str | None
     """Whether commas are decimal marks and, with a blank behind them, separators too: "1,25, 2,50"."""
     if separator not in (None, "comma") or decimal not in (None, ","):
         return False
-    rows = [words for line in sample if len(words := words_of(line, _SPACED)) > 1]
+    rows = [words for line in sample if len(words := split_line(line, _SPACED)) > 1]
     rows = [words for words in rows if any("," in word for word in words)]
     if not rows or len({len(words) for words in rows}) != 1:
         return False
@@ -278,8 +278,8 @@ def _is_spaced(sample: Sequence[str], separator: str | None, decimal: str | None
 
 
 def _could_be_thousands(dialect: Dialect, sample: Sequence[str]) -> bool:
-    marked = [word for line in sample for word in words_of(line, dialect) if "," in word]
-    numbers = [word for word in marked if is_number(word, ",")]
+    marked = [word for line in sample for word in split_line(line, dialect) if "," in word]
+    numbers = [word for word in marked if is_numeral(word, ",")]
     return bool(numbers) and all(_LIKE_THOUSANDS.fullmatch(word) for word in numbers)
 
 
@@ -326,16 +326,16 @@ def cells(lines: Iterable[str], dialect: Dialect | None = None) -> Iterator[Tabl
         dialect = dialect_of(lines)
     for number, line in enumerate(lines, 1):
         if line.strip() and not is_comment(line):
-            words = words_of(line, dialect)
+            words = split_line(line, dialect)
             yield TableRow(number, [_cell(word, dialect.decimal) for word in words])
 
 
 def _cell(word: str, decimal: str) -> str:
     plain = point_form(word, decimal)
-    return plain if plain != word and is_number(plain) else word
+    return plain if plain != word and is_numeral(plain) else word
 
 
-def parse_table(
+def parse_numbers(
     lines: Iterable[str],
     columns: Sequence[int] | None = None,
     dialect: Dialect = PLAIN,
@@ -408,7 +408,7 @@ def _parse_rows(
     plain, delimiter = batch, dialect.delimiter
     if dialect.decimal == ",":
         if "." in text or '"' in text:
-            return _parse_words(batch, columns, dialect, before, counts)
+            return _parse_line_by_line(batch, columns, dialect, before, counts)
         if dialect.needs_blank:
             text, delimiter = _BETWEEN.sub(";", text), ";"
         plain = text.replace(",", ".").split("\n")
@@ -418,10 +418,10 @@ def _parse_rows(
             plain, usecols=columns, delimiter=delimiter, comments=None, quotechar=quote, ndmin=2
         )
     except ValueError:  # numpy knows fewer numbers, no comments, and counts rows from the first of these
-        return _parse_words(batch, columns, dialect, before, counts)
+        return _parse_line_by_line(batch, columns, dialect, before, counts)
 
 
-def _parse_words(
+def _parse_line_by_line(
     batch: Iterable[str],
     columns: Sequence[int] | None,
     dialect: Dialect,
@@ -431,7 +431,7 @@ def _parse_words(
     """As `_parse_rows`, word by word."""
     rows: list[list[float]] = []
     for line in batch:
-        words = words_of(without_comment(line), dialect)
+        words = split_line(without_comment(line), dialect)
         if not any(words):
             continue
         if counts is not None and len(words) == 1 and words[0].isdecimal() and len(words[0]) < 19:
@@ -456,7 +456,7 @@ def _number(word: str, decimal: str, row: int, column: int) -> float:
     except ValueError:
         what = f"row {row:,}, column {column}: {shortened(word)!r} is not a number"
         other = "," if decimal == "." else "."
-        is_other = is_number(word, other)
+        is_other = is_numeral(word, other)
         hint = f"If it is one, read the file with --read decimal={other}" if is_other else None
         raise InputError(what, hint=hint) from None
 
