@@ -66,7 +66,7 @@ def encoding_decision(head: bytes, corrected: str | None = None) -> Decision:
 
 
 def codec_of(encoding: Decision, head: bytes) -> str:
-    """What Python calls the encoding of a text."""
+    """The encoding of a text as Python names it."""
     return _CODECS[encoding.value] if encoding.source == "user" else encoding_of(head)
 
 
@@ -428,7 +428,7 @@ def _parse_line_by_line(
     before: int,
     counts: list[int] | None,
 ) -> NDArray[np.float64]:
-    """As `_parse_rows`, word by word."""
+    """The same rows as of `_parse_rows`, read word by word."""
     rows: list[list[float]] = []
     for line in batch:
         words = split_line(without_comment(line), dialect)
