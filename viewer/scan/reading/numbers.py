@@ -428,7 +428,7 @@ def _parse_line_by_line(
     before: int,
     counts: list[int] | None,
 ) -> NDArray[np.float64]:
-    """The same rows as of `_parse_rows`, read word by word."""
+    """The rows of a few lines, (N, C), word by word; arguments as those of `_parse_rows`."""
     rows: list[list[float]] = []
     for line in batch:
         words = split_line(without_comment(line), dialect)
