@@ -53,6 +53,35 @@ def test_info_as_text(run: Run, scans: Path) -> None:
     assert lines["colors"].startswith("uint8 x 4")
 
 
+def test_info_says_how_it_read_the_scan(run: Run, tmp_path: Path) -> None:
+    """One line on the contents, one on what it assumes; --verbose and --json say all."""
+    table = tmp_path / "points.xyz"
+    table.write_text("1 2 3\n4 5 6\n7 8 10\n")
+    short = run("info", table).out
+    assert "columns x y z" in re.search("^read as .*$", short, re.M)[0]  # type: ignore[index]
+    assert "unit units" in re.search("^assumed .*$", short, re.M)[0]  # type: ignore[index]
+    assert "how Scan4D read" not in short
+    assert "Alternatives: mm, m, cm" in run("info", table, "--verbose").out
+    record = json.loads(run("info", table, "--json").out)["reading"]
+    assert record["decisions"]["columns"]["value"] == ["x", "y", "z"]
+    assert set(record["assumed"]) == {"columns", "unit"}
+
+
+def test_corrections_of_the_command_line(run: Run, tmp_path: Path) -> None:
+    """They may stand in several options, and before the scan."""
+    table = tmp_path / "points.xyz"
+    table.write_text("1 2 3 4\n5 6 7 8\n")
+    done = run("info", "--read", "columns=- x y z", "unit=mm", "--read", "decimal=.", table, "--json")
+    facts = json.loads(done.out)
+    assert facts["bounds"]["low"] == [2, 3, 4]
+    assert facts["reading"]["decisions"]["unit"]["from"] == "--read"
+    assert "decimal=." in done.err
+    refused = run("info", table, "--read", "columms=x y z")
+    assert refused.code == 2
+    assert "Did you mean 'columns'" in refused.err
+    assert run("info", table, "--read", "decimal").code == 2
+
+
 def test_info_reads_the_first_readable_pose_alone(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -62,9 +91,9 @@ def test_info_reads_the_first_readable_pose_alone(
     read: list[str] = []
     original = formats.read
 
-    def noted(path: Path, *rest: int) -> PointCloud:
+    def noted(path: Path, *rest: int, **named: object) -> PointCloud:
         read.append(path.name)
-        return original(path, *rest)
+        return original(path, *rest, **named)
 
     monkeypatch.setattr(formats, "read", noted)
     done = run("info", tmp_path, "--json")

@@ -335,3 +335,60 @@ def test_a_folder_that_holds_another_scan_says_so(tmp_path: Path) -> None:
     )
     assert told(tmp_path / "frames") == []
     assert told(tmp_path / "whole9.ply") == []
+
+
+def test_corrections_are_part_of_the_record(tmp_path: Path) -> None:
+    table = tmp_path / "points.xyz"
+    table.write_text("1 2 3 4\n5 6 7 8\n9 1 2 3\n")
+    with open_scan(table, read={"columns": "intensity x y z", "unit": "mm"}) as timeline:
+        cloud = timeline.pose(0).cloud
+        record = timeline.reading
+    np.testing.assert_allclose(cloud.world(), [(2, 3, 4), (6, 7, 8), (1, 2, 3)])
+    np.testing.assert_allclose(cloud.scalars["intensity"], [1, 5, 9])
+    assert (record["columns"].value, record["columns"].source) == (["intensity", "x", "y", "z"], "user")
+    assert (record["unit"].value, record["unit"].source) == ("mm", "user")
+    assert not [message for message in timeline.messages if message.kind == "correction"]
+
+
+def test_a_correction_that_changes_nothing_is_reported_once(tmp_path: Path) -> None:
+    for index in range(2):
+        np.save(tmp_path / f"{index}.npy", np.zeros((2, 3), np.float32) + index)
+    with open_scan(tmp_path, read={"texture": "dense"}) as timeline:
+        list(timeline)
+        told = [message.text for message in timeline.messages if message.kind == "correction"]
+    assert told == ["Scan4D does not use the correction texture=dense here"]
+
+
+def test_columns_that_do_not_fit_the_file_are_refused(tmp_path: Path) -> None:
+    (tmp_path / "points.xyz").write_text("1 2 3 4\n")
+    with (
+        open_scan(tmp_path / "points.xyz", read={"columns": "x y z"}) as timeline,
+        pytest.raises(InputError, match=r"3 roles, but the file has 4 columns"),
+    ):
+        timeline.pose(0)
+
+
+def test_colors_and_normals_can_be_left_out(tmp_path: Path) -> None:
+    (tmp_path / "p.csv").write_text("x,y,z,nx,ny,nz,r,g,b\n1,2,3,0,0,1,9,9,9\n2,2,2,0,0,1,9,200,9\n")
+    with open_scan(tmp_path / "p.csv", read={"normals": "none", "colors": "none"}) as timeline:
+        cloud = timeline.pose(0).cloud
+        assert [timeline.reading[key].source for key in ("normals", "colors")] == ["user", "user"]
+    assert cloud.normals is None
+    assert cloud.colors is None
+    assert not cloud.scalars
+
+
+def test_the_record_says_where_times_and_frames_come_from(tmp_path: Path) -> None:
+    for index in range(2):
+        np.save(tmp_path / f"f{index}.npy", np.zeros((2, 3), np.float32) + index)
+    with open_scan(tmp_path) as timeline:
+        times, frames = timeline.reading["times"], timeline.reading["frames"]
+        assert times.source == "assumed"
+        assert "times" in timeline.reading.assumed
+        assert frames.source == "folder"
+    with open_scan(tmp_path, fps=50) as timeline:
+        assert timeline.reading["times"].source == "user"
+    (tmp_path / "times.csv").write_text("file,time\nf0.npy,0\nf1.npy,1\n")
+    with open_scan(tmp_path) as timeline:
+        times = timeline.reading["times"]
+        assert (times.source, times.where) == ("neighbour", "times.csv")

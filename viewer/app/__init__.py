@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 class Start(NamedTuple):
     """Choices that a window begins with, beside its scans.
 
-    unit, fps, up: that the command line states for all scans; None: it states none. device: has no effect on
+    unit, fps, up: that the command line states for all scans; None: it states none. corrections: of how
+    Scan4D reads the scans that it names, as `--read` takes them. device: has no effect on
     a window, which says so. replay: a recording to show first. session: to open the first scan with. refused:
     what was wrong with what the user named, to be reported.
     """
@@ -28,6 +29,7 @@ class Start(NamedTuple):
     replay: Path | None = None
     session: SavedSession | None = None
     refused: InputError | None = None
+    corrections: Mapping[str, str] | None = None
 
 
 def run(
@@ -55,7 +57,7 @@ def run(
         up_vector(start.up)
     found, problems = named_scans(scans)
     is_lost, found = not found, found or [DEMO]
-    timeline = opened or open_scan(found[0], start.unit, start.fps)
+    timeline = opened or open_scan(found[0], start.unit, start.fps, start.corrections)
     from .closing import Signals
 
     with Signals() as signals:
@@ -76,7 +78,7 @@ def run(
             raise
         try:
             with uncollected():  # tools are imported
-                stated = StatedOptions(start.unit, start.fps, start.up)
+                stated = StatedOptions(start.unit, start.fps, start.up, start.corrections)
                 app = App(window, found, timeline, stored, stated, start.session)
             try:
                 for note in notes:

@@ -32,11 +32,15 @@ log = logging.getLogger(__name__)
 
 
 class StatedOptions(NamedTuple):
-    """The unit, rate and up axis that the command line states for all scans; None: it states none."""
+    """The unit, rate and up axis that the command line states for all scans; None: it states none.
+
+    corrections: of how Scan4D reads the scans that the command line names, as `--read` takes them.
+    """
 
     unit: str | None = None
     fps: float | None = None
     up: str | None = None
+    corrections: Mapping[str, str] | None = None
 
 
 class App:

@@ -54,7 +54,7 @@ class Tasks(WindowPart):
         preparing = self.viewport.renderer.work.preparing
         tasks = [self.exporting.task, self.capture.task, preparing, self.opener.job.task, *self.tools.tasks]
         if self.playback.pose is None:
-            tasks.append(self.playback.timeline.reading)
+            tasks.append(self.playback.timeline.loading)
         return [task for task in tasks if task is not None]
 
     @property
@@ -89,7 +89,7 @@ class Tasks(WindowPart):
 
     def cancel(self, task: Task) -> None:
         """Stop a piece of the work; what was shown before it stays."""
-        is_reported = task is self.playback.timeline.reading  # by what the timeline says of the frame
+        is_reported = task is self.playback.timeline.loading  # by what the timeline says of the frame
         if task is self.opener.job.task:
             self.opener.job.cancel()
         elif task is self.viewport.renderer.work.preparing:

@@ -158,6 +158,19 @@ def _common_arguments() -> _Parser:
     group.add_argument(
         "--fps", type=float, metavar="F", help="frame rate of the scan, and of a film, in frames per second"
     )
+    group.add_argument(
+        "--read",
+        action=_Corrections,
+        type=_pair,
+        nargs="+",
+        default={},
+        metavar="KEY=VALUE",
+        help="correct how Scan4D reads the scan, for example decimal=, or unit=mm. 'scan4d info --verbose' "
+        "lists the decisions",
+    )
+    group.add_argument(
+        "--take", metavar="NAME", help="which scan of a folder that holds several, or all as one scan"
+    )
     group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: guessed")
     group.add_argument(
         "-q",
@@ -167,6 +180,24 @@ def _common_arguments() -> _Parser:
     )
     group.add_argument("--debug", action="store_true", help="print the tracebacks of errors")
     return parser
+
+
+class _Corrections(Action):
+    """Collects `--read KEY=VALUE` into one dictionary."""
+
+    def __call__(
+        self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: str | None = None
+    ) -> None:
+        setattr(namespace, self.dest, {**getattr(namespace, self.dest), **dict(values)})
+
+
+def _pair(text: str) -> tuple[str, str]:
+    """KEY=VALUE of `--read`. Raises InputError where it is unusable."""
+    from ..scan.reading.corrections import parsed_pair
+
+    if "=" not in text:
+        raise ArgumentTypeError(f"'{shortened(text)}' is not KEY=VALUE")
+    return parsed_pair(text)
 
 
 def _up(text: str) -> str:

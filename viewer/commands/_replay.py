@@ -35,6 +35,7 @@ from . import _drawing as drawing
 from ._console import warn
 from ._drawing import Plan
 from ._outputs import claim
+from ._scans import stated_corrections
 
 # Arguments that a recording replaces.
 _OF_RECORDING = (
@@ -65,7 +66,11 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
     for scan in dict.fromkeys(args.scan or entry.scan for entry in entries):
         with suppress(InputError):
             if scan is not None:
-                with open_scan(scan) if args.scan else _open(scan, args.replay)[1] as timeline:
+                with (
+                    open_scan(scan, read=stated_corrections(args))
+                    if args.scan
+                    else _open(scan, args.replay)[1] as timeline
+                ):
                     yield from scan_inputs(timeline)
 
 
@@ -166,7 +171,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
     the one that was named is another one.
     """
     if args.scan is not None:
-        found, timeline = args.scan, open_scan(args.scan)
+        found, timeline = args.scan, open_scan(args.scan, read=stated_corrections(args))
     elif entry.scan is None:
         hint = f"Name the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
         raise InputError("does not name its scan", args.replay, hint)

@@ -42,8 +42,13 @@ def add_pose_arguments(parser: ArgumentParser) -> None:
 
 
 def open_timeline(args: Namespace, scan: str) -> Timeline:
-    """Open a scan with the unit and the frame rate of the command line. Raises InputError."""
-    return open_scan(scan, unit=args.unit, fps=args.fps)
+    """Open a scan with the unit, the rate and the corrections of the command line. Raises InputError."""
+    return open_scan(scan, unit=args.unit, fps=args.fps, read=stated_corrections(args))
+
+
+def stated_corrections(args: Namespace) -> dict[str, str]:
+    """The corrections of the command line, with the take as one of them."""
+    return {**args.read, **({} if args.take is None else {"take": args.take})}
 
 
 def chosen_poses(args: Namespace, timeline: Timeline) -> list[int] | None:

@@ -22,6 +22,7 @@ from ..scan.points import PointCloud, finite_rows
 from ..scan.pose import Pose
 from ..scan.range_folders import RangeFrames
 from ..scan.range_view import RangeView
+from ..scan.reading.record import Reading
 from ..scan.sources import FrameSource
 from ..scan.timeline import Timeline
 from ._console import escaped
@@ -32,6 +33,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d info`."""
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     parser.add_argument("--json", action="store_true", help="print a JSON object")
+    parser.add_argument(
+        "--verbose", action="store_true", help="print every decision about how Scan4D reads the scan"
+    )
 
 
 def run(args: Namespace) -> int:
@@ -43,8 +47,10 @@ def run(args: Namespace) -> int:
     with open_timeline(args, args.scan) as timeline:
         pose = first_readable(timeline, range(len(timeline)))
         report(timeline, 0)
-        facts = scan_facts(timeline, pose)
-    print(json.dumps(facts, indent=2, allow_nan=False) if args.json else _as_text(facts))
+        facts, record = scan_facts(timeline, pose), timeline.reading
+    print(
+        json.dumps(facts, indent=2, allow_nan=False) if args.json else _as_text(facts, record, args.verbose)
+    )
     return 0
 
 
@@ -75,6 +81,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         "bytes": pose.nbytes,
         "views": [_view_facts(view) for view in pose.views],
         "beside": [message.text for message in timeline.messages if message.kind == "beside"],
+        "reading": timeline.reading.to_json(),
         "origin": pose.origin.tolist(),
         "bounds": {"low": (pose.origin + found.low).tolist(), "high": (pose.origin + found.high).tolist()},
         "attributes": {
@@ -166,7 +173,7 @@ def _range(values: NDArray) -> list[float] | None:
     return [float(finite.min()), float(finite.max())] if finite.size else None
 
 
-def _as_text(facts: dict[str, Any]) -> str:
+def _as_text(facts: dict[str, Any], record: Reading, verbose: bool) -> str:
     times, unit, broken = facts["times"], facts["unit"], facts["unreadable"]
     low, high = facts["bounds"]["low"], facts["bounds"]["high"]
     poses = f"{facts['poses']}"
@@ -184,6 +191,7 @@ def _as_text(facts: dict[str, Any]) -> str:
         ("points", points),
         *(("view", _shown_view(view)) for view in facts["views"]),
         *(("beside", text) for text in facts["beside"]),
+        *record.lines(),
         ("unit", unit),
         ("size", " x ".join(f"{b - a:g}" for a, b in zip(low, high, strict=True))),
         ("from", ", ".join(f"{value:g}" for value in low)),
@@ -195,6 +203,8 @@ def _as_text(facts: dict[str, Any]) -> str:
         span = "no finite value" if attribute["range"] is None else "{:g} to {:g}".format(*attribute["range"])
         columns = f" x {attribute['columns']}" if attribute["columns"] > 1 else ""
         rows.append((name, f"{attribute['type']}{columns}, {span}"))
+    if verbose:
+        rows += [("", ""), ("how Scan4D read this scan", ""), *record.lines(verbose=True)]
     return _in_columns(rows)
 
 

@@ -30,7 +30,7 @@ from ..scan.timeline import Timeline
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
-from ._scans import SCAN_HELP, framing, open_timeline, read_poses, stated_upright
+from ._scans import SCAN_HELP, framing, open_timeline, read_poses, stated_corrections, stated_upright
 from .doctor import display
 
 _SIZE = (1200, 800)
@@ -124,7 +124,16 @@ def _open_window(args: Namespace, named: _Named, first: Timeline, refused: Input
         )
     from .. import app
 
-    start = app.Start(args.unit, args.fps, args.up, args.device, named.replay, named.session, refused)
+    start = app.Start(
+        args.unit,
+        args.fps,
+        args.up,
+        args.device,
+        named.replay,
+        named.session,
+        refused,
+        stated_corrections(args),
+    )
     return app.run(named.scans, start, opened=first)
 
 

@@ -150,7 +150,7 @@ class PointContents:
     held:     bytes of the file in memory, for the admission of what is made of it; None: not packed
     """
 
-    columns: dict[str, Column] = field(default_factory=dict)
+    columns: dict[str, NDArray] = field(default_factory=dict)
     is_named: bool = True
     arrays: Mapping[str, ArrayInFile] = field(default_factory=dict)
     stated: Stated = field(default_factory=Stated)

@@ -7,7 +7,7 @@ import glob
 import itertools
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +15,14 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, shortened
 from . import formats
-from .points import UNKNOWN_UNIT
 from .range_folders import find_range_frames, lacking_part, pods
+from .reading.corrections import NOTHING_CORRECTED, Corrections
+from .reading.record import Aside, Decision
+from .reading.sequence import Decided
+from .reading.unit import decide as decide_unit
 from .sources import FACES_FILE, FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
-from .times import DEFAULT_FPS, TIMES_FILE, natural_key, paced_times, times_in_names
+from .times import DEFAULT_FPS, TIMES_FILE, frame_numbers, natural_key, paced_times, times_in_names
 from .units import checked_unit, usable_unit
 
 DEMO = "demo"
@@ -37,26 +40,41 @@ def is_demo(scan: str | None) -> bool:
     return scan is not None and (scan == DEMO or scan.startswith(f"{DEMO}:"))
 
 
-def open_scan(path: str | os.PathLike[str], unit: str | None = None, fps: float | None = None) -> Timeline:
+def open_scan(
+    path: str | os.PathLike[str],
+    unit: str | None = None,
+    fps: float | None = None,
+    read: Mapping[str, str] | None = None,
+    take: str | None = None,
+) -> Timeline:
     """Open a scan without reading any frame.
 
     path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo", of which
     "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed. unit: the
     name of its unit of length, for example "mm"; None: what the scan states, else "units". fps: frame numbers
     a second, where no times.csv states the times. Without it the times stored in the file count, and without
-    those 25 a second. Raises InputError where there is nothing to open, and says what is near.
+    those 25 a second. read: corrections of how Scan4D reads it, key -> text, as `--read` takes them. take:
+    which scan of a folder that holds several. Raises InputError where there is nothing to open, and says what
+    is near, and where a correction is unusable.
     """
     if fps is not None and not (np.isfinite(fps) and fps > 0):
         raise InputError(f"Scan4D cannot use a frame rate of {fps}", hint="Give frames per second above 0")
-    unit = unit and checked_unit(unit)
-    source = find_source(path)
+    corrections = Corrections.parse({**(read or {}), **({"take": take} if take else {})})
+    unit = unit or corrections.get("unit")
+    if unit is not None:
+        corrections = corrections.amended({"unit": checked_unit(unit)})
+    source = find_source(path, corrections)
     recorded = source.times()
     measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
     if recorded is None or (fps is not None and not measured):
         recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
     stated, others = source.unit, left_aside(path, source)
-    timeline = Timeline(source, recorded, unit or usable_unit(stated) or UNKNOWN_UNIT)
+    unit_decision = decide_unit(stated, corrections=corrections)
+    timeline = Timeline(source, recorded, unit_decision.value)
     timeline.is_measured = measured
+    timeline.decided.replace(unit_decision)
+    _note_frames(timeline, fps)
+    timeline.decided.leave_aside(*(Aside(name, "may be a scan of its own") for name in others))
     if others:
         what = f"The folder also holds {_listed(others)}, which this scan does not use"
         timeline.messages.append(ScanMessage("beside", f"{what}. Open such a file by its name to see it."))
@@ -89,6 +107,39 @@ def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> Non
     if stated is None and fps is not None and not timeline.is_measured:
         stated = _paced(source, fps)
     timeline.retime(timeline.opened_with if stated is None else stated)
+    if stated is not None:
+        value = "names" if fps is None or by_names else f"fps:{fps:g}"
+        timeline.decided.replace(Decision("times", value, "user", "the panel", changes_numbers=True))
+
+
+def _note_frames(timeline: Timeline, fps: float | None) -> None:
+    """Put into the record which files are frames, and when the frames are."""
+    source, count = timeline.source, len(timeline)
+    if count < 2:
+        return
+    if isinstance(source, FileSequence):
+        names = [source.label(0), source.label(count - 1)]
+        why = f"{count} files in the order of their names"
+        timeline.decided.note(Decision("frames", f"{names[0]} to {names[1]}", "folder", why=why))
+    elif isinstance(source, MultiFrameFile):
+        timeline.decided.note(Decision("frames", f"{count} in one file", "file"))
+    timeline.decided.note(_times_decision(source, fps, timeline.is_measured))
+
+
+def _times_decision(source: FrameSource, fps: float | None, measured: bool) -> Decision:
+    if measured:
+        return Decision("times", TIMES_FILE, "neighbour", TIMES_FILE, changes_numbers=True)
+    if fps is not None:
+        return Decision("times", f"fps:{fps:g}", "user", "--fps", changes_numbers=True)
+    if source.times() is not None:
+        return Decision("times", "stored", "file", changes_numbers=True)
+    numbered = frame_numbers(_labels(source)) is not None
+    why = "Nothing states the times. Scan4D takes " + (
+        "the numbers in the names as frame numbers" if numbered else "the frames as evenly spaced"
+    )
+    others = ("names",) if times_in_names(_labels(source)) is not None else ()
+    value = f"fps:{DEFAULT_FPS:g}"
+    return Decision("times", value, "assumed", "", why, (*others, "fps:30", "fps:50", "fps:60"), True)
 
 
 def has_times_in_names(timeline: Timeline) -> bool:
@@ -107,8 +158,9 @@ def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
     return paced_times(_labels(source), fps)
 
 
-def find_source(path: str | os.PathLike[str]) -> FrameSource:
+def find_source(path: str | os.PathLike[str], corrections: Corrections = NOTHING_CORRECTED) -> FrameSource:
     """Find where the frames of the scan named `path` come from. Raises InputError."""
+    decided = Decided(corrections)
     path = os.fspath(path)
     if is_demo(path):
         from .demo import DemoSource
@@ -118,14 +170,16 @@ def find_source(path: str | os.PathLike[str]) -> FrameSource:
         path = os.path.dirname(path) or os.curdir
     if os.path.isdir(path):
         folder = Path(path)
-        found = find_range_frames(folder)
-        return _open_frames(folder_frames(folder), folder.resolve().name) if found is None else found
+        found = find_range_frames(folder, decided)
+        if found is not None:
+            return found
+        return _open_frames(folder_frames(folder), folder.resolve().name, decided)
     if os.path.isfile(path):
-        return _open_frames([Path(path)], Path(path).name)
+        return _open_frames([Path(path)], Path(path).name, decided)
     if os.path.exists(path):
         raise InputError("is neither a file nor a folder", path)
     if _PRINTF.search(path) or glob.has_magic(path):
-        return _open_pattern(path)
+        return _open_pattern(path, decided)
     raise _nothing_there(path)
 
 
@@ -150,14 +204,14 @@ def folder_frames(folder: Path) -> list[Path]:
     raise InputError("holds no scan files", folder, hint)
 
 
-def _open_pattern(pattern: str) -> FrameSource:
+def _open_pattern(pattern: str, decided: Decided) -> FrameSource:
     files = matches(pattern)
     if not files:
         raise InputError("matches no file", pattern, "Check the folder, and put the pattern in quotes")
     frames = _choose_frames(files, pattern)
     if not frames:
         raise InputError("matches no scan file", pattern, f"Known files: {_listed(formats.known_suffixes())}")
-    return _open_frames(frames, Path(pattern).name)
+    return _open_frames(frames, Path(pattern).name, decided)
 
 
 def matches(pattern: str) -> list[Path]:
@@ -210,10 +264,10 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     return sorted(itertools.chain(*by_kind.values()), key=lambda file: natural_key(str(file)))
 
 
-def _open_frames(files: list[Path], name: str) -> FrameSource:
-    if len(files) == 1 and (count := formats.frame_count(files[0])) > 1:
-        return MultiFrameFile(files[0], count)
-    return FileSequence(files, name)
+def _open_frames(files: list[Path], name: str, decided: Decided) -> FrameSource:
+    if len(files) == 1 and (count := formats.frame_count(files[0], decided)) > 1:
+        return MultiFrameFile(files[0], count, decided)
+    return FileSequence(files, name, decided)
 
 
 def _nothing_there(path: str) -> InputError:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -15,16 +16,22 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import printable
 from . import formats
+from .contents import PointContents
 from .faces import Faces
 from .points import PointCloud
 from .pose import Scanned
+from .reading.sequence import Decided
 from .times import TIMES_FILE, frame_in_words, read_times_csv
 
+_SAMPLES = 4  # frames beside the first one that an uncertain decision looks at
 FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces that all of them have
 
 
 class FrameSource(Protocol):
-    """A source of frames for a Timeline. Nothing is read before `load`, which several threads may call."""
+    """A source of frames for a Timeline. Nothing is read before `load`, which several threads may call.
+
+    It may have an attribute `decided`, the decisions about how Scan4D reads it.
+    """
 
     @property
     def name(self) -> str:
@@ -57,7 +64,9 @@ class FrameSource(Protocol):
 class FileSequence:
     """A sequence of files, one frame each, in the order given. paths: at least one."""
 
-    def __init__(self, paths: Sequence[Path], name: str) -> None:
+    def __init__(self, paths: Sequence[Path], name: str, decided: Decided | None = None) -> None:
+        self.decided = decided or Decided()
+        self.decided.samples = self._samples
         self.name = printable(name)
         self.files = tuple(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))
@@ -66,7 +75,7 @@ class FileSequence:
     def unit(self) -> str | None:
         """The unit that the first file states, where its format knows units."""
         try:
-            return formats.read_unit(self.files[0])
+            return formats.read_unit(self.files[0], self.decided)
         except InputError:  # reading its pose will say why
             return None
 
@@ -88,13 +97,14 @@ class FileSequence:
 
     def load(self, index: int) -> Scanned:
         path = self.files[index]
-        if (count := formats.frame_count(path)) > 1:
+        decided = self.decided.at(index)
+        if (count := formats.frame_count(path, decided)) > 1:
             raise InputError(
                 f"holds {count} frames, but each file of a sequence must hold one",
                 path,
                 "Open this file alone",
             )
-        scanned = formats.read(path)
+        scanned = formats.read(path, decided=decided)
         if not isinstance(scanned, PointCloud) or scanned.topology is not None:
             return scanned
         points, topology = self._shared_topology
@@ -102,7 +112,7 @@ class FileSequence:
 
     def faces(self, index: int) -> Faces:
         """The frame's own faces; where it has none, those of the file beside the frames."""
-        own = formats.read_faces(self.files[index])
+        own = formats.read_faces(self.files[index], decided=self.decided.at(index))
         return own if len(own) else self._shared_faces
 
     @cached_property
@@ -120,6 +130,15 @@ class FileSequence:
             mesh = None
         return (len(mesh) + mesh.dropped, mesh.topology) if mesh else (0, None)
 
+    def _samples(self) -> Iterator[PointContents]:
+        """The contents of some frames, spread evenly, for decisions that one frame leaves uncertain."""
+        last = len(self) - 1
+        for index in sorted({round(last * step / _SAMPLES) for step in range(_SAMPLES + 1)}):
+            with suppress(InputError):
+                found = formats.contents(self.files[index], 0, self.decided.at(index))
+                if found is not None:
+                    yield found
+
     def _beside(self, name: str) -> Path | None:
         """The file of this name beside the frames, or beside their folder where that is called `frames`."""
         folders = [self._folder, self._folder.parent] if self._folder.name == "frames" else [self._folder]
@@ -130,16 +149,17 @@ class FileSequence:
 class MultiFrameFile:
     """One file that holds all frames, such as NPY or NPZ with positions (T, N, 3), or SVO."""
 
-    def __init__(self, path: Path, count: int) -> None:
+    def __init__(self, path: Path, count: int, decided: Decided | None = None) -> None:
+        self.decided = decided or Decided()
         self.name = printable(path.name)
         self.files = (path,)
         self._path = path
         self._count = count
-        self._read = formats.frames(path)
+        self._read = formats.frames(path, self.decided)
 
     @cached_property
     def unit(self) -> str | None:
-        return formats.read_unit(self._path)
+        return formats.read_unit(self._path, self.decided)
 
     def __len__(self) -> int:
         return self._count
@@ -148,10 +168,10 @@ class MultiFrameFile:
         return f"{self.name} {frame_in_words(index)}"
 
     def times(self) -> NDArray[np.float64] | None:
-        return formats.read_times(self._path)
+        return formats.read_times(self._path, self.decided)
 
     def load(self, index: int) -> Scanned:
         return self._read(index)
 
     def faces(self, index: int) -> Faces:
-        return formats.read_faces(self._path, index)
+        return formats.read_faces(self._path, index, self.decided.at(index))

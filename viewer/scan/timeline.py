@@ -24,6 +24,8 @@ from .faces import Faces
 from .points import UNKNOWN_UNIT, PointCloud
 from .pose import Pose
 from .range_view import RangeView, in_one_unit
+from .reading.record import Reading
+from .reading.sequence import Decided, ReportKind
 from .sources import FrameSource
 from .times import frame_in_words
 from .units import usable_unit
@@ -39,10 +41,12 @@ class ScanMessage:
     kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite coordinate were left
     out), "shortened" (splats far larger than the scan were), "unit" (lengths in another unit than the scan's,
     or a name of it that is no unit), "assumed" (what range views do not state), "times" or "beside"
-    (files in its folder may be another scan). index: the frame; None where it concerns all.
+    (files in its folder may be another scan), "normals", "camera", "aside" (files that the scan leaves out),
+    "take" (its folder holds several), "contradiction" (a frame does not fit the scan's decisions) or
+    "correction" (one that nothing uses). index: the frame; None where it concerns all.
     """
 
-    kind: Literal["broken", "dropped", "shortened", "unit", "assumed", "times", "beside"]
+    kind: Literal["broken", "dropped", "shortened", "beside"] | ReportKind
     text: str
     index: int | None = None
 
@@ -61,6 +65,7 @@ class Timeline:
     is_measured: whether a file beside the frames states the times
     source:   where the frames come from
     opened_with: the times that it began with
+    decided:  how Scan4D reads it: `reading` is the record
     finish:   called with each pose on the thread that has read it, before anybody gets it; for what
               would take too long where it is shown
 
@@ -85,6 +90,7 @@ class Timeline:
         self.messages: list[ScanMessage] = []
         self.finish: Callable[[Pose], object] = lambda pose: None
         self.source = source
+        self.decided: Decided = getattr(source, "decided", None) or Decided()
         self._state = threading.Condition()  # guards all that follows
         self._cache = PoseCache(default_budget() if cache_bytes is None else cache_bytes)
         self._loading: dict[int, Future[Pose]] = {}
@@ -99,6 +105,7 @@ class Timeline:
         self._last_read: Callable[[], PointCloud | None] = lambda: None
         self._worker: threading.Thread | None = None
         self._reading: Task | None = None  # what the worker does
+        self._reported = 0  # messages about decisions
         self._closed = False
 
     def __len__(self) -> int:
@@ -133,6 +140,11 @@ class Timeline:
         return pose if pose.time == time else pose.at(time)
 
     @property
+    def reading(self) -> Reading:
+        """The record of how Scan4D reads the scan, as far as it has read frames."""
+        return self.decided.reading
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """The files that hold its frames; none for the demo."""
         return self.source.files
@@ -156,7 +168,7 @@ class Timeline:
             return dict(self._broken)
 
     @property
-    def reading(self) -> Task | None:
+    def loading(self) -> Task | None:
         """The work on the pose that was asked for last, while the worker is at it.
 
         Where it is cancelled, the frame counts as broken.
@@ -400,6 +412,7 @@ class Timeline:
         try:
             with np.errstate(all="ignore"):  # odd numbers in a file are data
                 scanned = self.source.load(index)
+                self._report_decisions()
                 if not isinstance(scanned, PointCloud):
                     scanned = self._in_unit(index, scanned)
                     for assumed in {view.assumed for view in scanned if view.assumed}:
@@ -411,6 +424,19 @@ class Timeline:
             raise
         except Exception as error:  # whatever a damaged file does to a reader, playing goes on
             raise InputError(f"cannot be read ({type(error).__name__}: {error})", label) from error
+
+    def _report_decisions(self) -> None:
+        """Pass on the messages about decisions, and name the corrections that none has used."""
+        for key in self.decided.ignored():
+            what = f"Scan4D does not use the correction {key}={self.decided.corrections.texts[key]} here"
+            self.decided.report("correction", what)
+        stated = self.reading["unit"]
+        with self._state:
+            if self.unit == UNKNOWN_UNIT and stated.source == "file" and stated.value is not None:
+                self.unit = stated.value  # by what the frame states, which opening did not read
+            reports = self.decided.reports(self._reported)
+            self._reported += len(reports)
+            self.messages += [ScanMessage(one.kind, one.text, one.frame) for one in reports]
 
     def _in_unit(self, index: int, views: tuple[RangeView, ...]) -> tuple[RangeView, ...]:
         """The views in the unit of the scan; a message says once that they have another one."""

@@ -66,7 +66,7 @@ class Loading(WindowPart):
             return Awaited(f"Loading {title(opening.scan)}", opening.task)
         if playback.problem is not None or self.viewport.problem is not None:
             return None
-        task = playback.timeline.reading or self.viewport.renderer.work.preparing
+        task = playback.timeline.loading or self.viewport.renderer.work.preparing
         if self.viewport.shows_another_scan:
             return Awaited(f"Loading {title(self.session.scan)}", task)
         if now <= self._since + _PATIENCE:

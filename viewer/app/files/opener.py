@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -30,8 +30,8 @@ log = logging.getLogger(__name__)
 class Opener(WindowPart):
     """Opens scans, and has all parts begin with each.
 
-    opened: the first scan. unit, fps, up: what the command line states of all scans. job: what is being
-    opened.
+    opened: the first scan. unit, fps, up: what the command line states of all scans. corrections: of how
+    Scan4D reads those that it names, which are `named`. job: what is being opened.
     """
 
     name = "opener"
@@ -47,6 +47,8 @@ class Opener(WindowPart):
     unit: str | None
     fps: float | None
     up: str | None
+    corrections: Mapping[str, str] | None
+    named: Sequence[str]
     tell_later: Callable[[Callable[[], str]], None]
     open_with: Callable[..., None]
     after: Callable[[str], str | None]
@@ -67,7 +69,8 @@ class Opener(WindowPart):
         self.notices.end("opening")
         left = self.session.left(scan)
         find = (lambda: find_stored(scan, self.up)) if left is None else lambda: left
-        self.job.start(scan, title(scan), find, lambda: open_scan(scan, self.unit, self.fps), session)
+        read = self.corrections if scan in self.named else None
+        self.job.start(scan, title(scan), find, lambda: open_scan(scan, self.unit, self.fps, read), session)
 
     def advance(self, now: float) -> None:
         """Show the scan that has been opened, where one has, and pass on what the timeline reports."""

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ..faces import Faces
 from ..points import PointCloud
+from ..reading.record import Decision
+from ..reading.sequence import Decided
 from ..times import frame_in_words
 from .asset import rest_points
 from .motion import PERIOD, move, turn
@@ -33,6 +35,8 @@ class DemoSource:
     def __init__(self, name: str = "demo") -> None:
         self.name = name
         self.motion = demo_motion(name)
+        self.decided = Decided()
+        self.decided.note(Decision("format", "the demo scan"))
 
     def __len__(self) -> int:
         return round(PERIOD * self.fps)

@@ -3,7 +3,8 @@
 A format module declares
 
 - `TITLE: str`, as messages name it, and `SUFFIXES: tuple[str, ...]`, lower case with the dot;
-- `read(path, frame=0) -> PointCloud`, or a tuple of RangeViews;
+- `contents(path, frame) -> PointContents`: what the file says, of which `reading/cloud.py` makes points;
+- or `read(path, frame=0) -> PointCloud`, or a tuple of RangeViews;
 - where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
   `read_times(path)` (seconds, (T,) float64, or None);
 - where it holds faces: `read_faces(path, frame=0) -> Iterator[Faces]`, in pieces, none where there are none;
@@ -13,6 +14,9 @@ A format module declares
   `write_views(path, views)`, or, all poses in one file,
   `write_poses(path, poses, unit, **options)` and `check(path)`, which says whether it can be read again.
 
+Each function that reads may have a parameter `decided`: the decisions about the scan, with the user's
+corrections (`reading/sequence.py`).
+
 A module may raise any exception: the functions below turn it into one InputError that names the file.
 Modules whose name starts with an underscore are helpers.
 """
@@ -21,7 +25,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -33,10 +37,14 @@ from ...errors import InputError, Scan4DError, explained, shortened, unknown_nam
 from ...extensions import load_modules, package_of
 from ...files import whole_file
 from ..admission import admit
+from ..contents import PointContents
 from ..faces import Faces
 from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
+from ..reading.cloud import assemble
+from ..reading.record import Decision
+from ..reading.sequence import Decided, ask
 from ..times import frame_in_words
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
@@ -82,49 +90,82 @@ def package_reading(path: Path) -> str:
     return package_of(module.__name__) if module else ""
 
 
-def frame_count(path: Path | str) -> int:
+def frame_count(path: Path | str, decided: Decided | None = None) -> int:
     """How many moments the file holds; reads no more than its header. Raises InputError."""
     path = Path(path)
     module = _readable(path)
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        return module.frame_count(path) if hasattr(module, "frame_count") else 1
+        if not hasattr(module, "frame_count"):
+            return 1
+        return ask(module.frame_count, path, decided=decided or Decided())
 
 
-def read_times(path: Path | str) -> NDArray[np.float64] | None:
+def read_times(path: Path | str, decided: Decided | None = None) -> NDArray[np.float64] | None:
     """The times stored with the moments of the file, (T,) seconds, or None. Raises InputError."""
     path = Path(path)
     module = _readable(path)
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        return module.read_times(path) if hasattr(module, "read_times") else None
+        if not hasattr(module, "read_times"):
+            return None
+        return ask(module.read_times, path, decided=decided or Decided())
 
 
-def read_unit(path: Path | str) -> str | None:
+def read_unit(path: Path | str, decided: Decided | None = None) -> str | None:
     """The name of the unit of length that the file states, which may be any text (see `usable_unit`); None
     if it states none. Raises InputError.
     """
     path = Path(path)
     module = _readable(path)
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        return module.read_unit(path) if hasattr(module, "read_unit") else None
+        if not hasattr(module, "read_unit"):
+            return None
+        return ask(module.read_unit, path, decided=decided or Decided())
 
 
-def read(path: Path | str, frame: int = 0) -> Scanned:
+def read(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Scanned:
     """One moment of a file as it is stored: points, at least one, or range views.
+
+    decided: the decisions about the scan that it belongs to; None: the file stands alone.
 
     Raises InputError where the path is not a readable file of a known format, where the file is
     empty or damaged or has no such frame, and where no point of it has finite coordinates.
     """
     path = Path(path)
     module = _readable(path)
-    frames = frame_count(path)
+    decided = decided or Decided()
+    frames = frame_count(path, decided)
     if not 0 <= frame < frames:
         raise InputError(f"has no pose {frame}", path, f"It holds {frames}, counted from 0")
     where = path if frames == 1 else f"{path}, {frame_in_words(frame)}"
     with one_message(where, f"cannot be read as {module.TITLE}"):
-        return _with_points(module.read(path, frame))
+        return _scanned(module, path, frame, decided)
 
 
-def read_faces(path: Path | str, frame: int = 0) -> Faces:
+def contents(path: Path | str, frame: int, decided: Decided) -> PointContents | None:
+    """What a file says of one moment of points; None where its format does not say. Raises InputError."""
+    path = Path(path)
+    module = _readable(path)
+    if not hasattr(module, "contents"):
+        return None
+    with one_message(path, f"cannot be read as {module.TITLE}"):
+        found = ask(module.contents, path, frame, decided=decided)
+        return found if isinstance(found, PointContents) else None
+
+
+def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scanned:
+    """What a module reads of one moment, with the decisions that every format shares."""
+    hook = module.contents if hasattr(module, "contents") else module.read
+    return _finished(module, path, ask(hook, path, frame, decided=decided), decided)
+
+
+def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, decided: Decided) -> Scanned:
+    """The points or views that a module's answer comes to."""
+    scanned = assemble(found, decided) if isinstance(found, PointContents) else found
+    decided.note(Decision("format", module.TITLE, "file", path.suffix.lower()))
+    return _with_points(scanned)
+
+
+def read_faces(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Faces:
     """The faces between the points of one moment of a file, perhaps none.
 
     Raises InputError as `read` does, and where the faces are damaged.
@@ -135,26 +176,27 @@ def read_faces(path: Path | str, frame: int = 0) -> Faces:
         return Faces.joined([])
     with one_message(path, f"its faces cannot be read as {module.TITLE}"):
         held, taken, pieces = path.stat().st_size, 0, []
-        for piece in module.read_faces(path, frame):
+        for piece in ask(module.read_faces, path, frame, decided=decided or Decided()):
             taken += piece.nbytes
             admit(held, 2 * taken)  # in pieces, and joined
             pieces.append(piece)
         return Faces.joined(pieces)
 
 
-def frames(path: Path | str) -> Callable[[int], Scanned]:
+def frames(path: Path | str, decided: Decided | None = None) -> Callable[[int], Scanned]:
     """A function that reads frames of one file as `read` does, several in less time. Raises InputError."""
     path = Path(path)
     module = _readable(path)
+    shared = decided or Decided()
     if not hasattr(module, "Frames"):
-        return partial(read, path)
+        return lambda frame: read(path, frame, shared.at(frame))
     failed = f"cannot be read as {module.TITLE}"
     with one_message(path, failed):
-        opened = module.Frames(path)
+        opened = ask(module.Frames, path, decided=shared)
 
     def read_frame(frame: int) -> Scanned:
         with one_message(f"{path}, {frame_in_words(frame)}", failed):
-            return _with_points(opened.read(frame))
+            return _finished(module, path, opened.read(frame), shared.at(frame))
 
     return read_frame
 
@@ -244,7 +286,8 @@ def _formats() -> dict[str, ModuleType]:
             return  # for folders: see viewer/scan/range_folders
         if not isinstance(module.SUFFIXES, tuple):
             raise InputError(f"SUFFIXES is a {type(module.SUFFIXES).__name__}, expected a tuple of suffixes")
-        if missing := [name for name in ("TITLE", "read") if not hasattr(module, name)]:
+        reads = "contents" if hasattr(module, "contents") else "read"
+        if missing := [name for name in ("TITLE", reads) if not hasattr(module, name)]:
             raise InputError(
                 f"it has SUFFIXES, but no {' and no '.join(missing)}", hint="Add what is missing"
             )

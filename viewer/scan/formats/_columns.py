@@ -1,42 +1,24 @@
-"""Named columns, as PLY, PCD and text files hold points, to and from a PointCloud."""
+"""Named columns, as PLY, PCD and text files hold points, and what a PointCloud becomes in them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from functools import partial
 from itertools import chain, count, islice
 from typing import IO, AnyStr, BinaryIO, TypeVar
 
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 from numpy.typing import DTypeLike, NDArray
 
 from ...errors import InputError
 from ..admission import LONGEST_LINE
-from ..contents import Deferred
 from ..points import PointCloud
 from ..reading import numbers
-from ._deferred import cloud_of
+from ..reading.cloud import ELLIPSES, GEOMETRY
 from ._precision import is_enough
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
 Columns = dict[str, NDArray]  # name -> (N,)
 T = TypeVar("T")
-
-# What the columns of a file may be called, in lower case; the first set that is complete is taken.
-_POSITIONS = [("x", "y", "z")]
-_NORMALS = [("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z")]
-_COLORS = [
-    ("red", "green", "blue", "alpha"),
-    ("red", "green", "blue"),
-    ("r", "g", "b", "a"),
-    ("r", "g", "b"),
-    ("diffuse_red", "diffuse_green", "diffuse_blue", "diffuse_alpha"),
-    ("diffuse_red", "diffuse_green", "diffuse_blue"),
-]
-_RADII = [("radius",), ("surfel_radius",)]
-_ELLIPSES = ("radius_u", "radius_v", "tangent_x", "tangent_y", "tangent_z")
-_GEOMETRY = {"rgb", "rgba", *chain(*_POSITIONS, *_NORMALS, *_COLORS, *_RADII, _ELLIPSES)}
 
 
 def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
@@ -50,10 +32,10 @@ def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
     seen: dict[str, int] = {}
     for index, (name, column) in enumerate(pairs, 1):
         name = name or f"column_{index}"
-        key = name.lower() if name.lower() in _GEOMETRY else name
+        key = name.lower() if name.lower() in GEOMETRY else name
         seen[key] = seen.get(key, 0) + 1
         if seen[key] > 1:
-            if key in _GEOMETRY:
+            if key in GEOMETRY:
                 raise InputError(f"two columns are called '{name}'", hint="Rename one of them")
             name = next(free for n in count(seen[key]) if (free := f"{name}_{n}") not in columns)
         columns[name] = column
@@ -70,57 +52,6 @@ def first_repeated(names: Iterable[str]) -> str | None:
     return None
 
 
-def listed(names: Iterable[str], most: int = 12, longest: int = 24) -> str:
-    """Names of a file for a message: some of them, shortened where they are long."""
-    names = list(names)
-    shown = [name if len(name) <= longest else name[:longest] + "..." for name in names[:most]]
-    return ", ".join([*shown, f"and {len(names) - most} more"] if len(names) > most else shown) or "none"
-
-
-def cloud_from_columns(columns: Columns, held: int | None = None) -> PointCloud:
-    """Points from named columns; names count in any case, what is not geometry becomes a scalar.
-
-    columns: name -> (N,) of any real type and byte order; emptied, so that each may go when it is used.
-    held: bytes of the file, where the columns were packed in it.
-    Raises InputError where x, y or z is missing, and where all that takes too much memory.
-    """
-    names = {name.lower(): name for name in columns}
-
-    def found(choices: Sequence[Sequence[str]]) -> list[str]:
-        complete = (choice for choice in choices if all(name in names for name in choice))
-        return [names[name] for name in next(complete, ())]
-
-    def take(chosen: Sequence[str]) -> NDArray:
-        return _joined([columns.pop(name) for name in chosen])
-
-    def native(name: str) -> NDArray:
-        column = columns.pop(name)
-        return column.astype(column.dtype.newbyteorder("="), copy=False)
-
-    chosen = found(_POSITIONS)
-    if not chosen:
-        raise InputError(f"no x, y and z among the columns: {listed(columns)}")
-    normals, colors, radii, ellipses = (
-        found(choices) for choices in (_NORMALS, _COLORS, _RADII, [_ELLIPSES])
-    )
-    attributes: dict[str, Deferred] = {}
-    if normals:
-        attributes["normals"] = Deferred(lambda: take(normals), columns[normals[0]].dtype, 3)
-    if colors:
-        kind = columns[colors[0]].dtype
-        attributes["colors"] = Deferred(lambda: _bytes_or_units(take(colors)), kind, len(colors))
-    if radii:
-        attributes["radii"] = Deferred(lambda: take(radii)[:, 0], columns[radii[0]].dtype)
-    positions = [take(chosen)]
-    if ellipses:
-        axes, mean = _half_axes(take(ellipses))
-        attributes.setdefault("radii", Deferred(lambda: mean, mean.dtype))
-        attributes["axes"] = Deferred(lambda: axes, axes.dtype, 4)
-    rest = columns.keys() - {*normals, *colors, *radii}
-    scalars = {name: Deferred(partial(native, name), columns[name].dtype) for name in columns if name in rest}
-    return cloud_of(positions, attributes, scalars, held=held, at_hand=True)
-
-
 def columns_from_cloud(
     cloud: PointCloud, normals: tuple[str, str, str] = ("nx", "ny", "nz"), slack: float = 0.0
 ) -> dict[str, NDArray]:
@@ -135,7 +66,7 @@ def columns_from_cloud(
         (normals, cloud.normals),
         (("red", "green", "blue", "alpha"), cloud.colors),
         (("radius",), None if cloud.radii is None else cloud.radii[:, None]),
-        (_ELLIPSES, None if cloud.axes is None else _as_ellipses(cloud.axes)),
+        (ELLIPSES, None if cloud.axes is None else _as_ellipses(cloud.axes)),
     ]
     columns = {
         name: block[:, i] for names, block in blocks if block is not None for i, name in enumerate(names)
@@ -210,7 +141,7 @@ def declared(name: str, column: NDArray[np.float64], dtype: DTypeLike) -> NDArra
     that does not fit its type stays float64 too.
     """
     dtype = np.dtype(dtype)
-    if name.lower() in _POSITIONS[0]:
+    if name.lower() in ("x", "y", "z"):
         return column
     if dtype.kind in "iu":
         limits = np.iinfo(dtype)
@@ -219,62 +150,8 @@ def declared(name: str, column: NDArray[np.float64], dtype: DTypeLike) -> NDArra
     return column.astype(dtype)
 
 
-def _joined(columns: Sequence[NDArray]) -> NDArray:
-    """(N, C) from C columns, without a copy where they lie side by side in one record."""
-    first = columns[0]
-    start, step = _address(first), first.itemsize
-    side_by_side = all(
-        (column.dtype, column.strides, _address(column)) == (first.dtype, first.strides, start + i * step)
-        for i, column in enumerate(columns)
-    )
-    if side_by_side:
-        return as_strided(first, (len(first), len(columns)), (first.strides[0], step), writeable=False)
-    return np.stack(columns, axis=1)
-
-
-def _address(array: NDArray) -> int:
-    return array.__array_interface__["data"][0]
-
-
-def _bytes_or_units(colors: NDArray) -> NDArray:
-    """Colours as PointCloud takes them. Floats beyond 1 and small uint16 count in 0..255."""
-    if colors.dtype.kind == "f" and np.nanmax(colors, initial=0) > 1:
-        return _in_bytes(colors)
-    if colors.dtype == np.uint16 and colors.max(initial=0) <= 255:
-        return colors.astype(np.uint8)
-    return colors
-
-
-def _in_bytes(colors: NDArray) -> NDArray[np.uint8]:
-    """Floats in 0..255 rounded; NaN: 0."""
-    rounded = np.empty(colors.shape, np.uint8)
-    for start in range(0, len(colors), _AT_ONCE):
-        part = colors[start : start + _AT_ONCE]
-        rounded[start : start + _AT_ONCE] = np.rint(np.clip(np.nan_to_num(part), 0, 255))
-    return rounded
-
-
-def _half_axes(ellipses: NDArray) -> tuple[NDArray, NDArray]:
-    """Half-axes as PointCloud takes them, and radii of circles of the same area, from columns of _ELLIPSES.
-
-    Tangents have any length; where one has none, neither has the half-axis.
-    """
-    dtype = np.result_type(ellipses.dtype, np.float32)
-    axes, mean = np.empty((len(ellipses), 4), dtype), np.empty(len(ellipses), dtype)
-    for start in range(0, len(ellipses), _AT_ONCE):
-        rows = slice(start, start + _AT_ONCE)
-        numbers = ellipses[rows].astype(dtype)
-        lengths = np.where(numbers[:, :2] > 0, numbers[:, :2], 0)
-        with np.errstate(over="ignore", invalid="ignore"):
-            tangent_length = np.linalg.norm(numbers[:, 2:], axis=1, keepdims=True)
-            unit = numbers[:, 2:] / np.where(tangent_length > 0, tangent_length, 1)
-            axes[rows] = np.hstack([lengths[:, :1] * unit, lengths[:, 1:]])
-            mean[rows] = np.sqrt(lengths.prod(axis=1))
-    return axes, mean
-
-
 def _as_ellipses(axes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """The columns of _ELLIPSES, (N, 5); zeros where a splat is round."""
+    """The columns of ELLIPSES, (N, 5); zeros where a splat is round."""
     length = np.linalg.norm(axes[:, :3], axis=1, keepdims=True)
     return np.hstack([length, axes[:, 3:], axes[:, :3] / np.where(length > 0, length, 1)])
 

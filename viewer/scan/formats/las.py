@@ -25,8 +25,11 @@ from ...helper import start_python
 from ...task import checkpoint
 from ...unfinished import temporary_folder
 from ..admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
+from ..contents import PointContents
 from ..points import PointCloud
-from ._columns import cloud_from_columns, named
+from ..reading.cloud import assemble
+from ..reading.sequence import Decided
+from ._columns import named
 
 if TYPE_CHECKING:
     from laspy import LasReader
@@ -46,7 +49,7 @@ _LOOK = 0.1  # seconds between looks at whether reading is cancelled
 _SAID = 200  # letters of what the unpacker says
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
+def read(path: Path, frame: int, decided: Decided) -> PointCloud:
     """All finite points of a LAS or LAZ file. Raises InputError."""
     import laspy
 
@@ -56,12 +59,13 @@ def read(path: Path, frame: int = 0) -> PointCloud:
         if not _checked_format(stream.read(_FIRST.size), held) & _PACKED:
             stream.seek(0)
             with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
-                return cloud_from_columns(_columns(reader, held))
+                return assemble(PointContents(columns=_columns(reader, held)), decided)
     with temporary_folder() as folder:
         plain = folder / "plain.las"
         _unpack_beside(path, plain)
         with laspy.open(plain) as reader:
-            return cloud_from_columns(_columns(reader, plain.stat().st_size))
+            columns = _columns(reader, plain.stat().st_size)
+            return assemble(PointContents(columns=columns), decided)
 
 
 def unpack_laz(packed: str, plain: str) -> None:

@@ -8,7 +8,7 @@ from typing import BinaryIO
 
 from ..admission import admit, opened, size_of
 from ..points import PointCloud
-from ._deferred import cloud_of
+from ..reading.cloud import cloud_of
 from ._stored import StoredArray
 
 TITLE = "NPY"

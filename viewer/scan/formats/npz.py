@@ -31,9 +31,9 @@ from ..contents import Deferred
 from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ..pose import Scanned
+from ..reading.cloud import cloud_of
 from ._array_views import makes_views, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
-from ._deferred import cloud_of
 from ._precision import within_decimals
 from ._stored import StoredArray
 from ._topology import with_topology

@@ -34,14 +34,16 @@ from ..admission import (
     too_few,
     whole_number,
 )
+from ..contents import PointContents
 from ..grids import view_of_camera
 from ..image_poses import from_camera_to_world, rotation_of
 from ..points import UNKNOWN_UNIT, PointCloud
 from ..pose import Scanned
 from ..range_view import RangeView
+from ..reading.cloud import assemble
+from ..reading.sequence import Decided
 from ._columns import (
     Columns,
-    cloud_from_columns,
     columns_from_cloud,
     declared,
     named,
@@ -93,7 +95,7 @@ class _Header:
         return np.dtype([(str(i), f"<{f.type}", (f.count,)) for i, f in enumerate(self.fields)])
 
 
-def read(path: Path, frame: int = 0) -> Scanned:
+def read(path: Path, frame: int, decided: Decided) -> Scanned:
     """All finite points of a PCD file, or the range view that they are. Raises InputError."""
     with opened(path) as stream:
         header = _read_header(stream.read(_HEADER_LIMIT))
@@ -106,7 +108,8 @@ def read(path: Path, frame: int = 0) -> Scanned:
             admit(size_of(stream), header.points * (header.dtype.itemsize + _VIEW_BYTES) + _WORK)
             if (view := _camera_view(columns, header.grid, header.viewpoint)) is not None:
                 return (view,)
-        cloud = cloud_from_columns(columns, held=size_of(stream) if packed else None)
+        held = size_of(stream) if packed else None
+        cloud = assemble(PointContents(columns=columns, held=held), decided)
         return replace(cloud, viewpoint=_sensor(header.viewpoint))
 
 

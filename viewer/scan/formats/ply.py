@@ -23,14 +23,15 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...task import checkpoint
 from ..admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
+from ..contents import PointContents
 from ..faces import Faces
 from ..points import PointCloud
+from ..reading.cloud import assemble, listed
+from ..reading.sequence import Decided
 from ._columns import (
     Columns,
-    cloud_from_columns,
     columns_from_cloud,
     declared,
-    listed,
     named,
     parse_table,
     records,
@@ -58,7 +59,7 @@ _NORMALS = {"nx", "ny", "nz"}
 _GRID, _CELL_BYTES = "range_grid", 64  # bytes of memory for a cell of it
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
+def read(path: Path, frame: int, decided: Decided) -> PointCloud:
     """The vertices of a PLY file, ascii or binary. Raises InputError."""
     with opened(path) as stream:
         header = parse_header(stream.read(LONGEST_HEADER))
@@ -78,7 +79,8 @@ def read(path: Path, frame: int = 0) -> PointCloud:
         for element in before:
             _skip(stream, element, header.encoding)
         read_rows = _read_ascii if header.encoding == "ascii" else _read_binary
-        cloud = cloud_from_columns(read_rows(stream, vertex, header.encoding))
+        columns = read_rows(stream, vertex, header.encoding)
+        cloud = assemble(PointContents(columns=columns), decided)
         return with_topology(cloud, _faces(stream, header, len(before) + 1))
 
 
@@ -116,7 +118,7 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
         admit(size_of(stream), cells * _CELL_BYTES)
         stream.seek(header.size)
         lists = Faces.joined(_faces(stream, header, of=_GRID))
-    cloud = read(path)
+    cloud = read(path, 0, Decided())
     points = np.full((len(cloud) + cloud.dropped, 3), np.nan)
     points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
     if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():

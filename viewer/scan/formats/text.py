@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..admission import MOST_COLUMNS, check_count, opened, whole_number
+from ..contents import PointContents
 from ..points import PointCloud
-from ._columns import bounded_lines, cloud_from_columns, first_repeated, named, parse_table
+from ..reading.cloud import assemble
+from ..reading.sequence import Decided
+from ._columns import bounded_lines, first_repeated, named, parse_table
 from ._matrices import camera_matrices
 
 TITLE = "a text table"
@@ -40,7 +43,7 @@ class _Layout:
     promised: int | None  # rows
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
+def read(path: Path, frame: int, decided: Decided) -> PointCloud:
     """All finite points of a text table, parsed as float64. Raises InputError."""
     with opened(path) as stream:
         text = TextIOWrapper(stream, _ENCODING, errors="replace")
@@ -53,7 +56,8 @@ def read(path: Path, frame: int = 0) -> PointCloud:
     if layout.names is None and (matrices := camera_matrices(table)):
         raise InputError(f"looks like {matrices}, not like points", hint=_NAMES_HELP)
     names = layout.names or guess_names(table, intensity_first=path.suffix.lower() == ".pts")
-    return cloud_from_columns(named(zip(names, table.T, strict=True)))
+    columns = named(zip(names, table.T, strict=True))
+    return assemble(PointContents(columns=columns, is_named=layout.names is not None), decided)
 
 
 def guess_names(table: NDArray[np.float64], intensity_first: bool = False) -> list[str]:

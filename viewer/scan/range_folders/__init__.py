@@ -10,6 +10,9 @@ A module declares
   folder that has none of them;
 - optional: `GENERAL = True` if the other kinds are to be tried first.
 
+`find` may have a parameter `decided`: the decisions about the scan, with the user's corrections
+(`viewer/scan/reading/sequence.py`).
+
 Modules whose name starts with an underscore are helpers.
 """
 
@@ -24,12 +27,14 @@ from types import ModuleType
 from ...errors import InputError, explained
 from ...extensions import load_modules, package_of
 from ..formats import one_message
+from ..reading.record import Decision
+from ..reading.sequence import Decided, ask
 from ._source import RangeFrames
 
 __all__ = ["RangeFrames", "find_range_frames", "lacking_part"]
 
 
-def find_range_frames(folder: Path) -> RangeFrames | None:
+def find_range_frames(folder: Path, decided: Decided | None = None) -> RangeFrames | None:
     """The frames of a folder of range images, or None where it is none of a known kind. No frame is read.
 
     Raises InputError where it is of a known kind and cannot be used.
@@ -40,8 +45,10 @@ def find_range_frames(folder: Path) -> RangeFrames | None:
         raise InputError(f"cannot be listed ({error.strerror})", folder, explained(error)[1]) from error
     for kind in _kinds():
         with one_message(folder, f"cannot be read as {kind.TITLE}"):
-            if (frames := kind.find(folder, names)) is not None:
-                return replace(frames, package=package_of(kind.__name__))
+            shared = decided or Decided()
+            if (frames := ask(kind.find, folder, names, decided=shared)) is not None:
+                shared.note(Decision("format", kind.TITLE, "folder"))
+                return replace(frames, package=package_of(kind.__name__), decided=shared)
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..admission import admit, check_count, shared
 from ..faces import Faces
 from ..formats import one_message
 from ..range_view import RangeView, memory_of_merging
+from ..reading.sequence import Decided
 
 MOST_VIEWS = 256  # of a frame
 _MERGING_RATIO = 100  # of memory to the files: pictures of depth pack well, and points take far more bytes
@@ -27,7 +28,7 @@ class RangeFrames:
     the other, which may raise anything. files: all that is read, images first, as scans of one camera share
     calibration and poses, and the first file tells them apart. unit: of all views, as the files state it.
     recorded: the times that were stored with the frames, (T,) seconds, or None. package: that
-    reads them; "" for Scan4D itself.
+    reads them; "" for Scan4D itself. decided: the decisions about the scan.
     """
 
     name: str
@@ -37,6 +38,7 @@ class RangeFrames:
     unit: str | None
     recorded: Callable[[], NDArray[np.float64] | None] = lambda: None
     package: str = ""
+    decided: Decided = field(default_factory=Decided)
 
     def __len__(self) -> int:
         return len(self.labels)
