@@ -256,7 +256,6 @@ def film_changes(command: Callable[..., Done], scan: Path, film: Path, *more: ob
     return changes
 
 
-@FRAMES
 def test_16_a_film_shows_each_pose_until_the_next(
     reported: Path, command: Callable[..., Done], tmp_path: Path
 ) -> None:
@@ -379,7 +378,6 @@ def test_27_some_vertices_with_colors(reported: Path) -> None:
     assert colors(cloud)[:3] == [RED, GREEN, BLUE]
 
 
-@POINT_FILES
 @pytest.mark.parametrize("name", ["28_uint64.ply", "28_bool.ply"])
 def test_28_types_beyond_the_standard(reported: Path, name: str) -> None:
     assert len(only(reported / name)) == 3
@@ -435,7 +433,6 @@ def test_34_a_film_of_time_stamps(reported: Path, command: Callable[..., Done], 
     near(film_changes(command, reported / "34_stamps", tmp_path / "x.mp4"), (0, 0.033, 0.0663, 0.1663), 1e-3)
 
 
-@POINT_FILES
 def test_35_a_byte_order_mark(reported: Path) -> None:
     assert len(only(reported / "35_bom.ply")) == 3
 

@@ -340,10 +340,10 @@ def test_reading_a_frame_can_be_cancelled_and_then_it_is_left_out() -> None:
         return cloud
 
     source.load = load_with_checkpoint  # type: ignore[method-assign]
-    assert scan.reading is None
+    assert scan.loading is None
     scan.request(0)
     wait_until(lambda: source.loads == [0])
-    task = scan.reading
+    task = scan.loading
     assert task is not None
     assert task.name == "Reading 0.fake"
     task.cancel()
@@ -353,7 +353,7 @@ def test_reading_a_frame_can_be_cancelled_and_then_it_is_left_out() -> None:
     assert [notice.index for notice in scan.messages] == [0]
     scan.request(1)
     wait_until(lambda: scan.ready(1))
-    wait_until(lambda: scan.reading is None)
+    wait_until(lambda: scan.loading is None)
     scan.close()
 
 

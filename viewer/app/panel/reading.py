@@ -1,4 +1,4 @@
-"""The panel's section on how Scan4D read the scan: each decision, what it follows from, and what may be wrong."""
+"""The panel's section on how Scan4D read the scan: each decision, its source, and what is assumed."""
 
 from __future__ import annotations
 
