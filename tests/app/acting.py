@@ -19,7 +19,15 @@ from viewer.app.tools import tool_names
 
 engine = imgui.test_engine
 PANEL = "panel/settings"
-SECTIONS = ("Scan", *tool_names(), "Appearance", "View and bookmarks", "Renderer", "Statistics")  # of it
+SECTIONS = (
+    "Scan",
+    "How this was read",
+    *tool_names(),
+    "Appearance",
+    "View and bookmarks",
+    "Renderer",
+    "Statistics",
+)  # of it
 
 Action = Sequence[Any]  # name of a method of the engine's TestContext, and its arguments
 

@@ -53,7 +53,7 @@ class DepthCamera:
 
 
 @dataclass(frozen=True)
-class Decided:
+class DecidedCamera:
     """A camera, and the decisions "camera" and "depth-scale" that led to it."""
 
     camera: DepthCamera
@@ -97,7 +97,7 @@ PRIMESENSE = default_camera(525.0, 319.5, 239.5, 640, 480)
 
 def decide_camera(
     sources: CameraSources, size: Size, *, is_whole: bool = True, of_color: Size | None = None
-) -> Decided:
+) -> DecidedCamera:
     """The camera of a picture of this size. Raises InputError where a stated camera cannot be its own.
 
     is_whole: whether the picture stores whole numbers, not floats. of_color: the size of the colours beside
@@ -116,7 +116,7 @@ def decide_camera(
         unit=sources.unit,
         assumed=assumed,
     )
-    return Decided(camera, (decision, of_scale))
+    return DecidedCamera(camera, (decision, of_scale))
 
 
 def scaled(camera: StatedCamera, size: Size) -> StatedCamera:
