@@ -69,7 +69,7 @@ def explanation(decision: Decision) -> list[str]:
 
 
 def _others(record: Reading) -> Iterator[tuple[str, str, str]]:
-    """What else the record holds: a name, a text, and a tooltip."""
+    """Yield the other entries of the record: a name, a text, and a tooltip."""
     for take in record.takes:
         yield "Take", f"{take.name}, {take.frames} frames", take.pattern
     for aside in record.aside:

@@ -142,7 +142,7 @@ def read(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Sc
 
 
 def contents(path: Path | str, frame: int, decided: Decided) -> PointContents | None:
-    """What a file says of one moment of points; None where its format does not say. Raises InputError."""
+    """Read what a file says of one moment of points; None for formats with `read`. Raises InputError."""
     path = Path(path)
     module = _readable(path)
     if not hasattr(module, "contents"):
@@ -153,7 +153,7 @@ def contents(path: Path | str, frame: int, decided: Decided) -> PointContents | 
 
 
 def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scanned:
-    """What a module reads of one moment, with the decisions that every format shares."""
+    """Read one moment by a module, with the decisions that every format shares."""
     hook = module.contents if hasattr(module, "contents") else module.read
     return _finished(module, path, ask(hook, path, frame, decided=decided), decided)
 
