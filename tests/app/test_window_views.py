@@ -151,6 +151,7 @@ def test_full_screen_is_the_view_alone_and_goes_back(app: RunningApp) -> None:
         app.settle()
         screen.do("key", "p")
         app.told("Saved")
+        app.send_notes_away()  # Escape would end the message first
         screen.do("key", leave)
         app.see(view=[*place])
         app.settle()
