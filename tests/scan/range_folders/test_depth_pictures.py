@@ -136,13 +136,13 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
         (json.dumps(CAMERA | {"fx": -5}), "fx is -5"),
         (json.dumps(CAMERA | {"distortion": [1, 2, 3]}), "3 coefficients"),
         (json.dumps(CAMERA | {"distortion": 7}), "not a list"),
-        (json.dumps(CAMERA | {"depth_scale": 0.001}), "1000 for millimetres"),
+        (json.dumps(CAMERA | {"depth_scale": -1}), "1000 for millimetres"),
         (json.dumps(CAMERA | {"depth_scale": None}), "depth_scale is None"),
         (json.dumps(CAMERA | {"kind": "disparity"}), "unknown kind of depth"),
         (json.dumps(CAMERA | {"kind": []}), "unknown kind of depth"),
         (
             json.dumps(CAMERA | {"width": 640, "height": 480}),
-            "6 x 4 pixels, but its calibration is for 640",
+            "a.png: its camera is for 640 x 480, the picture has 6 x 4",
         ),
         (json.dumps({"intrinsic_matrix": [1, 2]}), "9 numbers"),
     ],
@@ -156,7 +156,7 @@ def test_a_calibration_that_is_none_is_told(tmp_path: Path, stored: str, told: s
 def test_without_a_calibration_it_says_what_is_missing(tmp_path: Path) -> None:
     put(tmp_path, "a", "b", camera=False)
     (tmp_path / "a.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
-    assert "without the data of their camera" in refusal(tmp_path)
+    assert "no file states the camera" in refusal(tmp_path)
     assert "depth_scale" in refusal(tmp_path)
     assert [one.kind for one in list_folder(tmp_path)] == ["file"]  # the table alone
 
@@ -237,12 +237,12 @@ def test_broken_frames_are_left_out(tmp_path: Path) -> None:
     (tmp_path / "pose_6.txt").write_text("1 0 0\n0 1 0\n0 0 1\n")
     write_matrix(tmp_path / "pose_7.txt", np.full((4, 4), np.nan))
     with open_scan(tmp_path) as scan:
-        assert [pose.index for pose in scan] == [0]
+        assert [pose.index for pose in scan] == [0, 4]
+        assert scan.pose(4).views[0].color is None
         told = {index: str(error) for index, error in scan.broken.items()}
     assert "depth_1.png: is not a valid PNG or TIFF file" in told[1]
     assert "depth_2.png: is a picture of type RGB" in told[2]
     assert "color_3.jpg: is not a valid PNG or JPEG" in told[3]
-    assert "color_4.jpg: has 6 x 2 pixels, but its depth picture has 6 x 4" in told[4]
     assert "depth_5.png: has no camera pose" in told[5]
     assert "pose_6.txt: holds 9 numbers" in told[6]
     assert "pose_7.txt: its pose is not a rotation" in told[7]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from depth_folders import (
+    CAMERA,
     POSE,
     colors,
     depth_numbers,
@@ -21,8 +22,6 @@ from depth_folders import (
 from viewer.errors import InputError
 from viewer.scan.open import find_source, open_scan
 from viewer.scan.range_view import RangeView
-
-PRIMESENSE = (525, 525, 319.5, 239.5)
 
 
 def put(folder: Path, count: int) -> Path:
@@ -57,10 +56,11 @@ def moved(by: float) -> np.ndarray:
 def test_frames_stand_where_the_log_says(tmp_path: Path, log: str) -> None:
     put(tmp_path, 3)
     write_log(tmp_path / log, [moved(0), moved(1), moved(2)])
+    write_camera(tmp_path)
     with open_scan(tmp_path) as scan:
         assert (len(scan), scan.unit, scan.label(2)) == (3, "m", "depth/00002.png")
         for pose in scan:
-            expected = seen_points(metres(depth_numbers(pose.index)), PRIMESENSE, moved(pose.index))
+            expected = seen_points(metres(depth_numbers(pose.index)), [*CAMERA.values()], moved(pose.index))
             np.testing.assert_allclose(pose.views[0].positions(), expected, atol=1e-5)
             np.testing.assert_array_equal(pose.views[0].color, colors(pose.index))
 

@@ -167,13 +167,14 @@ def test_pods_of_one_name_are_refused(tmp_path: Path) -> None:
         open_scan(write(tmp_path, one, one))
 
 
-def test_images_of_other_pixels_are_refused(tmp_path: Path) -> None:
+def test_images_of_another_shape_are_left_out_and_a_mask_is_refused(tmp_path: Path) -> None:
     rig(tmp_path, 1)
-    save(tmp_path / "left_0_texture.png", COLORS[1:])
-    with (
-        open_scan(tmp_path) as scan,
-        pytest.raises(InputError, match="has 121 x 96 pixels, but its depth picture has 121 x 97"),
-    ):
+    save(tmp_path / "left_0_texture.png", COLORS[40:])
+    with open_scan(tmp_path) as scan:
+        assert [view.color is None for view in scan.pose(0).views] == [True, False]
+        assert "121 x 57 pixels, but its depth picture has 121 x 97" in scan.reading.unused[0]
+    save(tmp_path / "left_0_mask.png", COLORS[40:, :, 0])
+    with open_scan(tmp_path) as scan, pytest.raises(InputError, match="a mask of another shape"):
         scan.pose(0)
 
 

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from depth_folders import (
+    CAMERA,
     POSE,
     colors,
     depth_numbers,
     metres,
     seen_points,
+    write_camera,
     write_color,
     write_depth,
     write_matrix,
@@ -33,11 +35,12 @@ def put(folder: Path, *numbers: int) -> Path:
 
 def test_each_frame_is_a_view_in_the_world(tmp_path: Path) -> None:
     put(tmp_path, 0, 33, 66)
+    write_camera(tmp_path)
     with open_scan(tmp_path) as scan:
         assert (len(scan), scan.unit, scan.label(1)) == (3, "m", "frame-000033.depth.png")
         np.testing.assert_allclose(scan.times, [0, 33 / 25, 66 / 25])
         (view,) = scan.pose(1).views
-    expected = seen_points(metres(depth_numbers(33)), (585, 585, 320, 240), POSE)
+    expected = seen_points(metres(depth_numbers(33)), [*CAMERA.values()], POSE)
     np.testing.assert_allclose(view.positions(), expected, rtol=1e-5)
     np.testing.assert_array_equal(view.color, colors(33))
 
@@ -45,15 +48,15 @@ def test_each_frame_is_a_view_in_the_world(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["camera-intrinsics.txt", "camera.txt"])
 def test_a_matrix_beside_them_is_the_camera(tmp_path: Path, name: str) -> None:
     put(tmp_path, 0)
-    (tmp_path / name).write_text("500 0 300\n0 501 200\n0 0 1\n")
+    (tmp_path / name).write_text("500 0 3\n0 501 2\n0 0 1\n")
     (view,) = find_source(tmp_path).load(0)
     assert isinstance(view, RangeView)
-    assert (view.fx, view.fy, view.cx, view.cy) == (500, 501, 300.5, 200.5)
+    assert (view.fx, view.fy, view.cx, view.cy) == (500, 501, 3.5, 2.5)
 
 
 def test_without_poses_frames_are_in_their_cameras_space(tmp_path: Path) -> None:
     put(tmp_path, 0)
-    (tmp_path / "camera-intrinsics.txt").write_text("500 0 300\n0 501 200\n0 0 1\n")
+    (tmp_path / "camera-intrinsics.txt").write_text("500 0 3\n0 501 2\n0 0 1\n")
     (tmp_path / "frame-000000.pose.txt").unlink()
     (view,) = find_source(tmp_path).load(0)
     assert isinstance(view, RangeView)

@@ -7,13 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from depth_folders import colors, depth_numbers, metres, seen_points, write_camera, write_color, write_depth
+from depth_folders import (
+    CAMERA,
+    colors,
+    depth_numbers,
+    metres,
+    seen_points,
+    write_camera,
+    write_color,
+    write_depth,
+)
 
 from viewer.errors import InputError
 from viewer.scan.open import find_source, open_scan
 from viewer.scan.range_folders.tum import nearest_once
 
-KINECT = (525, 525, 319.5, 239.5)
 HALF = np.sqrt(0.5)
 
 
@@ -37,6 +45,7 @@ def test_pictures_and_poses_belong_together_by_time(tmp_path: Path) -> None:
     poses = f"# timestamp tx ty tz qx qy qz qw\n{start + 0.051} 1 2 3 {HALF} 0 0 {HALF}\n"
     poses += f"{start + 0.011} 1 2 4 {HALF} 0 0 {HALF}\n{start + 5} 9 9 9 0 0 0 1\n"  # out of order
     put(tmp_path, [start + 0.05, start + 0.01], [start, start + 0.06], poses)
+    write_camera(tmp_path)
     with open_scan(tmp_path) as scan:
         assert (len(scan), scan.unit) == (2, "m")
         np.testing.assert_allclose(scan.times, [0, 0.04], atol=1e-5)
@@ -44,7 +53,7 @@ def test_pictures_and_poses_belong_together_by_time(tmp_path: Path) -> None:
         assert {file.name for file in scan.files} >= {"depth.txt", "rgb.txt", "groundtruth.txt"}
     for frame, (view, z) in enumerate(zip(views, (4, 3), strict=True)):
         pose = np.array([[1, 0, 0, 1], [0, 0, -1, 2], [0, 1, 0, z], [0, 0, 0, 1]], float)
-        expected = seen_points(metres(depth_numbers(1 - frame), 5000), KINECT, pose)
+        expected = seen_points(metres(depth_numbers(1 - frame), 5000), [*CAMERA.values()], pose)
         np.testing.assert_allclose(view.positions(), expected, rtol=1e-5, atol=1e-5)
         np.testing.assert_array_equal(view.color, colors(frame))
 

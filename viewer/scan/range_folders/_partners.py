@@ -1,9 +1,9 @@
-"""Depth pictures and what belongs to each: colours of the same pixels, and where the camera stood."""
+"""Depth pictures and what belongs to each: colours, mask, confidence, its camera, and where that stood."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,84 +11,178 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..image_poses import from_camera_to_world
+from ..contents import StatedCamera
+from ..image_poses import IMAGE_AXES, from_camera_to_world
 from ..range_view import RangeView
+from ..reading.camera import DepthCamera, Size
+from ..reading.camera_files import stated_cameras
+from ..reading.sequence import Decided
 from ..times import natural_key
-from ._calibration import FILES, Calibration
-from ._pictures import COLOR_SUFFIXES, DEPTH_SUFFIX, depth_view, is_depth
+from ._cameras import FolderCamera
+from ._pictures import (
+    COLOR_SUFFIXES,
+    DEPTH_SUFFIX,
+    OTHER_DEPTH_SUFFIXES,
+    ViewFiles,
+    depth_view,
+    is_depth,
+    size_of_image,
+)
 from ._source import RangeFrames
-from ._texts import rows_of
+from ._texts import object_of, rows_of, text_of
 
-DEPTH_FOLDER = "depth"
+DEPTH_FOLDERS = ("depth", "depths", "depth_images", "depth_maps", "depthmaps", "lowres_depth")
 PICTURE_BYTES = 3000  # of memory for what is known of a depth picture
 
-_DEPTH, _POSE = "depth", "pose"  # in the names of files, and of folders
-_COLORS = ("color", "colour", "rgb", "image")
+_DEPTH = "depth"  # in the names of files
+# What the folders of partners are called; in the names of files, these words replace `depth`.
+_COLORS = (
+    "color", "colour", "rgb", "image", "colors", "images", "corrected_images", "rgb_images", "lowres_wide",
+    "frame",
+)  # fmt: skip
+_POSES = ("pose", "poses")
+_CONFIDENCES = ("confidence", "conf", "confidences", "confidence_images")
+_MASKS = ("mask", "masks")
+_CAMERAS = ("cameras", "corrected_cameras", "camera", "frame", "lowres_wide_intrinsics")
+_CAMERA_SUFFIXES = (".json", ".pincam")
 _POSE_SUFFIX = ".txt"
 
 
 @dataclass(frozen=True)
 class DepthPicture:
-    """A depth picture, its colours, and its pose, which stand in other files or are not there."""
+    """A depth picture, and the files of its partners, which may be missing.
+
+    camera: a file that states the camera of this picture alone, and perhaps its pose.
+    """
 
     depth: Path
     color: Path | None = None
     pose: Path | None = None
+    mask: Path | None = None
+    confidence: Path | None = None
+    camera: Path | None = None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All that are there."""
+        named = (self.depth, self.color, self.pose, self.mask, self.confidence, self.camera)
+        return tuple(path for path in named if path is not None)
 
 
 def frames_of_pictures(
     folder: Path,
     pictures: Sequence[DepthPicture],
-    calibration: Calibration,
+    camera: FolderCamera,
     pose: Callable[[int], NDArray[np.float64]],
-    beside: Sequence[str] = (),
+    decided: Decided,
+    beside: Iterable[Path] = (),
     recorded: NDArray[np.float64] | None = None,
 ) -> RangeFrames:
-    """Frames of one view each. pose: the world_to_camera of each. beside: names of other files that are read.
+    """Frames of one view each. pose: the world_to_camera of each. beside: other files that are read.
 
     recorded: the times of the frames, (T,) seconds.
     """
 
     def read(index: int) -> Iterator[RangeView]:
-        yield depth_view(pictures[index].depth, pictures[index].color, calibration, pose(index))
+        picture, of_frame = pictures[index], decided.at(index)
 
-    used = [
-        path
-        for picture in pictures
-        for path in (picture.depth, picture.color, picture.pose)
-        if path is not None
-    ]
-    others = [folder / name for name in (*FILES, *beside) if (folder / name).is_file()]
+        def camera_of(stored: NDArray, of_color: Size | None) -> DepthCamera:
+            own = () if picture.camera is None else own_cameras(picture.camera)
+            is_whole = stored.dtype.kind != "f"
+            size = size_of_image(stored)
+            return camera.of_picture(size, of_frame, is_whole=is_whole, of_color=of_color, own=own)
+
+        files = ViewFiles(
+            depth=picture.depth, color=picture.color, mask=picture.mask, confidence=picture.confidence
+        )
+        yield depth_view(files, camera_of, pose(index), of_frame)
+
+    used = [path for picture in pictures for path in picture.files]
     labels = tuple(picture.depth.relative_to(folder).as_posix() for picture in pictures)
-    files = tuple(dict.fromkeys([*used, *others]))
-    return RangeFrames(folder.resolve().name, labels, read, files, calibration.unit, lambda: recorded)
+    files = tuple(dict.fromkeys([*used, *camera.files, *(path for path in beside if path.is_file())]))
+    return RangeFrames(folder.resolve().name, labels, read, files, camera.unit, lambda: recorded)
 
 
 def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
     """The depth pictures of a folder with their partners, in natural order.
 
-    They are in its folder `depth`, with partners of the same name in folders `color` (or `rgb`, `image`) and
-    `pose`; or in the folder itself, where partners have `color` and `pose` in place of `depth`, or the
-    same name and another suffix.
+    They are in its folder `depth`, with partners of the same name in folders such as `color` or `pose`; or in
+    the folder itself, where partners have another word in place of `depth`, or the same name and another
+    suffix.
     """
-    if DEPTH_FOLDER in names:
-        return list(_in_folders(folder, names))
+    if (of_depth := depth_folder(names)) is not None:
+        return list(_in_folders(folder, names, of_depth))
     there = set(names)
+
+    def first(candidates: Iterator[str]) -> Path | None:
+        return next((folder / name for name in candidates if name in there), None)
+
     return [
         DepthPicture(
             folder / name,
-            _first(folder, there, _color_names(name)),
-            _first(folder, there, _pose_names(name)),
+            first(_partner_names(name, _COLORS, COLOR_SUFFIXES)),
+            first(_pose_names(name)),
+            first(_partner_names(name, _MASKS, COLOR_SUFFIXES, without_word=False)),
+            first(_partner_names(name, _CONFIDENCES, COLOR_SUFFIXES, without_word=False)),
+            first(_partner_names(name, _CAMERAS, _CAMERA_SUFFIXES, without_word=False)),
         )
         for name in depth_names(folder, names)
     ]
 
 
+def depth_folder(names: Sequence[str]) -> str | None:
+    """The folder of depth pictures among the names in a folder."""
+    return next((name for name in DEPTH_FOLDERS if name in names), None)
+
+
 def depth_names(folder: Path, names: Sequence[str]) -> list[str]:
-    """The names of depth pictures in natural order: PNG that say so, or all if the first is 16-bit grey."""
+    """The names of depth pictures in natural order.
+
+    These are PNG that say so, or all PNG if the first is 16-bit grey, or else other pictures that say so.
+    """
     pictures = sorted((name for name in names if name.lower().endswith(DEPTH_SUFFIX)), key=natural_key)
-    named = [name for name in pictures if _DEPTH in name.lower()]
-    return named or (pictures if pictures and is_depth(folder / pictures[0]) else [])
+    others = sorted((name for name in names if name.lower().endswith(OTHER_DEPTH_SUFFIXES)), key=natural_key)
+    if named := [name for name in pictures if _DEPTH in name.lower()]:
+        return named
+    if pictures and is_depth(folder / pictures[0]):
+        return pictures
+    return [name for name in others if _DEPTH in name.lower()]
+
+
+def own_cameras(path: Path) -> tuple[StatedCamera, ...]:
+    """The cameras in a file that belongs to one picture. Raises InputError."""
+    try:
+        return stated_cameras(path.name, text_of(path))
+    except InputError as error:
+        raise InputError(error.what, path, error.hint) from error
+
+
+def pose_of_picture(picture: DepthPicture) -> NDArray[np.float64]:
+    """The world_to_camera of a picture, from its pose file, else from its camera file. Raises InputError."""
+    if picture.pose is not None or picture.camera is None:
+        return pose_of_file(picture)
+    stored = object_of(picture.camera)
+    try:
+        if "t_00" in stored:  # Polycam: the upper three rows
+            rows = [[float(stored[f"t_{row}{column}"]) for column in range(4)] for row in range(3)]
+            matrix = np.array([*rows, [0, 0, 0, 1]])
+        else:
+            matrix = np.array(stored["cameraPoseARFrame"], np.float64).reshape(4, 4)
+        return from_camera_to_world(matrix @ IMAGE_AXES)  # their cameras look along -z, +y is up
+    except InputError as error:
+        raise InputError(error.what, picture.camera, error.hint) from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError("holds no camera pose", picture.camera) from error
+
+
+def states_a_pose(picture: DepthPicture) -> bool:
+    """Whether the file of a picture's camera states its pose, too."""
+    if picture.camera is None or picture.camera.suffix.lower() != ".json":
+        return False
+    try:
+        return bool({"t_00", "cameraPoseARFrame"} & object_of(picture.camera).keys())
+    except InputError:  # reading the frame will say why
+        return False
 
 
 def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
@@ -109,12 +203,26 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
         raise InputError("is not a pose: it contains other words than numbers", picture.pose) from error
 
 
-def _in_folders(folder: Path, names: Sequence[str]) -> Iterator[DepthPicture]:
-    of_colors = next((name for name in _COLORS if name in names), None)
-    colors = _by_stem(folder / of_colors, COLOR_SUFFIXES) if of_colors else {}
-    poses = _by_stem(folder / _POSE, (_POSE_SUFFIX,))
-    for stem, depth in _by_stem(folder / DEPTH_FOLDER, (DEPTH_SUFFIX,)).items():
-        yield DepthPicture(depth, colors.get(stem), poses.get(stem))
+def _in_folders(folder: Path, names: Sequence[str], of_depth: str) -> Iterator[DepthPicture]:
+    def partners(folders: Sequence[str], suffixes: Sequence[str]) -> dict[str, Path]:
+        found = next((name for name in folders if name in names), None)
+        return {} if found is None else _by_stem(folder / found, suffixes)
+
+    colors, poses = partners(_COLORS, COLOR_SUFFIXES), partners(_POSES, (_POSE_SUFFIX,))
+    masks, confidences = partners(_MASKS, COLOR_SUFFIXES), partners(_CONFIDENCES, COLOR_SUFFIXES)
+    cameras = partners(_CAMERAS, _CAMERA_SUFFIXES)
+    pictures = _by_stem(folder / of_depth, (DEPTH_SUFFIX,)) or _by_stem(
+        folder / of_depth, OTHER_DEPTH_SUFFIXES
+    )
+    for stem, depth in pictures.items():
+        yield DepthPicture(
+            depth,
+            colors.get(stem),
+            poses.get(stem),
+            masks.get(stem),
+            confidences.get(stem),
+            cameras.get(stem),
+        )
 
 
 def _by_stem(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
@@ -127,25 +235,27 @@ def _by_stem(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:
     return {file.stem: file for file in sorted(chosen, key=lambda file: natural_key(file.name))}
 
 
-def _color_names(depth: str) -> Iterator[str]:
-    stem, lower = Path(depth).stem, Path(depth).stem.lower()
-    stems = [_replaced(stem, color) for color in _COLORS] if _DEPTH in lower else [stem]
-    for suffix in COLOR_SUFFIXES:
+def _partner_names(
+    depth: str, words: Sequence[str], suffixes: Sequence[str], without_word: bool = True
+) -> Iterator[str]:
+    """Names that a partner may have. without_word: whether one may have the depth picture's own name."""
+    stem = Path(depth).stem
+    if _DEPTH in stem.lower():
+        stems = [_replaced(stem, word) for word in words]
+    else:
+        stems = [stem] if without_word else []
+    for suffix in suffixes:
         yield from (name for one in stems if (name := one + suffix) != depth)
 
 
 def _pose_names(depth: str) -> Iterator[str]:
     stem = Path(depth).stem
     if _DEPTH in stem.lower():
-        yield _replaced(stem, _POSE) + _POSE_SUFFIX
-    yield from (f"{stem}.{_POSE}{_POSE_SUFFIX}", stem + _POSE_SUFFIX)
+        yield _replaced(stem, _POSES[0]) + _POSE_SUFFIX
+    yield from (f"{stem}.{_POSES[0]}{_POSE_SUFFIX}", stem + _POSE_SUFFIX)
 
 
 def _replaced(stem: str, word: str) -> str:
     """The name with a word in place of `depth`."""
     at = stem.lower().rindex(_DEPTH)
     return stem[:at] + word + stem[at + len(_DEPTH) :]
-
-
-def _first(folder: Path, there: set[str], names: Iterator[str]) -> Path | None:
-    return next((folder / name for name in names if name in there), None)

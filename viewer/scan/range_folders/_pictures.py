@@ -1,23 +1,30 @@
-"""Range views of pictures: depth as 16-bit PNG or TIFF; colours, mask and confidence as PNG, JPEG or TIFF."""
+"""Range views of pictures: depth as 16-bit PNG, TIFF, NPY or EXR; colours, mask and confidence as PNG, JPEG
+or TIFF."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError, Scan4DError
-from ..admission import opened
+from .. import formats
+from ..admission import admit, opened, size_of
 from ..formats._pictures import COLOR_KINDS, DEPTH_KINDS, numbers_of_picture, opened_picture, srgb_of_picture
+from ..formats._stored import StoredArray
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, mask_of
+from ..reading.camera import DepthCamera, Size, have_same_aspect
+from ..reading.sequence import Decided
 from ..units import usable_unit
-from ._calibration import Calibration
 
 COLOR_SUFFIXES = (".png", ".jpg", ".jpeg")
 DEPTH_SUFFIX = ".png"
+OTHER_DEPTH_SUFFIXES = (".tif", ".tiff", ".npy", ".exr")
+_ALIKE = 0.02  # how far the ratio of aspect ratios of colours and depth may be from 1
 
 _SIXTEEN_BITS = "I;16"  # as Pillow calls a grey picture of these
 _COLORED = ("RGB", "RGBA", "LA", "P")  # likewise
@@ -40,11 +47,32 @@ def is_depth(path: Path) -> bool:
 
 
 def read_depth(path: Path) -> NDArray:
-    """The numbers of a 16-bit grey PNG, or of a TIFF, (H, W). Raises InputError."""
+    """The numbers of a 16-bit grey PNG, of a TIFF, of a NPY or of an EXR, (H, W). Raises InputError.
+
+    Depth that an EXR has no number for is NaN.
+    """
+    if path.suffix.lower() == ".npy":
+        return _read_npy(path)
+    if path.suffix.lower() == ".exr":
+        views = formats.read(path)
+        if not isinstance(views, tuple):
+            raise InputError("holds points, but a depth picture is expected", path)
+        return np.where(views[0].mask, views[0].depth, np.float32(np.nan))
     with opened_picture(path, DEPTH_KINDS) as image:
         if image.format == "PNG" and not image.mode.startswith(_SIXTEEN_BITS):
             raise InputError(f"is a picture of type {image.mode}, but a depth picture must be 16-bit grey")
         return numbers_of_picture(image)
+
+
+def _read_npy(path: Path) -> NDArray:
+    """The numbers of a NPY file, (H, W). Raises InputError."""
+    with formats.one_message(path, "cannot be read"), opened(path) as stream:
+        array = StoredArray.open("depth", stream, size_of(stream))
+        if len(array.shape) != 2 or array.dtype.kind not in "fiu":
+            raise InputError(f"is {array.shape} {array.dtype}, but a depth picture is (H, W) numbers", path)
+        admit(size_of(stream), array.memory())
+        values = array.read()
+    return values.astype(values.dtype.newbyteorder("="), copy=False)
 
 
 def read_color(path: Path) -> NDArray[np.uint8]:
@@ -59,52 +87,88 @@ def read_numbers(path: Path) -> NDArray:
         return numbers_of_picture(image.convert("L") if image.mode in _COLORED else image)
 
 
-def depth_view(
-    depth: Path,
-    color: Path | None,
-    calibration: Calibration,
-    world_to_camera: NDArray[np.float64],
-    name: str = "camera",
-    mask: Path | None = None,
-    confidence: Path | None = None,
-) -> RangeView:
-    """The range view of a depth picture, and of colours, mask and confidence of the same pixels.
+@dataclass(frozen=True, kw_only=True)
+class ViewFiles:
+    """The pictures of one range view: its depth, and perhaps its colours, mask and confidence."""
 
-    Of whole numbers, 0 and 65535 mean that nothing was measured. Raises InputError.
+    depth: Path
+    color: Path | None = None
+    mask: Path | None = None
+    confidence: Path | None = None
+
+
+def depth_view(
+    files: ViewFiles,
+    camera_of: Callable[[NDArray, Size | None], DepthCamera],
+    world_to_camera: NDArray[np.float64],
+    decided: Decided,
+    name: str = "camera",
+) -> RangeView:
+    """The range view of a depth picture, and of its colours, mask and confidence.
+
+    camera_of: the camera of the stored numbers, (H, W), beside colours of this size. Pictures of another size
+    with the same aspect ratio count as they lie over the depth. Of whole numbers, 0 and 65535 mean that
+    nothing was measured. Raises InputError.
     """
-    stored = read_depth(depth)
-    calibration.check_size(stored.shape[::-1], depth)
+    stored = read_depth(files.depth)
+    color = None if files.color is None else read_color(files.color)
+    try:
+        camera = camera_of(stored, None if color is None else size_of_image(color))
+    except InputError as error:
+        raise InputError(error.what, error.where or files.depth, error.hint) from error
     measured = np.ones(stored.shape, bool)
     if stored.dtype.kind != "f":
         measured = (stored != 0) & (stored != _NOTHING)
+    if files.mask is not None:
+        mask = over_depth(read_numbers(files.mask), stored)
+        if mask is None:
+            raise InputError("is a mask of another shape than its depth picture", files.mask)
+        measured &= mask_of(mask)
 
-    def of_same_pixels(path: Path, what: str, read: Callable[[Path], NDArray]) -> NDArray:
-        image = read(path)
-        if image.shape[:2] != stored.shape:
-            sizes = f"has {_size(image)} pixels, but its depth picture has {_size(stored)}"
-            raise InputError(sizes, path, f"{what} must have the same size")
-        return image
+    def lying_over(image: NDArray, what: str) -> NDArray | None:
+        """The image over the depth; None, and a message, where it has another aspect ratio."""
+        if (fitting := over_depth(image, stored)) is None:
+            sizes = f"{_shown(image)} pixels, but its depth picture has {_shown(stored)}"
+            decided.note_unused(f"{what} of {sizes}")
+            decided.report("camera", f"Scan4D leaves out the {what}: a picture has {sizes}")
+        return fitting
 
-    if mask is not None:
-        measured &= mask_of(of_same_pixels(mask, "A mask", read_numbers))
+    confidence = None
+    if files.confidence is not None:
+        confidence = lying_over(read_numbers(files.confidence), "confidence")
     return RangeView(
-        depth=stored.astype(np.float32) / np.float32(calibration.depth_scale),
-        kind=calibration.kind,
+        depth=stored.astype(np.float32) / np.float32(camera.depth_scale),
         mask=measured,
-        color=None if color is None else of_same_pixels(color, "Colours", read_color),
-        confidence=None
-        if confidence is None
-        else of_same_pixels(confidence, "Confidence", read_numbers).astype(np.float32),
-        fx=calibration.fx,
-        fy=calibration.fy,
-        cx=calibration.cx,
-        cy=calibration.cy,
-        distortion=calibration.distortion,
+        color=None if color is None else lying_over(color, "colours"),
+        confidence=None if confidence is None else confidence.astype(np.float32),
         world_to_camera=world_to_camera,
         name=name,
-        unit=usable_unit(calibration.unit) or UNKNOWN_UNIT,
+        unit=usable_unit(camera.unit) or UNKNOWN_UNIT,
+        **camera.of_view,
     )
 
 
-def _size(image: NDArray) -> str:
-    return f"{image.shape[1]} x {image.shape[0]}"
+def over_depth(image: NDArray, depth: NDArray) -> NDArray | None:
+    """The image, (h, w) or (h, w, 3), at the pixels of the depth (H, W); None where it has another shape.
+
+    Each pixel of the depth gets the nearest one of the image. Both show the same if aspect ratios agree.
+    """
+    (height, width), (rows, columns) = depth.shape, image.shape[:2]
+    if (height, width) == (rows, columns):
+        return image
+    if not have_same_aspect((columns, rows), (width, height), _ALIKE):
+        return None
+    row, column = (
+        (np.arange(count) * 2 + 1) * other // (2 * count)
+        for count, other in ((height, rows), (width, columns))
+    )
+    return np.ascontiguousarray(image[row[:, None], column])
+
+
+def size_of_image(image: NDArray) -> Size:
+    """Width and height of an image, pixels."""
+    return image.shape[1], image.shape[0]
+
+
+def _shown(image: NDArray) -> str:
+    return "{} x {}".format(*size_of_image(image))

@@ -16,12 +16,13 @@ _MOST_BYTES = 64 << 20  # of a log of poses, some hours long
 _WORD_BYTES, _ROW_BYTES = 64, 200  # of memory for a word, and beside the words for a line
 _JSON_BYTES = 30  # of memory for a letter of JSON, at most
 _SPACE, _NEWLINE = 32, 10
+_MARK = "\ufeff"  # of the order of bytes, which some editors write in front
 
 
 def text_of(path: Path) -> str:
     """The text of a file. Raises InputError where there is none."""
     try:
-        return read_text(path, _MOST_BYTES)
+        return read_text(path, _MOST_BYTES).removeprefix(_MARK)
     except OSError as error:
         what, hint = explained(error)
         raise InputError(f"cannot be read: {what}", path, hint) from error

@@ -1,44 +1,107 @@
-"""Depth pictures in general: 16-bit PNG, colours and poses by the same names, and a camera.json."""
+"""Depth pictures in general: colours, poses and masks by the same names, and a file that states the camera.
+
+Most recorders write such folders. They differ in the name and in the form of the file with the camera, which
+`viewer/scan/reading/camera_files.py` knows.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...errors import InputError
 from .. import formats
 from ..image_poses import UPRIGHT
-from ._calibration import calibration_file, read_calibration
-from ._partners import frames_of_pictures, named_pictures, pose_of_file
-from ._pictures import is_depth
+from ..reading.sequence import Decided
+from ._cameras import FolderCamera, camera_of_folder
+from ._partners import (
+    DepthPicture,
+    depth_folder,
+    frames_of_pictures,
+    named_pictures,
+    pose_of_picture,
+    states_a_pose,
+)
+from ._pictures import DEPTH_SUFFIX, is_depth
 from ._source import RangeFrames
 
 TITLE = "depth pictures"
 GENERAL = True
 
-_HINT = 'Put a camera.json beside them: {"fx": 525, "fy": 525, "cx": 319.5, "cy": 239.5, "depth_scale": 1000}'
+_DEPTH = "depth"  # in names
+_INNER = ("keyframes", "EXR_RGBD", "frames")  # folders that recorders put all pictures into
+_HINT = (
+    'Put a camera.json beside them: {"fx": 525, "fy": 525, "cx": 319.5, "cy": 239.5, "depth_scale": 1000}, '
+    "or state it with --read camera=fx,fy,cx,cy"
+)
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """A frame for each depth picture; None where there is none, or the folder may be another scan.
 
-    Raises InputError where depth pictures are all that there is, and their calibration is missing.
+    Raises InputError where 16-bit pictures are all that there is, and nothing says that they are depth.
     """
-    pictures, camera = named_pictures(folder, names), calibration_file(names)
+    base, inner = _with_pictures(folder, names)
+    pictures = named_pictures(base, inner)
     if not pictures:
         return None
-    has_scans = _has_scan_files(names)
-    if (camera is None or has_scans) and not is_depth(pictures[0].depth):
-        return None
-    if camera is None:
-        if has_scans:
+    if _has_scan_files(names):
+        camera = _camera_beside_scans(base, inner, pictures[0].depth, decided)
+        if camera is None:
             return None
-        raise InputError("holds depth pictures without the data of their camera", folder, _HINT)
-    calibration = read_calibration(folder / camera)
-    have_poses = any(picture.pose for picture in pictures)
-    return frames_of_pictures(
-        folder, pictures, calibration, lambda index: pose_of_file(pictures[index]) if have_poses else UPRIGHT
-    )
+    else:
+        camera = camera_of_folder(base, inner, decided.corrections)
+        first = pictures[0].depth
+        if not (camera.is_stated or pictures[0].camera or is_depth(first) or _is_no_png(first)):
+            return None
+        if not (camera.is_stated or pictures[0].camera or _say_depth(pictures, inner)):
+            raise InputError("holds 16-bit pictures, but no file states the camera of depth", folder, _HINT)
+    of_files = any(picture.pose for picture in pictures) or states_a_pose(pictures[0])
+
+    def pose(index: int) -> NDArray[np.float64]:
+        return pose_of_picture(pictures[index]) if of_files else UPRIGHT
+
+    return frames_of_pictures(folder, pictures, camera, pose, decided)
+
+
+def _camera_beside_scans(
+    folder: Path, names: Sequence[str], first: Path, decided: Decided
+) -> FolderCamera | None:
+    """The camera of depth pictures beside scan files, which they may be themselves; None where those are the
+    scan, as no file says that the pictures are depth."""
+    says_depth = _DEPTH in first.relative_to(folder).as_posix().lower()
+    if not (says_depth if _is_no_png(first) else is_depth(first)):
+        return None
+    try:
+        camera = camera_of_folder(folder, names, decided.corrections, only_own=True)
+    except InputError:
+        if not _is_no_png(first):
+            raise
+        return None  # a camera.json of Scan4D's own, beside pictures that it has made
+    return camera if camera.is_stated else None
+
+
+def _is_no_png(path: Path) -> bool:
+    """Whether a depth picture is of a kind that stores no colours but depth or points."""
+    return path.suffix.lower() != DEPTH_SUFFIX
+
+
+def _say_depth(pictures: Sequence[DepthPicture], names: Sequence[str]) -> bool:
+    """Whether the names of the pictures, or of their folder, say that they are depth."""
+    return depth_folder(names) is not None or _DEPTH in pictures[0].depth.name.lower()
+
+
+def _with_pictures(folder: Path, names: Sequence[str]) -> tuple[Path, Sequence[str]]:
+    """The folder that holds the pictures, and the names in it: the folder itself, or one in it."""
+    for name in _INNER:
+        if name in names and depth_folder(names) is None and (folder / name).is_dir():
+            inner = [path.name for path in (folder / name).iterdir()]
+            if depth_folder(inner) is not None:
+                return folder / name, inner
+    return folder, names
 
 
 def _has_scan_files(names: Sequence[str]) -> bool:

@@ -1,8 +1,8 @@
 """Open3D's RGB-D folders: depth/ and color/, poses in trajectory.log or odometry.log, pairs in rgbd.match.
 
 Depth is in millimetres. Each record of a log is three whole numbers and a matrix from the camera to the
-world, in metres, in the order of the frames. Without a camera.json the camera is Open3D's default, a
-PrimeSense: f 525, c 319.5, 239.5.
+world, in metres, in the order of the frames. If no file states the camera, Scan4D takes Open3D's
+default, a PrimeSense: f 525, c 319.5, 239.5 for 640 x 480 pixels.
 """
 
 from __future__ import annotations
@@ -16,27 +16,33 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...files import named_inside
 from ..image_poses import UPRIGHT, from_camera_to_world
-from ._calibration import PRIMESENSE, calibration_beside
-from ._partners import DEPTH_FOLDER, PICTURE_BYTES, DepthPicture, frames_of_pictures, named_pictures
+from ..reading.camera import PRIMESENSE
+from ..reading.sequence import Decided
+from ._cameras import camera_of_folder
+from ._partners import PICTURE_BYTES, DepthPicture, frames_of_pictures, named_pictures
 from ._source import RangeFrames
 from ._texts import rows_of
 
 TITLE = "Open3D's RGB-D images"
+
+_DEPTH_FOLDER = "depth"
 
 _PAIRS = "rgbd.match"
 _LOGS = ("trajectory.log", "odometry.log")  # the better one first
 _RECORD = 19  # numbers: three that count, and a matrix
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """A frame for each depth picture, where a log or a list of pairs stands beside the folder `depth`."""
     known = [name for name in (_PAIRS, *_LOGS) if name in names]
-    if not known or DEPTH_FOLDER not in names:
+    if not known or _DEPTH_FOLDER not in names:
         return None
     pictures = _pairs(folder) if _PAIRS in known else named_pictures(folder, names)
     if not pictures:
-        raise InputError("holds no depth pictures", folder / DEPTH_FOLDER, "They are 16-bit PNG")
-    calibration = calibration_beside(folder, names, PRIMESENSE)
+        raise InputError("holds no depth pictures", folder / _DEPTH_FOLDER, "They are 16-bit PNG")
+    camera = camera_of_folder(
+        folder, names, decided.corrections, default=PRIMESENSE, is_known_scale=True, kind=TITLE
+    )
     log = next((name for name in _LOGS if name in names), None)
     poses = None if log is None else read_log(folder / log)
 
@@ -47,13 +53,14 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
             raise InputError(f"has no pose: {log} holds {len(poses)}", pictures[index].depth)
         return from_camera_to_world(poses[index])
 
-    return frames_of_pictures(folder, pictures, calibration, pose, known)
+    beside = [folder / name for name in known]
+    return frames_of_pictures(folder, pictures, camera, pose, decided, beside)
 
 
 def lacks(names: Sequence[str]) -> str:
     """The folder of depth pictures, where logs or pairs stand without."""
     known = [name for name in (_PAIRS, *_LOGS) if name in names]
-    return f"its folder '{DEPTH_FOLDER}' of 16-bit PNG is missing" if known else ""
+    return f"its folder '{_DEPTH_FOLDER}' of 16-bit PNG is missing" if known else ""
 
 
 def read_log(path: Path) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,12 +26,16 @@ from numpy.typing import NDArray
 from ...errors import InputError, shortened
 from ...files import named_inside
 from ..admission import admit
+from ..contents import StatedCamera
 from ..image_poses import UPRIGHT, from_camera_to_world
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView
+from ..reading.camera import CameraSources, DepthCamera, Size, decide_camera
+from ..reading.camera_files import camera_of
+from ..reading.record import Decision
+from ..reading.sequence import Decided
 from ..times import natural_key
-from ._calibration import Calibration, calibration_of
-from ._pictures import depth_view
+from ._pictures import ViewFiles, depth_view, size_of_image
 from ._source import RangeFrames
 from ._texts import object_of
 
@@ -48,12 +52,12 @@ _NAME_BYTES = 1000  # of memory for a file that a pattern names
 @dataclass(frozen=True)
 class _Pod:
     name: str
-    calibration: Calibration
+    camera: StatedCamera
     world_to_camera: NDArray[np.float64]
     patterns: dict[str, str]  # of the images that it has
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """The frames that pods.json names, None without one. Raises InputError where it is unusable."""
     if FILE not in names:
         return None
@@ -68,23 +72,38 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         raise InputError(f"there is no range image {looked}", folder / FILE)
 
     def read(index: int) -> Iterator[RangeView]:
+        of_frame, cameras = decided.at(index), []
         for pod in pods:
             images = _files(folder, pod, frames[index])
             if images[_RANGE].is_file():
-                yield depth_view(
-                    images[_RANGE],
-                    images.get(_TEXTURE),
-                    pod.calibration,
-                    pod.world_to_camera,
-                    pod.name,
-                    images.get(_MASK),
-                    images.get(_CONFIDENCE),
+
+                def camera_of_pod(stored: NDArray, _: Size | None, pod: _Pod = pod) -> DepthCamera:
+                    found = decide_camera(
+                        CameraSources(stated=[pod.camera], source="file"), size_of_image(stored)
+                    )
+                    cameras.append((pod.name, found.decisions))
+                    return found.camera
+
+                files = ViewFiles(
+                    depth=images[_RANGE],
+                    color=images.get(_TEXTURE),
+                    mask=images.get(_MASK),
+                    confidence=images.get(_CONFIDENCE),
                 )
+                yield depth_view(files, camera_of_pod, pod.world_to_camera, of_frame, pod.name)
+        of_frame.note(*_joined(cameras))
 
     labels = tuple(next(pod.patterns[_RANGE].replace(_ANY, key) for pod in pods) for key in frames)
     used = (pattern.replace(_ANY, key) for pattern, keys in found.items() for key in sorted(keys))
     files = tuple(folder / name for name in (*dict.fromkeys(used), FILE))
     return RangeFrames(folder.resolve().name, labels, read, files, unit)
+
+
+def _joined(cameras: Sequence[tuple[str, tuple[Decision, ...]]]) -> Iterator[Decision]:
+    """The decisions about the cameras of all pods: the value of each by the pod's name."""
+    for of_pods in zip(*(decisions for _, decisions in cameras), strict=True):
+        values = {name: one.value for (name, _), one in zip(cameras, of_pods, strict=True)}
+        yield replace(of_pods[0], value=values)
 
 
 def _rig(stored: dict[str, Any]) -> tuple[str, list[_Pod]]:
@@ -107,10 +126,15 @@ def _pod(stored: Any, name: str, unit: str) -> _Pod:
     if not isinstance(stated, str) or not stated:
         raise InputError(f"the name of {name} is {shortened(stated)}")
     try:
-        default = Calibration(fx=1, fy=1, cx=0, cy=0, depth_scale=1, unit=unit)
+        camera = camera_of(stored, FILE)
+        camera = replace(
+            camera,
+            depth_scale=1.0 if camera.depth_scale is None else camera.depth_scale,
+            unit=unit if camera.unit is None else camera.unit,
+        )
         there = [image for image in _IMAGES if image in stored or image == _RANGE]
         patterns = {image: _pattern(stored, image) for image in there}
-        return _Pod(stated, calibration_of(stored, default), _pose(stored), patterns)
+        return _Pod(stated, camera, _pose(stored), patterns)
     except InputError as error:
         raise InputError(f"pod '{shortened(stated)}' {error.what}", hint=error.hint) from error
 

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..image_poses import UPRIGHT
-from ._calibration import calibration_beside, of_pinhole, read_calibration
+from ..reading.camera import default_camera
+from ..reading.sequence import Decided
+from ._cameras import camera_of_folder
 from ._partners import frames_of_pictures, named_pictures, pose_of_file
 from ._source import RangeFrames
 
@@ -22,24 +24,23 @@ TITLE = "7-Scenes"
 
 _DEPTH, _POSE = ".depth.png", ".pose.txt"
 _INTRINSICS = "camera-intrinsics.txt"
-_KINECT = of_pinhole(585.0, 320.0, 240.0)
+_KINECT = default_camera(585.0, 320.0, 240.0, 640, 480)
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """A frame for each depth picture, where some names end as 7-Scenes has it."""
     has_depth, has_poses = (any(name.endswith(end) for name in names) for end in (_DEPTH, _POSE))
     if not has_depth or not (has_poses or _INTRINSICS in names):
         return None
     pictures = named_pictures(folder, names)
-    if _INTRINSICS in names:
-        calibration = read_calibration(folder / _INTRINSICS, _KINECT)
-    else:
-        calibration = calibration_beside(folder, names, _KINECT)
+    camera = camera_of_folder(
+        folder, names, decided.corrections, default=_KINECT, is_known_scale=True, kind=TITLE
+    )
 
     def pose(index: int) -> NDArray[np.float64]:
         return pose_of_file(pictures[index]) if has_poses else UPRIGHT
 
-    return frames_of_pictures(folder, pictures, calibration, pose, [_INTRINSICS])
+    return frames_of_pictures(folder, pictures, camera, pose, decided)
 
 
 def lacks(names: Sequence[str]) -> str:

@@ -2,8 +2,8 @@
 
 Depth is in 1/5000 m. A pose is a translation and a quaternion x y z w, from the camera to the world, in
 metres. To each depth picture belong the colours and the pose nearest in time, within 0.02 s, each of them
-once. Without a camera.json the camera is the one that the data set's page gives for all of it, ROS's
-default: f 525, c 319.5, 239.5, without distortion.
+once. If no file states the camera, Scan4D takes the one that the data set's page gives for all of it, ROS's
+default: f 525, c 319.5, 239.5 for 640 x 480 pixels, without distortion.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from ...errors import InputError, shortened
 from ...files import named_inside
 from ...rigid import rigid_matrix
 from ..image_poses import UPRIGHT, from_camera_to_world, rotation_of
-from ._calibration import PRIMESENSE, calibration_beside
+from ..reading.camera import PRIMESENSE
+from ..reading.sequence import Decided
+from ._cameras import camera_of_folder
 from ._partners import PICTURE_BYTES, DepthPicture, frames_of_pictures
 from ._source import RangeFrames
 from ._texts import rows_of
@@ -32,7 +34,7 @@ _KINECT = replace(PRIMESENSE, depth_scale=5000.0)
 _MOST_APART = 0.02  # s
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """A frame for each depth picture that is listed; None where nothing lists them."""
     if _DEPTH not in names or not {_COLOR, _POSES} & {*names}:
         return None
@@ -48,7 +50,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
         )
         for words, color in zip(rows, colors, strict=True)
     ]
-    calibration = calibration_beside(folder, names, _KINECT)
+    camera = camera_of_folder(folder, names, decided.corrections, default=_KINECT, kind=TITLE)
 
     def pose(index: int) -> NDArray[np.float64]:
         if poses is None:
@@ -58,8 +60,8 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
             raise InputError(what, pictures[index].depth)
         return _pose(words, folder / _POSES)
 
-    lists = [name for name in (_DEPTH, _COLOR, _POSES) if name in names]
-    return frames_of_pictures(folder, pictures, calibration, pose, lists, times - times[0])
+    lists = [folder / name for name in (_DEPTH, _COLOR, _POSES) if name in names]
+    return frames_of_pictures(folder, pictures, camera, pose, decided, lists, times - times[0])
 
 
 def lacks(names: Sequence[str]) -> str:
