@@ -265,10 +265,9 @@ class RangeView:
 
 
 def assumed_pinhole(width: int, height: int) -> dict[str, Any]:
-    """Default calibration for pictures of this size, and `assumed`, as in RangeView: 45 degrees across the
-    longer edge."""
+    """A camera for pictures of this size, and `assumed`, as in RangeView: 45 degrees across the longer edge."""
     focal = max(width, height) / (2 * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
-    shown = f"Scan4D found no calibration and assumes a field of view of {_FIELD_OF_VIEW:g} degrees"
+    shown = f"Scan4D found no camera and assumes a field of view of {_FIELD_OF_VIEW:g} degrees"
     return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": shown}
 
 

@@ -156,7 +156,7 @@ def test_a_calibration_that_is_none_is_told(tmp_path: Path, stored: str, told: s
 def test_without_a_calibration_it_says_what_is_missing(tmp_path: Path) -> None:
     put(tmp_path, "a", "b", camera=False)
     (tmp_path / "a.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
-    assert "no file states the camera" in refusal(tmp_path)
+    assert "no file states their camera" in refusal(tmp_path)
     assert "depth_scale" in refusal(tmp_path)
     assert [one.kind for one in list_folder(tmp_path)] == ["file"]  # the table alone
 

@@ -108,8 +108,8 @@ def test_a_default_for_other_pictures_is_passed_over() -> None:
     assert camera.fx == pytest.approx(386.27, abs=0.01)  # 45 degrees across 320 pixels
     assert (camera.cx, camera.cy) == (160, 90)
     assert "assumes a field of view of 45 degrees" in camera.assumed
-    assert "for 640 x 480 pixels" in camera.assumed
-    assert "--read camera=" in camera.assumed
+    assert "for 640 x 480 pixels" in decision.why
+    assert "--read camera=" in decision.why
     assert decision.is_marked
     assert decision.alternatives == ("262.5,262.5,159.5,89.5",)
 

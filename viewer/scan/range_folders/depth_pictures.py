@@ -58,7 +58,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
         if not (camera.is_stated or pictures[0].camera or is_depth(first) or _is_no_png(first)):
             return None
         if not (camera.is_stated or pictures[0].camera or _say_depth(pictures, inner)):
-            raise InputError("holds 16-bit pictures, but no file states the camera of depth", folder, _HINT)
+            raise InputError("holds 16-bit pictures, but no file states their camera", folder, _HINT)
     of_files = any(picture.pose for picture in pictures) or states_a_pose(pictures[0])
 
     def pose(index: int) -> NDArray[np.float64]:

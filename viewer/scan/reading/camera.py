@@ -171,7 +171,7 @@ def _pinhole(sources: CameraSources, size: Size, of_color: Size | None) -> tuple
         stated, camera = _fitting(_ranked(sources.stated, size), size, of_color)
         return camera, _decision(camera, stated, sources.source, stated.where), ""
     assumed = assumed_pinhole(*size)
-    words = assumed.pop("assumed")
+    words = why = assumed["assumed"]
     guess = StatedCamera(
         fx=assumed["fx"], fy=assumed["fy"], cx=assumed["cx"] - CENTER, cy=assumed["cy"] - CENTER,
         width=size[0], height=size[1],
@@ -181,9 +181,9 @@ def _pinhole(sources: CameraSources, size: Size, of_color: Size | None) -> tuple
         if not isinstance(default, str):
             why = f"No file states the camera, so Scan4D takes the default camera of {sources.kind}"
             return default, _decision(default, sources.default, "assumed", "", why, (_as_text(guess),)), ""
-        words += f", as the default camera of {sources.kind} is for {_of(sources.default)}"
+        why += f", as the default camera of {sources.kind} is for {_of(sources.default)}"
     others = () if sources.default is None else (_as_text(scaled_alike(sources.default, size)),)
-    return guess, _decision(guess, guess, "assumed", "", words, others), f"{words}. {_STATE_IT}"
+    return guess, _decision(guess, guess, "assumed", "", f"{why}. {_STATE_IT}", others), words
 
 
 def scaled_alike(camera: StatedCamera, size: Size) -> StatedCamera:

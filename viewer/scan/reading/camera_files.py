@@ -47,7 +47,7 @@ _OTHER_NAMES = (
     "info.txt", "_info.txt", "*_info.txt", "scene*.txt", "calib*.json", "calib*.yaml", "calib*.yml",
     "calib*.txt", "cameras.txt", "metadata.json", "metadata", "transforms.json", "*depth*metadata*.csv",
     "*metadata*depth*.csv", "*depth*metadata*.txt", "*metadata*depth*.txt", "*_metadata.csv",
-    "*_metadata.txt", "*.intrinsics.json", "intrinsic_color.txt",
+    "*_metadata.txt", "*intrinsic*.json", "*intrinsic*.txt", "*camera*.json",
 )  # fmt: skip
 FOLDERS = ("intrinsic", "intrinsics")  # which may hold these files instead
 
@@ -99,14 +99,17 @@ _KINECT_LENS = (4, 5, 13, 12, 6, 7, 8, 9)  # where k1 k2 p1 p2 k3 k4 k5 k6 stand
 
 
 def camera_names(names: Iterable[str]) -> list[str]:
-    """The names among those of a folder that may state its camera, the better file first."""
+    """The names among those of a folder that may state its camera, the better file first.
+
+    Files of the colour camera come last.
+    """
     found = [
-        (rank, name)
+        (bool(_COLOR_WORDS.search(name)), rank, name)
         for name in names
         for rank, pattern in enumerate((*OWN_NAMES, *_SURE_NAMES, *_OTHER_NAMES))
         if fnmatch.fnmatchcase(name.lower(), pattern)
     ]
-    return list(dict.fromkeys(name for _, name in sorted(found)))
+    return list(dict.fromkeys(name for *_, name in sorted(found)))
 
 
 def must_state_a_camera(name: str) -> bool:
