@@ -24,7 +24,6 @@ from viewer.errors import InputError
 TABLES = pytest.mark.xfail(strict=True, reason="tables")
 POINT_FILES = pytest.mark.xfail(strict=True, reason="point files")
 ARRAYS = pytest.mark.xfail(strict=True, reason="arrays and pictures")
-DEPTH_CAMERAS = pytest.mark.xfail(strict=True, reason="depth cameras")
 FRAMES = pytest.mark.xfail(strict=True, reason="frames and times")
 MESHES = pytest.mark.xfail(strict=True, reason="meshes")
 
@@ -323,7 +322,6 @@ def test_21_slicers_table_in_ras_with_a_gap(tmp_path: Path) -> None:
 # --- depth cameras --------------------------------------------------------------------------
 
 
-@DEPTH_CAMERAS
 @pytest.mark.parametrize("name", ["camera_intrinsic.json", "intrinsic.json"])
 def test_22_folders_of_recorders(reported: Path, tmp_path: Path, name: str) -> None:
     folder = shutil.copytree(reported / "22_recorder", tmp_path / "recorder")
@@ -444,7 +442,6 @@ def test_36_an_empty_frame_is_an_empty_picture(
     near(film_changes(command, reported / "36_empty_between", tmp_path / "x.mp4"), (0, 0.04, 0.08), 1e-3)
 
 
-@DEPTH_CAMERAS
 def test_37_the_camera_of_the_neighbour_file(reported: Path, info: Callable[..., Any]) -> None:
     facts = info(reported / "37_camera_in_info")
     near((facts["bounds"]["low"][0], facts["bounds"]["high"][0]), (-0.55, 0.55), 0.005)
@@ -452,7 +449,6 @@ def test_37_the_camera_of_the_neighbour_file(reported: Path, info: Callable[...,
     assert (camera["source"], camera["from"]) == ("neighbour", "info.txt")
 
 
-@DEPTH_CAMERAS
 def test_37_a_default_camera_that_does_not_fit(
     reported: Path, command: Callable[..., Done], tmp_path: Path
 ) -> None:
@@ -470,7 +466,6 @@ def test_37_a_default_camera_that_does_not_fit(
     assert "camera" in done.err
 
 
-@DEPTH_CAMERAS
 def test_38_a_larger_picture(reported: Path) -> None:
     cloud = only(reported / "38_larger_picture")
     assert len(cloud) == 57_600
@@ -540,7 +535,6 @@ def test_the_record_is_corrected_on_the_command_line(reported: Path, info: Calla
     assert decision(facts, "columns")["source"] == "user"
 
 
-@DEPTH_CAMERAS
 def test_a_camera_as_the_message_asks_for_it(
     reported: Path, tmp_path: Path, info: Callable[..., Any]
 ) -> None:

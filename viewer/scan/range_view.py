@@ -265,7 +265,7 @@ class RangeView:
 
 
 def assumed_pinhole(width: int, height: int) -> dict[str, Any]:
-    """A camera for pictures of this size, and `assumed`, as in RangeView: 45 degrees across the longer edge."""
+    """The camera of pictures of this size, 45 degrees across the longer edge, with `assumed` of RangeView."""
     focal = max(width, height) / (2 * math.tan(math.radians(_FIELD_OF_VIEW) / 2))
     shown = f"Scan4D found no camera and assumes a field of view of {_FIELD_OF_VIEW:g} degrees"
     return {"fx": focal, "fy": focal, "cx": width / 2, "cy": height / 2, "assumed": shown}
