@@ -97,7 +97,8 @@ class Grown:
     [
         ({"mode": param("one", "m", when={"sise": (1,)}), "size": param(1, "s")},
          "Wrong.mode depends on 'sise', which is not another parameter. Known: size"),
-        ({"size": param(1, "s", key="K")}, "Wrong.size has a key, but only a bool can have one"),
+        ({"size": param(1, "s", key="K")}, "Wrong.size has a keyboard shortcut, "
+         "but only an on/off parameter can have one"),
         ({"a": param(True, "a", key="K"), "b": param(True, "b", key="K")},
          "Wrong.a has the key 'K', which another parameter also has"),
         ({"size": param(1, "s", deprecated=("mode",)), "mode": param("one", "m")},

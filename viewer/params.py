@@ -177,7 +177,7 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
     """The mistake in a declaration, empty where there is none. by_name: all of the dataclass."""
     others = {name: other for name, other in by_name.items() if name != parameter.name}
     if parameter.key and parameter.type is not bool:
-        return "has a key, but only a bool can have one"
+        return "has a keyboard shortcut, but only an on/off parameter can have one"
     if parameter.key and parameter.key in (other.key for other in others.values()):
         return f"has the key '{parameter.key}', which another parameter also has"
     for old in parameter.deprecated:

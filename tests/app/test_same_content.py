@@ -79,7 +79,7 @@ def test_other_files_under_the_same_name_are_told_and_what_was_made_is_put_aside
     began: list[str] = []
     offer = offer_of_change(saved, found(OTHER), lambda: began.append("anew"))
     assert isinstance(offer, Offer)
-    assert "may belong to another subject" in offer
+    assert "may show another subject" in offer
     keeps, begins = offer.choices
     assert (keeps, begins) == ("Keep the bookmarks", "Begin without the bookmarks")
     offer.choices[begins]()

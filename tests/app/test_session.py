@@ -132,7 +132,7 @@ def test_a_renderer_for_all_scans_that_cannot_draw_one_is_told() -> None:
     with closing(open_scan("demo")) as timeline:
         Rendering(session, Playback(timeline, session), told.append).tell_missing(SOME)
     assert rendered(session)[0] == "surfels"
-    assert told == ["Merged views cannot draw this scan. Discs draws it instead."]
+    assert told == ["Merged views cannot draw this scan. Discs draws the scan instead."]
 
 
 def test_what_is_up_in_one_scan_says_nothing_of_the_next() -> None:
@@ -177,7 +177,7 @@ def test_a_renderer_that_is_not_there_is_told_once_and_another_one_draws() -> No
         rendering = Rendering(session, Playback(timeline, session), told.append)
         for _ in range(2):
             rendering.tell_missing(BARE)
-    assert told == ["This version of Scan4D has no renderer 'gone'. Points draws it instead."]
+    assert told == ["This version of Scan4D has no renderer 'gone'. Points draws the scan instead."]
     assert session.document == document, "it comes back where the renderer is there"
 
 

@@ -176,7 +176,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
     for number in range(3):
         formats.write(scan / f"{number}.npz", PointCloud.from_arrays(np.eye(3) + number))
     with running_app(screen, tmp_path, scan) as app:
-        app.told("The scan has changed since you saved this")
+        app.told("The files of the scan have changed since Scan4D saved your changes")
 
 
 def saved_session(app: RunningApp, name: str) -> Path:
@@ -266,7 +266,7 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
         app.told("cannot read some of the saved changes: parts.landmarks")
-        app.told("This version of Scan4D has no renderer 'cubist'. .* draws it instead")
+        app.told("This version of Scan4D has no renderer 'cubist'. .* draws the scan instead")
         state = app.see(frame=1)
         assert state.document["backend"] == "cubist"
         assert state.document["camera"] == data["document"]["camera"]

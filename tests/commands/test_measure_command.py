@@ -163,7 +163,9 @@ def test_previews_are_told_and_not_measured(run: Run) -> None:
     write("preview", "defined")
     done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "out.csv")
     assert done.code == 0, done.err
-    assert "m.mrk.json: 1 point is a preview, which nobody has confirmed, such as 'a'" in done.err
+    assert (
+        "m.mrk.json: 1 point is a preview, which nobody has confirmed in 3D Slicer, such as 'a'" in done.err
+    )
     assert {row["name"] for row in table(Path("out.csv")) if row["state"]} == {"b"}
     write("preview", "preview")
     done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "none.csv")
@@ -238,14 +240,14 @@ def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
     ("places", "words", "told"),
     [
         ({"a": [5000, 0, 0]}, (), "landmarks.csv: all landmarks lie off the scan"),
-        ({"a": [0, 0, 10000.0], "b": [0, 9900.0, 0]}, (), "they are in another unit"),
+        ({"a": [0, 0, 10000.0], "b": [0, 9900.0, 0]}, (), "their unit differs"),
         ({"a": ["nan", 0, 0]}, (), "landmarks.csv"),
         ({}, (), "landmarks.csv"),
         ({"a": [0, 0, 10]}, ("--noise", "-1"), "'-1' is not a length from 0 to"),
         ({"a": [0, 0, 10]}, ("--noise", "1e200"), "'1e200' is not a length from 0 to 1e+15"),
         ({"a": [0, 0, 10]}, ("--placed-in", "9"), "there is no pose 9"),
         ({"a": [0, 0, 10]}, ("--measures", "landmarks.csv"), "is neither JSON nor TOML"),
-        ({"a": [0, 0, 10]}, ("--measures", "measures.json"), "lacks landmarks for every measure"),
+        ({"a": [0, 0, 10]}, ("--measures", "measures.json"), "has the landmarks of none of the measures"),
         ({"a": [0, 0, 10]}, ("--poses", "9:"), "no frame is in the range 9:"),
     ],
 )  # fmt: skip

@@ -114,7 +114,7 @@ def test_a_picture_lies_behind(run: Run, scans: Path, tmp_path: Path) -> None:
     for arguments, told in (
         ((scan, "--no-gl", "-o", "c.png", "--size", "50x40", *over), "has 96 x 64 pixels, but the picture"),
         ((scan, "-o", "c.cw", *SMALL, *over), "--behind: is not stored in '.cw' files"),
-        ((scan, "-o", "c.png", *SMALL, *over), "--behind: is for pictures without OpenGL"),
+        ((scan, "-o", "c.png", *SMALL, *over), "--behind: applies only to pictures without OpenGL"),
         ((scan, "--no-gl", "-o", "c.png", *SMALL, "--behind", scan), "is not a valid PNG or JPEG or TIFF"),
         ((scan, "--no-gl", "-o", over[1], *SMALL, "--force", *over), "behind.png"),
     ):
@@ -135,7 +135,10 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         ),
         ((scan, "-o", "a.png", "--no-gl", "--quality", "fine"), "--quality: applies only to"),
         ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
-        ((scan, "-o", "a.png", "--no-gl", "--set", "normals=60"), "60 normals have no middle one"),
+        (
+            (scan, "-o", "a.png", "--no-gl", "--set", "normals=60"),
+            "60 values of n'x in the table have no middle value",
+        ),
         ((scan, "-o", "a.png", "--no-gl", "--set", "sises=3"), "Did you mean 'sizes'"),
         ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),
         ((words, "-o", "a.png", "--size", "10x10"), "--size: has no effect"),

@@ -392,7 +392,7 @@ def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> No
     text = json.dumps(json.loads(file.read_text()) | {"format": 2})
     file.write_text(text)
     for _ in range(2):
-        with pytest.raises(InputError, match=r"has the format 2.* They stay unchanged in"):
+        with pytest.raises(InputError, match=r"has the format 2.* The changes stay unchanged in"):
             stored(SESSION.scan)
         with pytest.raises(InputError, match="has the format 2"):
             store(replace(SESSION, pose=1))
@@ -402,7 +402,7 @@ def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> No
 def test_a_document_that_the_system_refuses_to_read_is_neither_moved_nor_written_over() -> None:
     file = stored_file(SESSION.scan)
     file.mkdir(parents=True)  # which root cannot read either
-    with pytest.raises(InputError, match="They stay unchanged in"):
+    with pytest.raises(InputError, match="The changes stay unchanged in"):
         stored(SESSION.scan)
     with pytest.raises(InputError, match="cannot be read"):
         store(SESSION)

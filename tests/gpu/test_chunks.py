@@ -101,7 +101,7 @@ def test_a_picture_of_nothing_looks_at_no_point(renderer: Renderer, monkeypatch:
     while told is None and time.monotonic() < end:
         _, ids, _, told = drawn(renderer, request)
         assert (ids == 0xFFFFFFFF).all()
-    assert told == f"{COUNT:,} of {COUNT:,} are in chunks out of view"
+    assert told == f"{COUNT:,} of {COUNT:,} points are in groups out of view"
 
 
 @pytest.mark.parametrize("name", ["points", "surfels"])

@@ -49,7 +49,7 @@ def test_ply_faces_by_either_name(tmp_path: Path, name: str, faces: str) -> None
         ("", "no faces"),
         ("f 1 2 9\n", "vertex 8 of 4"),
         ("f 1 2 x\n", "faces cannot be read"),
-        ("f 0 1 2\n", "not a vertex"),
+        ("f 0 1 2\n", "vertex that does not exist"),
     ],
 )
 def test_unusable_faces_are_one_message(tmp_path: Path, faces: str, message: str) -> None:
@@ -65,7 +65,11 @@ def test_unusable_faces_are_one_message(tmp_path: Path, faces: str, message: str
         ("element face 1\nproperty int flag\n", "3\n", "refer to no vertices"),
         ("element face 1\nproperty int vertex_index\n", "3\n", "refer to no vertices"),
         ("element face 2\nproperty list uchar int vertex_index\n", "3 0 1 2\n", "holds 1 of the 2 faces"),
-        ("element face 1\nproperty list uchar int vertex_index\n", "3 0 1 -2\n", "not a vertex"),
+        (
+            "element face 1\nproperty list uchar int vertex_index\n",
+            "3 0 1 -2\n",
+            "vertex that does not exist",
+        ),
         ("element face 1\nproperty list uchar float vertex_index\n", "3 0 1 nan\n", "faces cannot be read"),
         (
             "element face 99999999999\nproperty list uchar int vertex_index\n",

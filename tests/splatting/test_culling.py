@@ -234,7 +234,7 @@ def test_what_is_hidden_or_beside_the_picture_is_not_drawn(renderer: Renderer) -
     away = looking(cloud, 0)
     eye, target = np.array(away.eye), np.array(away.target)
     render_frame(renderer, replace(request, camera=replace(away, target=tuple(2 * eye - target))), surface)
-    assert surface.stats.skipped["points"] == f"{COUNT:,} of {COUNT:,} are in chunks out of view"
+    assert surface.stats.skipped["points"] == f"{COUNT:,} of {COUNT:,} points are in groups out of view"
     assert (surface.id == 0xFFFFFFFF).all()
 
 

@@ -87,7 +87,8 @@ def run(
                 app.capture.find_unfinished()
                 if start.device is not None:
                     app.notices.tell(
-                        "The display's own GPU draws the window, so a device number has no effect."
+                        "Scan4D draws the window on the GPU of the display, so the device that you "
+                        "chose has no effect."
                     )
                 if start.replay is not None:
                     app.replayer.replay(start.replay)

@@ -150,7 +150,7 @@ class Help(WindowPart):
         imgui.spacing()
         if imgui.button("Copy"):
             imgui.set_clipboard_text(f"Scan4D {__version__}, OpenGL {gpu.driver} on {gpu.device}{software}")
-        widgets.tooltip("Copy version and device, for a report")
+        widgets.tooltip("Copy the version and the graphics device, for a bug report")
 
     COMMANDS = (
         Command("keys", "Keys and mouse", lambda help: help.toggle("Keys and mouse"), "F1"),

@@ -130,7 +130,11 @@ def _checked(given: Mapping[str, Any], commands: CommandTable, problems: list[In
     problems += [unknown_name("table", name, ["keys"]) for name in given if name != "keys"]
     table = given.get("keys", {})
     if not isinstance(table, dict):
-        problems.append(InputError("'keys' is not a TOML table", hint="Write [keys] above the lines"))
+        problems.append(
+            InputError(
+                "'keys' is not a TOML table", hint="Write the line [keys] above the lines that set keys"
+            )
+        )
         table = {}
     changes = {}
     for name, text in table.items():
@@ -160,7 +164,7 @@ def _without_clashes(
                 what = f"{text} is set for both '{other}' and '{name}'"
                 guilty = next((n for n in reversed(changes) if n in (name, other)), None)
                 if guilty:
-                    hint = f"Give one of them other keys. '{guilty}' keeps its default keys"
+                    hint = f"Give one of the two commands other keys. '{guilty}' keeps its default keys"
                     problems.append(InputError(what, hint=hint))
                     del changes[guilty]
                 else:

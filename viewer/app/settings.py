@@ -39,7 +39,7 @@ def load(path: Path) -> tuple[dict[str, Any], list[str]]:
     except ValueError:  # of encoding as well
         return {}, [_put_aside(path, "is damaged")]
     if not isinstance(data, dict) or data.pop("format", None) != FORMAT:
-        return {}, [_put_aside(path, "is of another version of Scan4D")]
+        return {}, [_put_aside(path, "was written by another version of Scan4D")]
     return data, []
 
 

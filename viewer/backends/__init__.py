@@ -65,8 +65,8 @@ AROUND_ALL = (
     "or turned points change both"
 )
 NO_SPACING = (
-    "each point is drawn as large as the spacing of the points, which is unknown for a single point or a "
-    "line seen end on"
+    "each point is drawn as large as the spacing of the points, which is unknown for a single point "
+    "or a line of points that is viewed along the line"
 )
 NO_DETAIL = "octants and sectors divide the whole scan: a tiny detail lies in only a few of them"
 

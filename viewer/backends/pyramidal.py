@@ -14,7 +14,10 @@ from ..projection.settings import ProjectionParams
 from ..scan.pose import Pose
 from . import NO_SPACING, Backend, FrameView, Limit, Suited
 
-_BY_CELLS = "each pixel takes its values from whole cells; at the edges of cells, rounding decides from which"
+_BY_CELLS = (
+    "each pixel takes its values from whole cells; at the edges of cells, rounding decides which cell a "
+    "pixel takes"
+)
 
 
 class Pyramidal(Backend):
@@ -29,8 +32,8 @@ class Pyramidal(Backend):
         "the eye inside the scan": Limit(0.01, _BY_CELLS),
         "coplanar points": Limit(0.008, _BY_CELLS),
         "collinear points": Limit(0.035, _BY_CELLS),
-        "collinear points end on, perspective": Limit(0.08, NO_SPACING),
-        "collinear points end on, orthographic": Limit(0.08, NO_SPACING),
+        "collinear points, viewed along their line, perspective": Limit(0.08, NO_SPACING),
+        "collinear points, viewed along their line, orthographic": Limit(0.08, NO_SPACING),
     }
     default_reasons = {
         "fill": "point clouds have holes to fill, but the polygons of dense range views leave few"

@@ -118,7 +118,8 @@ class Params:
     )
     instancing: str = param(
         "auto",
-        "How the GPU draws splats. auto: the fastest way on this device; tiles: in a compute shader; the "
+        "Method by which the GPU draws splats. auto: the fastest method on this device; tiles: in a "
+        "compute shader; the "
         "others draw quads, from a geometry shader, uniform blocks, buffer textures, vertex attributes or"
         " pulled vertices",
         choices=("auto", *_VARIANTS),
@@ -144,8 +145,8 @@ class Surfels(Backend):
         "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
         "each point 1000 times, without radii": Limit(0.35, _SEEN_THROUGH, _SORTED),
         "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
-        "collinear points end on, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
-        "collinear points end on, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
+        "collinear points, viewed along their line, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
+        "collinear points, viewed along their line, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
         "zero radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
         "negative radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
         "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
@@ -247,7 +248,7 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
         if gaps.texels is not None:
             if own:
                 surface.stats.chosen["radius"] = (
-                    "as large as the gaps, because the scan's own radii leave them open"
+                    "radii as large as the gaps between points, because the scan's own radii leave gaps open"
                 )
             return _Sizes(True, gaps.usual, gaps.largest, {"radii": gaps.texels}), True
     # The spacing takes longer to find than many a pose takes to draw.

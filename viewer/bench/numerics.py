@@ -270,7 +270,9 @@ def _arranged() -> Iterator[Row]:
         return shot.picked(shot.depths().argsort()[:1])
 
     for projection in PROJECTIONS:
-        yield Row(f"collinear points end on, {projection}", end_on(projection), nearest, FLOAT32)
+        yield Row(
+            f"collinear points, viewed along their line, {projection}", end_on(projection), nearest, FLOAT32
+        )
 
     def with_outlier(shot: PointView) -> PointView:
         outlier = shot.picked(np.arange(1)).given(positions=1e6 * _SHIFT[None])
@@ -300,7 +302,7 @@ def _spoilt() -> Iterator[Row]:
     # 1e-4 is where a template that has a special case at y changes over.
     for power in (-7, -4):
         yield Row(
-            f"normals within 10^{power} of the y axis",
+            f"normals that deviate from the y axis by 10^{power} rad",
             lambda: _sheet().moved(turn=_QUARTER_TURN),
             partial(about_y, angle=10.0**power),
             Tolerance(FLOAT32.error + 5 * 10.0**power, "a splat of 5 px, tilted by that angle"),

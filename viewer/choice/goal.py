@@ -49,7 +49,9 @@ def in_unit(goal: Goal, unit: str) -> Goal:
     factor = conversion(goal.unit, unit)
     if factor is None:
         hint = f"Use pixels, such as 0.5px, or the scan's unit: --error {goal.bound:g}{unit}"
-        raise InputError(f"'{goal.unit}' cannot be converted to the scan's '{unit}'", "--error", hint)
+        raise InputError(
+            f"'{goal.unit}' of the limit cannot be converted to the scan's '{unit}'", "--error", hint
+        )
     return Goal("error", goal.bound * factor, unit)
 
 

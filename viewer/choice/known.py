@@ -30,7 +30,9 @@ def model_of(gpu: Gpu, file: Path | None = None) -> Model:
         kept = read_models(resource_path("assets", FILE)).get("software")
     if kept is None:
         what = f"Scan4D does not know how long {gpu.device} takes for a picture"
-        raise InputError(what, "automatic choice", "Measure it once: scan4d bench --calibrate -o DIR")
+        raise InputError(
+            what, "automatic choice", "Measure this device once: scan4d bench --calibrate -o DIR"
+        )
     return kept
 
 

@@ -55,7 +55,7 @@ class Params:
     )
     normals: int = param(
         61,
-        "Number of values of n'x, and of n'y, in the table; odd",
+        "How many values the table has for each slope of a normal, n'x and n'y; odd",
         low=3,
         high=121,
         group="Words",
@@ -63,7 +63,8 @@ class Params:
     )
     normal_parts: int = param(
         5,
-        "Number of values of n'x and n'y from 0 to 1, where 1 is a tilt of 45 degrees",
+        "How many values the table has for slopes of a normal (n'x or n'y) from 0 to 1, where 1 is a "
+        "tilt of 45 degrees",
         low=1,
         high=20,
         group="Words",

@@ -94,7 +94,10 @@ class WordStream:
         if (np.diff(starts) < 0).any():
             raise InputError("a line of code words begins before the one above it")
         if len(self.ids) != count or (self.finer is not None and self.finer.shape != (count, 3)):
-            raise InputError("the number of ids or finer depths does not match the code words")
+            raise InputError(
+                "a file of code words must store an id for each code word, and depths of its corners for "
+                "all code words or for none"
+            )
 
     def _check_depths(self) -> None:
         least = _NEAREST if self.perspective else -_FARTHEST

@@ -51,7 +51,9 @@ class Steps:
         if min(self.sizes, self.size_parts, self.normals, self.normal_parts) < 1:
             raise InputError("steps of code words must be at least 1")
         if self.normals % 2 == 0:
-            raise InputError(f"{self.normals} normals have no middle one", hint="Use an odd number")
+            raise InputError(
+                f"{self.normals} values of n'x in the table have no middle value", hint="Use an odd number"
+            )
         if (self.sizes - 1) / self.size_parts > _MOST_RADIUS:
             raise InputError(f"radii in a table of code words must not exceed {_MOST_RADIUS} pixels")
 

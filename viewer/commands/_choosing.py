@@ -47,7 +47,11 @@ def goal_of(args: Namespace) -> Goal | None:
     (name,) = given
     if args.backend not in (None, AUTO):
         hint = f"Use --backend {AUTO}, or leave out --{name}"
-        raise InputError(f"the command already names the renderer: {args.backend}", f"--{name}", hint)
+        raise InputError(
+            f"this limit chooses the renderer, but the command already names one: {args.backend}",
+            f"--{name}",
+            hint,
+        )
     for other, what in _OTHERS.items():
         if getattr(args, other):
             raise InputError(what, f"--{other}", f"Leave out --{other} or --{name}")

@@ -30,11 +30,14 @@ def check_on_scan(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
     if found.is_framed and last >= len(timeline):
         raise InputError(
             f"has landmarks in {frame_in_words(last)}, but the scan has only {len(timeline)} frames", path,
-            "They belong to another scan",
+            "The landmarks belong to another scan",
         )  # fmt: skip
     apart = why_apart(found, framing(timeline, range(len(timeline))))
     if apart is not None:
-        hint = "Use landmarks of this scan; --axes and --unit give the axes and unit of the scan"
+        hint = (
+            "Use landmarks that belong to this scan. Check that --axes and --unit state the axes and the "
+            "unit of the scan"
+        )
         raise InputError(apart, path, hint)
 
 

@@ -46,7 +46,7 @@ def add_measuring_arguments(parser: ArgumentParser) -> None:
         help="quick run with few scenes, few views and small pictures, about two minutes",
     )
     parser.add_argument(
-        "--report", action="store_true", help="measure nothing; make the report from the rows in DIR"
+        "--report", action="store_true", help="measure nothing; make the report from the results in DIR"
     )
     parser.add_argument(
         "--data", type=Path, metavar="DIR",
@@ -55,7 +55,9 @@ def add_measuring_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--size", type=arguments.size, metavar="WxH", help="size of the pictures; default 1920x1280"
     )
-    parser.add_argument("--views", type=arguments.count, metavar="N", help="views of each scene; default 20")
+    parser.add_argument(
+        "--views", type=arguments.count, metavar="N", help="number of views of each scene; default 20"
+    )
     parser.add_argument(
         "--seed", type=arguments.seed, metavar="N", help="seed of viewpoints, samples and noise; default 0"
     )
@@ -147,7 +149,10 @@ class MeasuringPlan(NamedTuple):
             report()
         except KeyboardInterrupt:
             if any(measured):
-                warn(f"{out} holds the rows. The same command with --report makes the page from them")
+                warn(
+                    f"{out} holds the results. Run the same command with --report to make the page from "
+                    "these results"
+                )
             raise
 
     def _foretell(self, bench: Bench) -> None:
@@ -157,9 +162,9 @@ class MeasuringPlan(NamedTuple):
             rows = sum(len(group.contenders) for group in self.groups)
             minutes = f"{seconds / 60:.0f} minutes" if seconds >= _MINUTES else f"{seconds:.0f} seconds"
             scenes = len({group.scene for group in self.groups})
-            tell(f"{rows} rows on {scenes} scenes: about {minutes}")
+            tell(f"{rows} combinations of renderer and parameters on {scenes} scenes: about {minutes}")
         if self.others:
-            tell(f"After that, {', '.join(self.others)}: some more minutes")
+            tell(f"After that, {', '.join(self.others)} will take some more minutes")
 
 
 def _drawn(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:

@@ -77,7 +77,7 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
 def _check_arguments(args: Namespace) -> None:
     if given := arguments.given(args, _OF_RECORDING):
         hint = "The recording defines what to draw. Leave these options out"
-        raise InputError(f"--replay takes no {', '.join(given)}", args.replay, hint)
+        raise InputError(f"--replay cannot be combined with {', '.join(given)}", args.replay, hint)
 
 
 def _of_film(entries: Sequence[Entry], times: FilmTimes) -> Sequence[Entry]:
@@ -204,7 +204,7 @@ def _open(scan: str, path: Path) -> tuple[str, Timeline]:
     if is_demo(scan) or os.path.isabs(scan):
         raise missing
     hint = (
-        f"Scan4D looked in '{path.parent}' and in the working directory. Put the scan there, or correct "
-        "'scan'"
+        f"Scan4D looked in '{path.parent}' and in the working directory. Put the scan there, or "
+        "correct the field 'scan' of the recording"
     )
     raise InputError(f"its scan '{scan}' is missing", path, hint) from missing

@@ -130,7 +130,9 @@ def _background(path: Path | None, size: tuple[int, int]) -> NDArray[np.uint8] |
     height, width = colors.shape[:2]
     if (width, height) != size:
         what = f"has {width} x {height} pixels, but the picture has {size[0]} x {size[1]}"
-        raise InputError(what, path, "Resize it, or change the size of the picture with --size")
+        raise InputError(
+            what, path, ("Resize the background picture, or change the size of the picture with --size")
+        )
     return np.dstack([colors, np.full((height, width), 255, np.uint8)])
 
 

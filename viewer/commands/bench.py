@@ -67,7 +67,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="measure only what the automatic choice needs on this device, and store it for this user",
     )  # fmt: skip
     parser.add_argument(
-        "--compare", type=Path, metavar="OLD", help="list what got slower or worse than these results"
+        "--compare",
+        type=Path,
+        metavar="OLD",
+        help="compare with these earlier results, and list what got slower or worse",
     )
 
 
@@ -79,7 +82,7 @@ def run(args: Namespace) -> int:
     if args.report:
         if args.compare or args.backend or args.scene:
             hint = "Leave out --compare, --backend and --scene"
-            raise InputError("measures nothing: it reports all rows in DIR", "--report", hint)
+            raise InputError("measures nothing: it reports all results in DIR", "--report", hint)
         claim(_report_files(args.out), [], args.force)
         tell(write_report(args.out))
         return 0
@@ -121,7 +124,7 @@ def _calibrate(args: Namespace) -> int:
             write_rows(args.out / WAYS, bench, 0, bench.until_stopped(measure_ways(bench, scenes)))
         write_notes(args.out, bench.notes)
         if bench.stopped:
-            warn(f"{args.out} holds the rows. 'scan4d bench --calibrate --report' uses them")
+            warn(f"{args.out} holds the results. 'scan4d bench --calibrate --report' uses these results")
             return 1
     tell(keep_model(renderer.gpu, laws_of(read_rows(args.out / WAYS))))
     return 0

@@ -64,10 +64,13 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--delta",
         type=float,
         metavar="D",
-        help="share of the positions that may share their leaf with others; default 0.05",
+        help="share of the positions that may share their octree leaf with others; default 0.05",
     )
     group.add_argument(
-        "--depth", type=int, metavar="H", help="fixed level of the leaves, 0 to 21, instead of a share"
+        "--depth",
+        type=int,
+        metavar="H",
+        help="fixed level of the octree's leaves, 0 to 21, instead of a share",
     )
 
 

@@ -104,7 +104,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     how = parser.add_argument_group("tracking and measuring")
     how.add_argument(
         "--noise", type=_length, default=0.0, metavar="SIGMA",
-        help="standard deviation of a coordinate of the scanner, scan units",
+        help="noise of the scanner: standard deviation of a coordinate, in scan units",
     )  # fmt: skip
     how.add_argument(
         "--order", choices=ORDERS, default=ORDERS[0],
@@ -126,7 +126,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     how.add_argument(
         "--smoothing", type=_time, metavar="SECONDS",
         help=(
-            "width of the smoothing window for speed, acceleration and the table of --numbers; default "
+            "width, in seconds, of the window that smooths speeds, accelerations and the table of "
+            "--numbers; default "
             f"{Smoothing().seconds}"
         )
         ,
@@ -137,7 +138,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     how.add_argument(
         "--least", type=_share, metavar="SHARE",
         help=(
-            "smallest height of a peak that counts as a repeat, as a share of the curve's range; "
+            "smallest height of a repeat's peak, as a share of the curve's range; "
             f"default {_LEAST}"
         ),
     )  # fmt: skip
@@ -281,7 +282,7 @@ def _outputs(args: Namespace) -> list[Path]:
         hint = "Name landmarks that move as one rigid body, separated by commas"
         raise InputError("removing head motion needs three landmarks", "--anchors", hint)
     if args.smoothing is not None and not (is_of_speeds or args.measures):
-        hint = f"Use it with --measures, or --order {' or '.join(ORDERS[1:])}"
+        hint = f"Use this option with --measures, or with --order {' or '.join(ORDERS[1:])}"
         raise InputError("has nothing to smooth", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
         flag = "--least" if args.aligned is None else "--aligned"
@@ -303,8 +304,11 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
     for name, landmark in lacking.items():
         warn(f"Scan4D leaves out '{name}': {args.landmarks} has no landmark '{landmark}'")
     if not kept:
-        hint = f"It has {', '.join(found.names[:_NAMED])}{', ...' if len(found.names) > _NAMED else ''}"
-        raise InputError(f"lacks landmarks for every measure in {args.measures}", args.landmarks, hint)
+        more = ", ..." if len(found.names) > _NAMED else ""
+        hint = f"The file has the landmarks {', '.join(found.names[:_NAMED])}{more}"
+        raise InputError(
+            f"has the landmarks of none of the measures in {args.measures}", args.landmarks, hint
+        )
     names = [measure.name for measure in kept]
     for name in (args.aligned, args.against):
         if name is not None and name not in names:

@@ -120,7 +120,8 @@ def _tell_facts(args: Namespace, timeline: Timeline, facts: Sequence[dict[str, A
         )
         tell(
             f"pose {pose['pose']}: overlap {pose['overlap_before']:.1%} -> {pose['overlap_after']:.2%} of the"
-            f" area, {pose['ties']:.2%} kept from several views with tied weights; pixels kept: {kept}"
+            f" area, {pose['ties']:.2%} kept from several views with tied weights; number of kept "
+            f"pixels: {kept}"
         )
     if args.report:
         save_json(args.report, {"scan": timeline.name, "unit": timeline.unit, "poses": facts})

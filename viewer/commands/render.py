@@ -92,8 +92,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     picture.add_argument(
         "--quality", choices=tuple(SAMPLES),
-        help="anti-aliasing of .png and .mp4: the mean of 1, 5 or 17 samples a pixel; default: balanced, or "
-        "that of --replay",
+        help=(
+            "anti-aliasing of .png and .mp4: the mean of 1, 5 or 17 samples a pixel; default: balanced, "
+            "or as in the recording"
+        ),
     )  # fmt: skip
     picture.add_argument(
         "--marks", choices=MARKS, nargs="+", action="extend", metavar="MARK",
@@ -109,7 +111,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--turntable",
         type=arguments.count,
         metavar="N",
-        help="N pictures all around the scan; a sequence plays meanwhile",
+        help="N pictures of one turn around the scan; a sequence plays during the turn",
     )
     measuring = parser.add_argument_group("statistics")
     measuring.add_argument(
@@ -122,7 +124,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--repeat",
         type=arguments.count,
         metavar="N",
-        help="draw each picture N times after two warm-ups; --stats has the medians",
+        help="draw each picture twice without and N times with measuring; --stats writes the median times",
     )
 
 
@@ -131,7 +133,7 @@ def run(args: Namespace) -> int:
     if without_gl.is_asked(args):
         return without_gl.run(args)
     if args.behind:
-        raise InputError("is for pictures without OpenGL", "--behind", "Add --no-gl")
+        raise InputError("applies only to pictures without OpenGL", "--behind", "Add --no-gl")
     if args.repeat and not args.stats:
         raise InputError("--repeat needs --stats", hint="Add --stats FILE.json")
     if args.stats:

@@ -156,7 +156,9 @@ def _faults(args: Namespace, pods: int) -> list[Faults]:
 def _for_each(flag: str, values: Sequence[Any], pods: int) -> Sequence[Any]:
     """A value for each pod, of one for all or one for each."""
     if len(values) not in (1, pods):
-        raise InputError(f"{len(values)} values for {pods} pods", flag, "Give one for all, or one per pod")
+        raise InputError(
+            f"{len(values)} values for {pods} pods", flag, "Give one value for all pods, or one value per pod"
+        )
     return values if len(values) == pods else [values[0]] * pods
 
 
@@ -197,5 +199,5 @@ def _factors(text: str) -> tuple[float, ...]:
     """Factors of red, green and blue, of one for all or three."""
     factors = _numbers(text)
     if len(factors) not in (1, 3):
-        raise ArgumentTypeError(f"'{text}' is neither one factor nor those of red, green and blue")
+        raise ArgumentTypeError(f"'{text}' is neither one factor nor three factors for red, green and blue")
     return factors if len(factors) == 3 else 3 * factors

@@ -458,7 +458,9 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
         complete |= change
         entries.append(Entry.from_json(complete, where))
         if number and entries[-1].at < entries[-2].at:
-            raise InputError("is earlier than the entry before it", where, "Sort the entries by 'at'")
+            raise InputError(
+                "is earlier than the entry before it", where, "Sort the entries by their field 'at'"
+            )
     return tuple(entries)
 
 

@@ -93,7 +93,9 @@ class SavedSession:
             return None
         what = f"Scan4D cannot read some of the saved changes: {names}"
         return str(
-            InputError(what, self.scan, ("They stay in the file for a version of Scan4D that can read them"))
+            InputError(
+                what, self.scan, ("The changes stay in the file for a version of Scan4D that can read them")
+            )
         )
 
     def save(self, path: Path) -> None:
@@ -189,12 +191,15 @@ def stored(scan: str) -> SavedSession | None:
         what = f"Scan4D cannot read the saved changes ({error.what})"
         if _is_foreign(error):
             hint = (
-                f"They stay unchanged in {path}. The scan opens without them, and Scan4D saves no new changes"
+                f"The changes stay unchanged in {path}. The scan opens without these changes, and "
+                "Scan4D saves no new changes"
             )
             raise InputError(what, scan, hint) from error
         aside = _put_aside(path)
         raise InputError(
-            what, scan, f"Scan4D renamed their file to {aside}. The scan opens without them"
+            what,
+            scan,
+            (f"Scan4D renamed the file of the changes to {aside}. The scan opens without these changes"),
         ) from error
 
 

@@ -294,7 +294,7 @@ def check_format(data: Mapping[str, Any], expected: int, where: object) -> None:
     if type(found) is not int or found != expected:
         what = f"has the format {found!r:.40}, but this version of Scan4D ({__version__}) reads {expected}"
         kind = NewerFormatError if type(found) is int and found > expected else InputError
-        raise kind(what, where, f"Use version {data.get('version')!r:.40}, which wrote it")
+        raise kind(what, where, f"Use version {data.get('version')!r:.40}, which wrote the file")
 
 
 # --- how the library reads ------------------------------------------------------------------

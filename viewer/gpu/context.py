@@ -83,7 +83,7 @@ class Gpu:
             missing = []  # clip control is core since 4.5
         if ctx.version_code < REQUIRED_VERSION or missing:
             raise NoOpenGLError(
-                f"OpenGL {ctx.version_code / 100:.1f} on '{ctx.info['GL_RENDERER']}' is not enough"
+                f"OpenGL {ctx.version_code / 100:.1f} on '{ctx.info['GL_RENDERER']}' is too old"
                 + (f" (no {', '.join(missing)})" if missing else ""),
                 hint=(
                     "Scan4D needs OpenGL 4.3 with ARB_clip_control. Update the graphics driver, or run "
@@ -229,7 +229,9 @@ class Gpu:
             for resource in made:
                 resource.release()
             what = "not enough memory" if self.software else "not enough memory on the graphics card"
-            raise Scan4DError(f"{what} for this picture", hint="Make it smaller, or close other programs")
+            raise Scan4DError(
+                f"{what} for this picture", hint="Make the picture smaller, or close other programs"
+            )
 
     def discard(self, *resources: Resource | None, nbytes: int = 0) -> None:
         """Have these released by the next `collect`. From any thread, a finalizer's too. nbytes: of large

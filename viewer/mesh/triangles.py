@@ -162,7 +162,7 @@ class Mesh:
 def read_mesh(path: Path | str) -> Mesh:
     """The mesh of a file of points with faces. Raises InputError where it is damaged or has no faces."""
     faces, points = read_faces(path), read(path)
-    assert isinstance(points, PointCloud), "formats with faces also hold points"
+    assert isinstance(points, PointCloud), "a file with faces also holds points"
     try:
         return Mesh(points, faces.triangles())
     except InputError as error:

@@ -115,7 +115,9 @@ class RenderTarget(PictureBuffers, Coloring):
         count, asked = self.kind.count, self.stats.asked
         near = None if margin is None else self.kind.near(self.view, margin, reach)
         if near is not None:
-            self.stats.skipped["points"] = f"{count - len(near):,} of {count:,} are in chunks out of view"
+            self.stats.skipped["points"] = (
+                f"{count - len(near):,} of {count:,} points are in groups out of view"
+            )
             if share < 1:
                 near = near[is_sampled(near, share)]
                 self.stats.share, self.stats.left_out = share, round(count * asked) - round(count * share)

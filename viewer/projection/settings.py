@@ -161,7 +161,7 @@ class ProjectionParams:
     antialias: str = param(
         "off",
         "Draw each point as a blurred dot (point spread function) and add up the colours. table: "
-        "read the dot from a table; analytic: compute it for each point",
+        "read the dot from a table; analytic: compute the dot for each point",
         choices=FUNCTIONS,
         group=_SMOOTHING,
         sweep=("off", "table", "analytic"),

@@ -34,10 +34,12 @@ class Faces:
         that cannot be the id of a point.
         """
         if corners.dtype.kind not in "iu":
-            raise InputError(f"a corner of a face is not a vertex: it is of type {corners.dtype}")
+            raise InputError(
+                f"the vertex indices of a face are not whole numbers, but of type {corners.dtype}"
+            )
         ids = np.ascontiguousarray(corners, corners.dtype.newbyteorder("="))
         if ids.size and not 0 <= ids.min() <= ids.max() < NOTHING:
-            raise InputError("a corner of a face is not a vertex")
+            raise InputError("a face refers to a vertex that does not exist")
         if sizes is None:
             sizes = np.full(len(ids), ids.shape[1], np.uint32)
         return cls(sizes.astype(np.uint32, copy=False), ids.ravel().astype(np.uint32, copy=False))

@@ -108,8 +108,8 @@ class PointCloud:
         if unknown := sorted(attributes.keys() - CloudAttributes.__optional_keys__):
             known = ", ".join(CloudAttributes.__annotations__)
             raise TypeError(
-                f"PointCloud.from_arrays has no argument {', '.join(unknown)}. Attributes are {known}; pass "
-                "other numbers of points as scalars={name: values}"
+                f"PointCloud.from_arrays has no argument {', '.join(unknown)}. Attributes are "
+                f"{known}; pass other values per point as scalars={{name: values}}"
             )
         points = np.asarray(positions)
         if points.ndim != 2 or points.shape[1] != 3:

@@ -101,7 +101,7 @@ class RangeView:
         numbers = np.array([self.fx, self.fy, self.cx, self.cy])
         if not ((np.abs(numbers) < _LARGEST).all() and (numbers[:2] > 1 / _LARGEST).all()):
             given = f"fx {self.fx:g}, fy {self.fy:g}, cx {self.cx:g}, cy {self.cy:g}"
-            raise InputError(f"a range view's calibration is unusable: {given}")
+            raise InputError(f"a range view's calibration cannot be used: {given}")
         self._check_distortion()
         if not is_rigid(self.world_to_camera, _RIGID):
             raise InputError("a range view's world_to_camera must be a rotation and a translation")
@@ -221,8 +221,8 @@ class RangeView:
         x, y = self._seen(rows, columns)
         if not can_be_undone(x, -y, self.distortion):
             raise InputError(
-                f"a range view's distortion ({shown}) maps different rays to the same pixel before "
-                "it reaches the picture's corners",
+                f"a range view's distortion ({shown}) maps different directions to the same pixel of "
+                "the picture",
                 hint="Check the coefficients and their order: k1 k2 p1 p2 k3 k4 k5 k6",
             )
 

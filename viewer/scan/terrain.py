@@ -80,7 +80,8 @@ def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, nam
         metre = conversion(METRE, ground.unit)
         if metre is None:
             raise InputError(
-                f"its heights are in '{ground.unit}', over degrees", hint="Convert the heights into metres"
+                f"its heights are in '{ground.unit}', but its ground coordinates are in degrees",
+                hint="Convert the heights into metres",
             )
         east, north = metres_of_a_degree(y)
         x, y, right, down = 0.0, 0.0, right * east * metre, down * north * metre

@@ -109,7 +109,7 @@ def _of_pictures(views: Sequence[RangeView], points: NDArray[np.float64]) -> Upr
         above = nearest_axis(vector(back))
         if first_elevation(Bounds(low, high), above):
             return Upright(above, "the scan is a map of heights", 0.95)
-    return Upright(known, "it points up in the range images", 0.95)
+    return Upright(known, "this axis points up in the range images", 0.95)
 
 
 def _of_a_map(points: NDArray[np.float64], normals: object) -> Upright | None:
@@ -154,13 +154,17 @@ def _of_a_body(points: NDArray[np.float64], normals: object) -> Upright | None:
     near = body.grown(0.5 * max(wide, high, deep))
     points = points[((points > near.low) & (points < near.high)).all(axis=1)]
     if _stands(points, 1):
-        return _facing(points, Upright(UP, "the scan stands stably that way", 0.7))
+        return _facing(points, Upright(UP, "the scan stands stably with this axis up", 0.7))
     if not _is_one_sided(points[:, :2], points[:, 2]):  # a relief, of a face perhaps, stands otherwise
         if _stands(points, 2):
-            return _facing(points, Upright("+z", "the scan stands stably that way", 0.7))
+            return _facing(points, Upright("+z", "the scan stands stably with this axis up", 0.7))
         if high > _UPENDED * max(wide, deep) and _stands(points * (1, -1, 1), 1):
-            return Upright("-y", "the scan stands stably that way", 0.6)
-    return Upright("+z", "the scan is longest along it", 0.6) if deep > _SLENDER * max(wide, high) else None
+            return Upright("-y", "the scan stands stably with this axis up", 0.6)
+    return (
+        Upright("+z", "the scan is longest along this axis", 0.6)
+        if deep > _SLENDER * max(wide, high)
+        else None
+    )
 
 
 def _facing(points: NDArray[np.float64], known: Upright) -> Upright:

@@ -165,7 +165,7 @@ def _draw_chunks(
     if found := chunks.few(surface, margin, few):
         _draw_listed(surface, visits(*found), size)
         left_out = max(chunks.count - found[1], 0)
-        surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} are in chunks out of view"
+        surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} points are in groups out of view"
         return
     surface.clear()
     take_keys(pose.gpu, visits(chunks.start(surface, margin)), surface.depths)

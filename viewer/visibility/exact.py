@@ -106,7 +106,7 @@ def flipping(seen: SeenPoints, radius: float) -> Kernel:
     if not farthest <= radius * _ROUNDED < np.inf:
         raise InputError(
             f"a sphere of radius {radius:g} around the eye does not contain all points",
-            hint=f"The farthest is {farthest:g} away",
+            hint=f"The farthest point is {farthest:g} away",
         )
 
     def shrink(distance: Floats, beyond: Floats, middle: float) -> Floats:

@@ -100,8 +100,8 @@ def test_states_of_markups(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.known[0], [placed, pending, pending, pending, placed, pending])
     np.testing.assert_array_equal(found.positions[0, 1], [1, 2, 3])  # a preview
     assert found.remarks == (
-        "2 points are marked as defined without a position, such as 'd'",
-        "1 point is a preview, which nobody has confirmed, such as 'b'",
+        "2 points have no position, although the file marks them as defined, such as 'd'",
+        "1 point is a preview, which nobody has confirmed in 3D Slicer, such as 'b'",
     )
 
 
@@ -211,7 +211,7 @@ def test_morphologika_of_other_programs(tmp_path: Path) -> None:
         found = read(tmp_path, name, MORPHOLOGIKA)
         np.testing.assert_array_equal(found.positions[1], [[7, 8, 9], [-1, -2, -3]])
         assert len(found) == 2
-        assert found.remarks == ("Scan4D leaves out its labels and lines",)
+        assert found.remarks == ("Scan4D leaves out these parts of the file: labels and lines",)
     flat = read(
         tmp_path, "m.txt", "[individuals]\n1\n[landmarks]\n1\n[dimensions]\n2\n[rawpoints]\n'a\n1 2\n"
     )

@@ -149,9 +149,9 @@ def test_c3d_of_many_points_and_long_names(tmp_path: Path) -> None:
 def test_c3d_tells_what_it_rounds(tmp_path: Path) -> None:
     few = moving(4)
     uneven = replace(few, times=np.array([0, 0.1, 0.5, 0.6]))
-    assert "regular times" in str(write_landmarks(tmp_path / "m.c3d", uneven))
+    assert "evenly spaced times" in str(write_landmarks(tmp_path / "m.c3d", uneven))
     at_once = replace(few, times=np.zeros(4))  # no rate comes of these
-    assert "regular times" in str(write_landmarks(tmp_path / "m.c3d", at_once))
+    assert "evenly spaced times" in str(write_landmarks(tmp_path / "m.c3d", at_once))
     assert np.ptp(np.diff(read_landmarks(tmp_path / "m.c3d").times)) == pytest.approx(0, abs=1e-9)
     far = replace(few, positions=few.positions + 4e6)
     assert "rounded" in str(write_landmarks(tmp_path / "m.c3d", far))

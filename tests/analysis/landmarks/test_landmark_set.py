@@ -52,8 +52,8 @@ BOX = Bounds(np.array([-90.0, 20, 500]), np.array([90.0, 240, 650]))
     ("factor", "words"),
     [
         (1.0, None),
-        (0.001, "multiplied by 1000 they"),
-        (1000.0, "multiplied by 0.001 they"),
+        (0.001, "multiplied by 1000, the landmarks"),
+        (1000.0, "multiplied by 0.001, the landmarks"),
         (np.array([-1, -1, 1]), "signs of x and y reversed"),
         (-7.0, "belong to another scan"),
     ],
@@ -79,7 +79,7 @@ def test_landmarks_that_any_unit_would_shrink_into_the_scan_tell_none() -> None:
         LandmarkSet.of([f"{n}" for n in range(9)], points, notes=LandmarkNotes("mm")), about_the_origin
     )
     assert told is not None
-    assert told.endswith("they belong to another scan")
+    assert told.endswith("the landmarks belong to another scan")
 
 
 def test_one_place_that_is_off_is_told() -> None:

@@ -106,7 +106,7 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
             r"measures\[0\]: the template has no landmark",
         ),
         ({"measures": [{"name": "w"}]}, r"measures\[0\]: needs a 'name' and a 'kind'"),
-        ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "options must be an object"),
+        ({"measures": [{"name": "w", "kind": "k", "options": {"a": 1}}]}, "'options' must contain names"),
         ({"measures": [{"name": "w", "kind": "width"}]}, r"measures\[0\]: unknown kind of measure 'width'"),
         ({"measures": [{"name": "w", "kind": "angle", "landmarks": ["aL"]}]}, "takes 3 landmarks, not 1"),
         ({"more": 1}, "unknown field 'more'"),

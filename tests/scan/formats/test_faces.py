@@ -189,9 +189,9 @@ def test_vertices_of_an_obj_that_are_counted_from_the_end_as_far_as_the_file_is_
 @pytest.mark.parametrize(
     ("kind", "corner", "message"),
     [
-        ("ply ascii uchar int", -1, "not a vertex"),
-        ("obj", -1, "not a vertex"),
-        ("npz <i8", 2**32, "not a vertex"),
+        ("ply ascii uchar int", -1, "a vertex that does not exist"),
+        ("obj", -1, "a vertex that does not exist"),
+        ("npz <i8", 2**32, "a vertex that does not exist"),
     ],
 )
 def test_damaged_faces_tell_nothing_and_cost_no_point(

@@ -216,10 +216,11 @@ def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     remarks = []
     if twice:
         remarks.append(
-            f"{_counted(len(twice), 'name')} appeared twice and got a number, such as '{shortened(twice[0])}'"
+            f"{_counted(len(twice), 'name')} appeared twice, so Scan4D added a number, such as "
+            f"'{shortened(twice[0])}'"
         )
     if unnamed:
-        remarks.append(f"{_counted(unnamed, 'landmark')} had no name and got a number")
+        remarks.append(f"{_counted(unnamed, 'landmark')} had no name, so Scan4D numbered them")
     if changed:
         remarks.append(f"Scan4D shortened or cleaned {_counted(changed, 'name')} that it cannot show")
     return tuple(usable), remarks
@@ -247,7 +248,7 @@ def why_apart(landmarks: LandmarkSet, bounds: Bounds) -> str | None:
         else f"all landmarks lie off the scan, by at least {off.min():.4g} {unit}"
     )
     cause = _cause(points, bounds)
-    return f"{head}: {cause or 'they belong to another scan'}"
+    return f"{head}: {cause or 'the landmarks belong to another scan'}"
 
 
 def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
@@ -260,13 +261,16 @@ def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
         return None
     if fits(points * _TURNED):
         return (
-            "with the signs of x and y reversed, they lie on the scan, so one of the two is in RAS "
-            "and the other in LPS"
+            "with the signs of x and y reversed, the landmarks lie on the scan, so either the "
+            "landmarks or the scan is in RAS, and the other is in LPS"
         )
     span = float(np.linalg.norm(np.ptp(points, axis=0)))
     for factor in _FACTORS:
         if factor * span >= _WIDE * bounds.radius and fits(points * factor):
-            return f"multiplied by {factor:.4g} they lie on the scan, so they are in another unit"
+            return (
+                f"multiplied by {factor:.4g}, the landmarks lie on the scan, so their unit differs from "
+                "the unit of the scan"
+            )
     return None
 
 

@@ -51,7 +51,7 @@ def measure_of(data: Any, where: str) -> Measure:
     if not (isinstance(landmarks, list) and all(isinstance(landmark, str) for landmark in landmarks)):
         raise InputError("'landmarks' is not a list of names", where)
     if not (isinstance(options, dict) and all(isinstance(value, str) for value in options.values())):
-        raise InputError("options must be an object whose values are texts", where)
+        raise InputError("'options' must contain names with texts as values", where)
     measure = Measure(name, kind, tuple(landmarks), options)
     try:
         kind_of(measure)

@@ -129,7 +129,7 @@ def read_distances(
         what = f"belongs to the scan '{min(others)}', not to '{scan}'" if others else "holds no distances"
         raise InputError(what, path, "Open that scan first" if others else _HINT)
     if unplaced := next((name for name, ends in found.items() if not all(ends)), None):
-        raise InputError(f"lacks the position of an end of '{unplaced}'", path, _HINT)
+        raise InputError(f"lacks the position of one end of the distance '{unplaced}'", path, _HINT)
     return {name: (tuple(first), tuple(second)) for name, (first, second) in found.items()}
 
 
@@ -142,7 +142,7 @@ def _rows(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
         for row in rows:
             where = f"{path}, line {rows.line_num}"
             if None in row or None in row.values() or not row.keys() >= set(COLUMNS):
-                raise InputError("has a missing column, or one too many", where, _HINT)
+                raise InputError("lacks a column, or has a column too many", where, _HINT)
             yield where, row
     except csv.Error as error:
         raise InputError(f"is not a table: {error}", f"{path}, line {rows.line_num}", _HINT) from error

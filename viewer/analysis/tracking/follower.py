@@ -218,7 +218,7 @@ class Follower:
         if hold is not None and carried is not None:
             aside = fine.position - carried.position
             if np.linalg.norm(aside) > _ASIDE * self.spacing:
-                raise _Lost("the surface around it moved differently")
+                raise _Lost("the surface around the landmark moved differently")
             left_out = _LEFT_OUT * fine_patch.radius * np.linalg.norm(fine.bent)
             covariance += left_out**2 * np.eye(3) + _BY_BODY**2 * np.outer(aside, aside)
             unsure = (_SLIPPED if hold.slip() > self._bound else _UNSURE) * self.spacing
@@ -226,7 +226,7 @@ class Follower:
         self._found, self._fine_found, self._is_lost = wide.at(fine.position), fine, False
         self._region = Placement(fine.position, wide.turn)
         if np.linalg.eigvalsh(covariance)[-1] > unsure**2:
-            return Sighting.gap("its position along the surface is too uncertain")
+            return Sighting.gap("the landmark's position along the surface is too uncertain")
         placed = wide.turn @ self._spread @ wide.turn.T
         return Sighting(fine.position + self._origin, covariance + placed)
 
@@ -243,13 +243,13 @@ class Follower:
         self, patch: SurfacePatch, surface: MomentSurface, guesses: Iterator[Placement]
     ) -> Placement:
         """The wide patch on a surface, from the first guess from which it fits. Raises _Lost."""
-        reason = "tracking did not find the region around it"
+        reason = "tracking did not find the region around the landmark"
         for start in guesses:
             fit = registered(patch, surface, start, _WIDE[self._is_held], self._loose)
             if fit is None or fit.kept < self._settings.least_kept:
-                reason = "tracking found too little of the surface around it"
+                reason = "tracking found too little of the surface around the landmark"
             elif fit.deviation > self._limit(_OFF_WIDE):
-                reason = "the surface around it has a different shape"
+                reason = "the surface around the landmark has a different shape"
             else:
                 return fit
         raise _Lost(reason)
@@ -261,9 +261,9 @@ class Follower:
         start = Placement(wide.position, wide.turn, bent)
         fine = registered(patch, surface, start, _FINE[self._is_held], slack)
         if fine is None or fine.middle < _MIDDLE:
-            raise _Lost("it is hidden, or there is a hole")
+            raise _Lost("the landmark is hidden, or lies in a hole")
         if fine.deviation > self._limit(_OFF_FINE):
-            raise _Lost("the surface around it has a different shape")
+            raise _Lost("the surface around the landmark has a different shape")
         return fine
 
     def _back(self, surface: MomentSurface, position: Float, turn: Float) -> Float:
@@ -274,9 +274,9 @@ class Follower:
             start = Placement(self._position, turn.T)
             back = registered(patch, self._own, start, _BACK[self._is_held], self._loose)
         if back is None or back.kept < self._settings.least_kept:
-            raise _Lost("tracking back did not find it again")
+            raise _Lost("tracking back to the earlier frame did not find the landmark again")
         if back.deviation > self._limit(_OFF_WIDE):
-            raise _Lost("the surface around it had a different shape")
+            raise _Lost("the surface around the landmark had a different shape")
         return back.position
 
     def _guesses(

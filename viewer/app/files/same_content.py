@@ -40,14 +40,17 @@ def offer_of_change(saved: SavedSession, hash: Future[str | None], begin: Callab
     """
     if hash.result() in (saved.hash, None):
         return ""
-    text = "The scan has changed since you saved this: bookmarks and distances may no longer fit."
+    text = (
+        "The files of the scan have changed since Scan4D saved your changes: bookmarks and distances may "
+        "no longer fit."
+    )
     if not saved.document.made:
         return text
     with suppress(InputError):  # what is kept stays as it is, and a message says so when it is written
         set_aside(saved)
     kept = _made(saved)
     choices = {f"Keep the {kept}": lambda: None, f"Begin without the {kept}": begin}
-    return Offer(f"{text} They may belong to another subject.", choices, _ABOUT)
+    return Offer(f"{text} The files may show another subject.", choices, _ABOUT)
 
 
 def _made(session: SavedSession) -> str:

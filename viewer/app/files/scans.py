@@ -67,7 +67,7 @@ class Scans(WindowPart):
     def tell(self, problems: Sequence[InputError], is_all: bool = False) -> None:
         """Tell in one message what cannot be opened. is_all: whether nothing else was asked for."""
         if problems:
-            others = f" {len(problems) - 1} others cannot be opened either." if len(problems) > 1 else ""
+            others = f" {len(problems) - 1} other scans cannot be opened either." if len(problems) > 1 else ""
             text = f"Cannot open: {problems[0]}.{others}"
             if is_all:
                 self.refuse(text)

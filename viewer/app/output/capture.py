@@ -179,7 +179,7 @@ class Capture(WindowPart):
             words = failure_in_words("Saving the recording", error)
             if journal is not None:
                 journal.leave()
-                words += " Scan4D keeps what it has recorded, and saves it at the next start."
+                words += " Scan4D keeps the recorded part, and saves this part at the next start."
             self.note_of_work(Problem(words))
             return
         if journal is not None:

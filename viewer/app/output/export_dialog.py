@@ -117,7 +117,7 @@ def _edit_format(choices: Choices, even_rate: float, problems: dict[str, str]) -
 def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict[str, str]) -> Choices:
     titles = {f"{w}x{h}": f"{w} x {h}" for w, h in _SIZES}
     if of_view is not None:
-        titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, as the view"
+        titles[f"{of_view[0]}x{of_view[1]}"] = f"{of_view[0]} x {of_view[1]}, the size of the view"
     now = f"{choices.width}x{choices.height}"
     widgets.label(
         "Size",
@@ -139,7 +139,10 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
 
 def _edit_quality(choices: Choices, shown: str) -> Choices:
     """Declare the choice of samples. shown: the word for that of the view."""
-    titles = {AS_SHOWN: f"As in Appearance: {QUALITY_WORDS[shown]}", **QUALITY_WORDS}
+    titles = {
+        AS_SHOWN: f"Anti-aliasing as in the section Appearance: {QUALITY_WORDS[shown]}",
+        **QUALITY_WORDS,
+    }
     imgui.begin_disabled(choices.format == EXR)
     widgets.label("Anti-aliasing", _HELP["quality"])
     quality = widgets.combo("quality", choices.quality, list(titles), titles)

@@ -40,10 +40,13 @@ class Choices:
     pictures: int = param(36, "Number of pictures in one turn", low=2, high=_MOST_PICTURES)
     first: int = param(1, "First frame to export")
     last: int | None = param(None, "Last frame to export; auto: the scan's last", type=int)
-    step: int = param(1, "1: every frame; 2: every second frame; and so on", low=1, high=100_000)
+    step: int = param(
+        1, "Which frames to export. 1: every frame; 2: every second frame; and so on", low=1, high=100_000
+    )
     format: str = param(PNG, "File format", choices=(PNG, EXR, MP4))
     fps: float | None = param(
-        None, "Frames per second of an even film; auto: a film shows each frame until the next one's time",
+        None,
+        "Frames per second of a film with an even rate; auto: each frame stays until the next one's time",
         low=FRAME_RATES[0], high=FRAME_RATES[1], type=float,
     )  # fmt: skip
     width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
@@ -58,7 +61,9 @@ class Choices:
         "The files store no name, path or date of the scan",
     )
     folder: str = param("", "Folder of the exported files")
-    name: str = param("", "File name; Scan4D numbers several files")
+    name: str = param(
+        "", "Name of the file. If there are several files, Scan4D adds a number to the name of each"
+    )
 
     @property
     def size(self) -> tuple[int, int]:

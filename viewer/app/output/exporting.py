@@ -213,7 +213,8 @@ class Exporting(WindowPart):
             self.note_of_work(warning)
         if made.device != self.viewport.renderer.gpu.device:
             self.note_of_work(
-                f"{made.device} drew the export, not the window's GPU: small differences are possible."
+                f"{made.device} drew the exported pictures, not the window's GPU. The pictures may "
+                "differ slightly from the window."
             )
 
     def asks_to_stay(self) -> bool:

@@ -93,7 +93,8 @@ def _in_unit(look: Look, factor: float) -> Look:
 def _edit_background(look: Look) -> Look:
     """Declare what chooses the background, and a field for one's own."""
     help = (
-        "background: colour behind the scan, in the window and in saved pictures. Films have no transparency"
+        "background: colour behind the scan, in the window and in saved pictures. A film cannot have "
+        "a transparent background"
     )
     widgets.label("Background", help, imgui.get_frame_height())
     presets = {color: name for name, color in BACKGROUNDS.items()}
@@ -133,7 +134,7 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
         shown = COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()
         idle["plain"] = f"This has no effect while the colours show {shown}"
     if not is_here:
-        idle |= dict.fromkeys(_OF_NUMBERS, "This frame lacks the data that the colours show")
+        idle |= dict.fromkeys(_OF_NUMBERS, "This frame has no values of the quantity that the colours show")
     if look.light == "auto" and why_unlit:
         idle |= dict.fromkeys(_OF_LIGHT, why_unlit)
     elif look.eye_dome is None:

@@ -71,7 +71,9 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
         return FIRST_GOAL if kind == "ms" else Goal("error", first, kind)
     pixel = 1.0 if kind == PIXELS else footprint or goal.bound / _FIRST_ERROR
     low, high = _TIMES if kind == "ms" else (_ERRORS[0] * pixel, _ERRORS[1] * pixel)
-    widgets.label("Maximum", "Time for one full picture. While you rest, Scan4D refines the picture further")
+    widgets.label(
+        "Maximum", "Time to draw one full picture. While the view rests, Scan4D refines the picture further"
+    )
     flags = imgui.SliderFlags_.logarithmic.value
     edited, bound = imgui.slider_float(
         "##most", goal.bound, low, high, widgets.number_format("%.3g", kind), flags
@@ -92,13 +94,18 @@ def _draw_choice(choosing: Choosing) -> None:
         each.bounded for each in comparison.candidates if each.configuration == choice.configuration
     )
     widgets.fact("90 % within", f"{bounded:.2g} {comparison.goal.unit}")
-    widgets.tooltip("Nine of ten pictures stay within this value, which Scan4D compares with the limit")
+    widgets.tooltip(
+        "Nine of ten pictures are expected to stay within this value. Scan4D compares the value with "
+        "your limit"
+    )
     if measured is not None:
         widgets.fact("Last picture", f"{measured:.3g} ms")
     if choosing.overrun:
         widgets.faint(choosing.overrun)
     if not choice.meets_limit:
-        widgets.faint("No renderer is sure to stay within the limit. Scan4D uses the closest one.")
+        widgets.faint(
+            "No renderer is sure to stay within the limit. Scan4D uses the renderer that comes closest."
+        )
     _draw_curve(comparison, choice)
 
 

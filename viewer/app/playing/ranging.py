@@ -77,7 +77,9 @@ class Ranging(WindowPart):
         """Words of the colour bar while not all frames are known; empty once they are."""
         look, count = self.session.document.look, self._ranges.count
         known = self._ranges.known(look)
-        return f"range of {known} of {count} frames" if is_open_range(look) and 0 < known < count else ""
+        return (
+            f"colour range of {known} of {count} frames" if is_open_range(look) and 0 < known < count else ""
+        )
 
     def advance(self, now: float) -> bool:
         """Go on while nothing else reads or draws; whether there is more to show."""

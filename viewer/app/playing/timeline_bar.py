@@ -119,7 +119,7 @@ class TimelineBar(WindowPart):
         for icon, name, about in (
             (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": start again at the end"),
             (icons.ICON_FA_BACKWARD, "reverse", ""),
-            (icons.ICON_FA_FILM, "every_frame", ": show each one, even if that is slower"),
+            (icons.ICON_FA_FILM, "every_frame", ": show each frame, even if playback gets slower"),
         ):
             self._draw_button(icon, name, accent if getattr(pace, name) else None, about)
         imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())

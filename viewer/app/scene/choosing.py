@@ -137,7 +137,7 @@ class Choosing(WindowPart):
         self.comparison = self.choice = None
         try:
             if not known:
-                raise InputError("no measured renderer can draw this scan")
+                raise InputError("none of the renderers that were measured on this device can draw this scan")
             self.comparison = Comparison.of(known, seen, in_unit(goal, unit), self._model)
         except InputError as error:
             self.problem = error.what

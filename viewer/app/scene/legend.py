@@ -102,7 +102,7 @@ class ViewMarks(WindowPart):
 def _scale_bar_help(orthographic: bool) -> str:
     if orthographic:
         return "Valid at every depth"
-    return "Valid at the depth of the orbit centre; nearer things look larger"
+    return "The scale bar is valid at the depth of the pivot. Nearer objects look larger"
 
 
 class _View:

@@ -82,7 +82,7 @@ def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown
     if shown in picked.scalars:
         words.append(f"{shown} {_number(picked.scalars[shown])}")
     if not picked.measured:
-        words.append(f"hole filled from level {picked.level}")
+        words.append(f"in a hole that the renderer filled from level {picked.level}")
     if picked.at_outline:
         words.append("at an outline")
     return words

@@ -38,7 +38,7 @@ def switch_commands(several: Iterable[Backend]) -> tuple[Command, ...]:
             raise InputError(
                 f"'{parameter.name}' has different keys, {there.key} and {parameter.key}",
                 one.name,
-                "Give it the same key in all backends",
+                "Give this parameter the same key in all backends",
             )
     return tuple(found.values())
 
@@ -92,7 +92,7 @@ class Rendering(WindowPart):
                 if known
                 else f"This version of Scan4D has no renderer '{chosen_backend}'"
             )
-            self.note_of_scan(f"{why}. {backends()[stand_in].title} draws it instead.")
+            self.note_of_scan(f"{why}. {backends()[stand_in].title} draws the scan instead.")
         missed = self.session.scan, look.color_by
         names = self.session.laid.layers(pose).names(pose.overview.scalars)
         drawn_by = backends()[self.session.document.chosen(pose)[0]]

@@ -230,7 +230,9 @@ class Steering(WindowPart):
                 self.session.amend(look=look, front=pose.upright.front)
                 if pose.upright.up != UP:
                     guess = f"{pose.upright.up} is up: {pose.upright.why}"
-                    self.note_of_scan(f"Scan4D guesses that {guess}. Change it below the cube.")
+                    self.note_of_scan(
+                        f"Scan4D assumes that {guess}. You can change the up axis below the orientation cube."
+                    )
             bounds, aspect = self.framing.bounds(pose), self.viewport.aspect
             if camera is not None and not navigation.shows(camera, bounds, aspect):
                 camera = None

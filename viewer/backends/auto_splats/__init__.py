@@ -21,7 +21,9 @@ from .grids import border_of
 from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .values import VALUES, give_value
 
-_HIDDEN_COPIES = "visible copies of a point count as one neighbour, but hidden copies count as several"
+_HIDDEN_COPIES = (
+    "the search takes visible copies of a point as one neighbour, but hidden copies as several neighbours"
+)
 
 _FEW = 200  # points
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
@@ -50,21 +52,21 @@ class Params:
     )
     hidden_neighbors: bool = param(
         True,
-        "Count a point as a neighbour even if a nearer point of the same surface covers its pixel",
+        "Use a point as a neighbour even if a nearer point of the same surface covers its pixel",
         group=_NEIGHBORS,
     )
     outliers: bool = param(False, "Show points without close neighbours", key="Shift+O", group=_NEIGHBORS)
     expansions: int = param(
         3,
-        "Number of times that the search doubles its radius before a point without neighbours counts "
-        "as an outlier",
+        "How often the search for neighbours doubles its radius. A point that still has no "
+        "neighbours is an outlier",
         low=0,
         high=10,
         group=_NEIGHBORS,
     )
     growth: float = param(
         4.0,
-        "Stop the search with fewer than k points if the area can grow by this factor without "
+        "Stop the search with fewer than k neighbours if its area can grow by this factor without "
         "reaching another point",
         low=1,
         high=100,
@@ -104,13 +106,13 @@ class Params:
     )
     cull: bool = param(
         True,
-        "Skip points far behind the nearest ones around them, until a picture needs them",
+        "Skip points far behind the nearest points around them, until a picture needs the skipped points",
         affects="speed",
         group=_SPEED,
     )
     instancing: str = param(
         "auto",
-        "How the GPU draws splats. auto: the fastest way on this device",
+        "Method by which the GPU draws splats. auto: the fastest method on this device",
         choices=("auto", *VARIANTS),
         affects="speed",
         group=_SPEED,
@@ -128,16 +130,17 @@ class AutoSplats(Backend):
     values = VALUES
     limits = {
         "a body, each point 1000 times": Limit(0.012, _HIDDEN_COPIES),
-        "collinear points end on, perspective": Limit(0.001, NO_SPACING),
-        "collinear points end on, orthographic": Limit(0.001, NO_SPACING),
+        "collinear points, viewed along their line, perspective": Limit(0.001, NO_SPACING),
+        "collinear points, viewed along their line, orthographic": Limit(0.001, NO_SPACING),
     }
     default_reasons = {
         "adaptive": "the default improves normals of other scans: 1.3° instead of 1.4° on the bunny, 2.6° "
         "instead of 3.1° on the armadillo",
-        "hidden_neighbors": "the default improves outlines of other scans: spill of 1.2 % instead of 1.8 % "
-        "on the bunny, 2.2 % instead of 3.0 % on the armadillo",
-        "instancing": "on software drivers auto means tiles, so the difference is noise; on hardware auto "
-        "means the fastest way",
+        "hidden_neighbors": "the default improves outlines of other scans: it draws "
+        "1.2 % instead of 1.8 % of the silhouette's area outside the silhouette on the bunny, and "
+        "2.2 % instead of 3.0 % on the armadillo",
+        "instancing": "on software drivers auto means tiles, so the measured difference is "
+        "noise; on graphics cards auto means the fastest method",
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:

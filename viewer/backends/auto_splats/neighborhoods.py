@@ -157,7 +157,7 @@ class Neighborhoods:
         made_of = (view.key, search, share, border)
         if not anew and self._pose is not None and self._pose() is pose and self._made_of == made_of:
             surface.stats.skipped["neighborhoods"] = (
-                "points, camera and search have not changed since the last picture"
+                "points, camera and settings of the search have not changed since the last picture"
             )
             return
         self._made_of, self._pose = None, weakref.ref(pose)

@@ -87,8 +87,9 @@ class Params:
     cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
     quality: str = param(
         "fast",
-        "How a view is read where its samples lie closer together than pixels. fast: once per pixel, between "
-        "two levels; fine: four times per pixel, from a finer level",
+        "How to read a range view where its samples lie closer together than the pixels. fast: one "
+        "value per pixel, interpolated between two levels; fine: four values per pixel, from a finer "
+        "level",
         choices=("fast", "fine"),
         title="Texture sampling",
         group=_VIEWS,

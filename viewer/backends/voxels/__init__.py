@@ -159,7 +159,7 @@ class Voxels(Backend):
     """The backend `voxels`."""
 
     title = "Voxels"
-    good_for = "For large scans: coarser where far away"
+    good_for = "For large scans: coarser where the scan is far away"
     params_class = Params
     rows = "octants"
     blends = True
@@ -177,8 +177,8 @@ class Voxels(Backend):
             Limit(0.65, NO_DETAIL),
         ),
         "collinear points": Limit(0.015, AROUND_ALL),
-        "collinear points end on, perspective": Limit(0.01, NO_SPACING),
-        "collinear points end on, orthographic": Limit(0.01, NO_SPACING),
+        "collinear points, viewed along their line, perspective": Limit(0.01, NO_SPACING),
+        "collinear points, viewed along their line, orthographic": Limit(0.01, NO_SPACING),
         **dict.fromkeys(
             (
                 "one point x1000",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 PANELS = (
     "reference",
     "backend",
-    "signed depth difference in pixel footprints (holes magenta, spill yellow)",
+    "signed depth difference in pixel footprints (holes magenta, pixels outside the true outline yellow)",
     "angle between the normals",
     "largest colour difference of the channels",
 )

@@ -191,7 +191,9 @@ def read_rows(path: Path, needed: dict[str, Any] | None = None) -> list[Row]:
     try:
         lines = path.read_text(encoding="utf-8").split("\n")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot be read: {error}", path, "Name a results.jsonl or its folder") from error
+        raise InputError(
+            f"cannot be read: {error}", path, "Give the path of a results.jsonl, or of its folder"
+        ) from error
     if needed is None:
         needed = _NEEDED.get(path.name, _NEEDED[RESULTS])
     rows = []

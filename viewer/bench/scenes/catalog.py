@@ -133,7 +133,7 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
 def _frame(source: FrameSource, index: int) -> Mesh:
     """The mesh of a frame."""
     points = source.load(index)
-    assert isinstance(points, PointCloud), "formats with faces also hold points"
+    assert isinstance(points, PointCloud), "a file with faces also holds points"
     return smooth(Mesh(points, source.faces(index).triangles()))
 
 
@@ -358,7 +358,9 @@ def subject(
     if scene is None:
         if not Path(name_or_file).is_file():
             if Path(name_or_file).is_dir():
-                raise InputError("is a folder, not a mesh", name_or_file, "Name a PLY, OBJ or NPZ file")
+                raise InputError(
+                    "is a folder, not a mesh", name_or_file, "Give the path of a PLY, OBJ or NPZ file"
+                )
             if Path(name_or_file).name != name_or_file or Path(name_or_file).suffix:
                 raise InputError("no such file", name_or_file)
             raise unknown_name("scene", name_or_file, list(_SCENES))

@@ -97,7 +97,7 @@ class DepthFrames:
     def _view(self, index: int, motion: NDArray[np.float64] | None = None) -> RangeView:
         """The view of a frame. motion: from the image's axes (+y down, +z ahead) to the world."""
         views = self._source.load(index)
-        assert isinstance(views, tuple), "frames of a phone are range views"
+        assert isinstance(views, tuple), "each frame of a phone's depth camera is a range view"
         (view,) = views
         world_to_image = np.eye(4) if motion is None else np.linalg.inv(motion).astype(np.float64)
         near = view.mask & (np.nan_to_num(view.depth) < _ROOM)

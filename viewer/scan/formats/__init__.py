@@ -135,7 +135,7 @@ def read(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Sc
     decided = decided or Decided()
     frames = frame_count(path, decided)
     if not 0 <= frame < frames:
-        raise InputError(f"has no pose {frame}", path, f"It holds {frames}, counted from 0")
+        raise InputError(f"has no pose {frame}", path, f"The file holds {frames}, counted from 0")
     where = path if frames == 1 else f"{path}, {frame_in_words(frame)}"
     with one_message(where, f"cannot be read as {module.TITLE}"):
         return _scanned(module, path, frame, decided)
@@ -313,7 +313,9 @@ def _readable(path: Path) -> ModuleType:
     if path.is_dir():
         raise InputError("is a folder, not a file", path, "Name a file in it")
     if not path.is_file():
-        raise InputError("is a device or a pipe, not a file", path, "Copy its output into a file")
+        raise InputError(
+            "is a device or a pipe, not a file", path, "Copy the data of the device or pipe into a file"
+        )
     suffix = path.suffix.lower()
     if suffix not in _formats():
         hint = _CONVERT.get(suffix, f"Known: {', '.join(known_suffixes())}")  # one that is close is another

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..range_view import RangeView, assumed_pinhole, mask_of
 
-HINT = "Depth of other programs must be a channel Z, as Blender, Nuke and renderers write it"
+HINT = "Files of other programs must store the depth in a channel Z, as Blender, Nuke and renderers write it"
 
 _FARTHEST = 1e10  # what programs write where nothing is, and more
 _UNSKEWED = 1e-3  # what else there may be in a projection, as a part of its focal length

@@ -122,7 +122,9 @@ def _time(words: list[str], path: Path, line: int) -> float:
     if not np.isfinite(time) or len(words) < 2:
         where = f"{path}, line {line}"
         raise InputError(
-            f"'{shortened(' '.join(words))}' is not a row of data", where, "A row is seconds, and a name"
+            f"'{shortened(' '.join(words))}' is not a row of data",
+            where,
+            "A row of the list is a time in seconds and the file name of a picture",
         )
     return time
 
@@ -137,6 +139,6 @@ def _pose(words: list[str], path: Path) -> NDArray[np.float64]:
     try:
         numbers = np.array(words, np.float64).reshape(7)
     except ValueError:
-        hint = "A row is seconds, tx ty tz qx qy qz qw"
+        hint = "A row is a time in seconds, a translation and a quaternion: t tx ty tz qx qy qz qw"
         raise InputError(f"'{shortened(' '.join(words))}' is not a pose", path, hint) from None
     return from_camera_to_world(rigid_matrix(rotation_of(numbers[3:]), numbers[:3]))

@@ -217,7 +217,7 @@ def _files_of(path: Path) -> list[tuple[int, Path]]:
     found = ((re.fullmatch(f"{head}([0-9]{{1,9}}){tail}", name), name) for name in names)
     files = {int(number[1]): path.with_name(name) for number, name in found if number and int(number[1])}
     if not files:
-        raise InputError("no file matches this name", path, "The numbers of the files start at 1")
+        raise InputError("no file matches this name", path, "Number the files of a series from 1")
     return [(number - 1, files[number]) for number in sorted(files)]
 
 

@@ -103,7 +103,7 @@ def _frame(word: str, line: int) -> int:
     word = word.strip()
     frame = count_of(word[:-2] if word.endswith(".0") else word, line, "the frame")
     if frame < 1:
-        raise at_line("has the frame 0, but the first frame is 1", line)
+        raise at_line("names frame 0, but frames are counted from 1", line)
     return frame - 1
 
 

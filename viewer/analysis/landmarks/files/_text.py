@@ -147,7 +147,7 @@ def without_states(landmarks: LandmarkSet, title: str) -> str | None:
     """The remark of a format that has no states, where the landmarks have some."""
     if (landmarks.known == Known.TRACKED).any() or np.isfinite(landmarks.sigmas).any():
         return (
-            f"{title} stores no states and no uncertainty: tracked landmarks count as placed when "
-            "you read the file"
+            f"{title} files store no uncertainty, and not which landmarks were tracked. If you read "
+            "the file, Scan4D takes all landmarks as placed"
         )
     return None

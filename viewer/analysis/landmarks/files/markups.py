@@ -115,12 +115,14 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
     remarks = []
     if lost:
         remarks.append(
-            f"{len(lost)} points are marked as defined without a position, such as '{shortened(lost[0])}'"
+            f"{len(lost)} points have no position, although the file marks them as defined, such as "
+            f"'{shortened(lost[0])}'"
         )
     if previews:
         are = "point is a preview" if len(previews) == 1 else "points are previews"
         remarks.append(
-            f"{len(previews)} {are}, which nobody has confirmed, such as '{shortened(previews[0])}'"
+            f"{len(previews)} {are}, which nobody has confirmed in 3D Slicer, such as "
+            f"'{shortened(previews[0])}'"
         )
     name = _word(markup.get("name"))
     if len(points) == 1 and not names[0]:

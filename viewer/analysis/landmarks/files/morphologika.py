@@ -84,7 +84,7 @@ def read(path: Path) -> LandmarkSet:
         three_numbers([*re.split(r"[\s,;]+", text)[:dimensions], *flat], line) for line, text in places
     ]
     left_out = dict.fromkeys(_LEFT_OUT[name] for name in sections if name in _LEFT_OUT)
-    remarks = [f"Scan4D leaves out its {' and '.join(left_out)}"] if left_out else []
+    remarks = [f"Scan4D leaves out these parts of the file: {' and '.join(left_out)}"] if left_out else []
     if flat:
         remarks.append("Its landmarks have two coordinates: Scan4D sets z to 0")
     frames = _listed(own.get("frames"), individuals)

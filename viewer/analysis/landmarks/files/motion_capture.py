@@ -205,7 +205,7 @@ def _remark(landmarks: LandmarkSet, labels: Sequence[bytes], longest: int, is_ev
     if any(label.decode() != name for label, name in zip(labels, landmarks.names, strict=True)):
         lost.append(f"names are cut after {longest} bytes")
     if not is_even:
-        lost.append("the frames get regular times from 0")
+        lost.append("the frames get evenly spaced times from 0 s, because C3D stores only a frame rate")
     points = landmarks.positions[landmarks.is_defined]
     if len(points):
         off = np.abs(points.astype(np.float32) - points).max()

@@ -63,7 +63,8 @@ def measure_kinds() -> Mapping[str, MeasureKind]:
     def add(_: str, module: ModuleType) -> None:
         if taken := found.keys() & {kind.name for kind in module.KINDS}:
             raise InputError(
-                f"a kind of measure '{min(taken)}' exists already", hint="Give the new one another name"
+                f"a kind of measure '{min(taken)}' exists already",
+                hint="Give the new kind of measure another name",
             )
         found.update((kind.name, kind) for kind in module.KINDS)
 

@@ -70,7 +70,10 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     if options.get("lines") != "all" and _ends_at_opening(
         surface, lines[0], plane_section(patch, center, normal)
     ):
-        return Refused("its line ends at an opening in the surface. Close the opening, or measure all lines")
+        return Refused(
+            "its line ends at an opening in the surface. Fill the opening, or measure along all lines "
+            "(option lines = all)"
+        )
     gradient = np.zeros_like(positions)
     step = _STEP * surface.spacing
     for number in range(len(local)):

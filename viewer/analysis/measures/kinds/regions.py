@@ -170,7 +170,8 @@ def _pulled(edges: list[Line]) -> list[NDArray[np.float64]]:
 
 KINDS = (
     MeasureKind(
-        "area", "Area of a region", "inside an outline that follows the surface between landmarks",
+        "area", "Area of a region",
+        "area of the surface inside an outline that follows the surface between landmarks",
         "area", 3, None, _area, True, {"depth": DEPTHS},
     ),
     MeasureKind(
@@ -180,7 +181,7 @@ KINDS = (
     ),
     MeasureKind(
         "volume", "Volume above the outline's plane",
-        "between a region and the plane of its outline; negative below the plane",
+        "volume between a region and the plane of its outline; negative below the plane",
         "volume", 3, None, _volume, True,
     ),
 )  # fmt: skip

@@ -112,18 +112,21 @@ def _catmull_rom(knots: Positions) -> Positions:
 
 KINDS = (
     MeasureKind(
-        "distance", "Distance", "from the first landmark to the second", "length", 2, 2, _distance,
-        lines=_joined,
+        "distance", "Distance", "straight line from the first landmark to the second",
+        "length", 2, 2, _distance, lines=_joined,
     ),
     MeasureKind(
-        "angle", "Angle", "at the second of three landmarks", "angle", 3, 3, _angle, lines=_joined
+        "angle", "Angle", "angle between two lines that meet at the second of three landmarks",
+        "angle", 3, 3, _angle, lines=_joined,
     ),
     MeasureKind(
-        "plane_angle", "Angle to a plane", f"of the line through the first two landmarks; {_PLANE}",
+        "plane_angle", "Angle to a plane",
+        f"angle between a plane and the line through the first two landmarks; {_PLANE}",
         "angle", 5, None, _plane_angle, choices={"plane": PLANES}, lines=_plane_angle_lines,
     ),
     MeasureKind(
-        "plane_distance", "Distance to a plane", f"of the first landmark, negative on one side; {_PLANE}",
+        "plane_distance", "Distance to a plane",
+        f"distance of the first landmark from a plane, negative on one side; {_PLANE}",
         "length", 4, None, _plane_distance, choices={"plane": PLANES}, lines=_plane_distance_lines,
     ),
     MeasureKind(

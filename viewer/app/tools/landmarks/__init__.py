@@ -195,7 +195,7 @@ class Tool:
     def prompt(self) -> str:
         """The words that say what a click does, and what arrow keys move."""
         if self.notebook.is_pinning:
-            return "Note: click where it belongs. Esc to stop."
+            return "Note: click the position of the note. Esc to stop."
         arrows = f" Arrow keys move {self.selected}." if self.takes_arrows else ""
         return f"{self._prompt_of_click()}{arrows} Esc to stop."
 
@@ -231,7 +231,7 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         point = SurfacePoint.of(click.picked, click.pose, place=click.motion)
         if click.through_gap:
-            self.context.note("No data there: placed on the nearest surface in front.")
+            self.context.note("No point at the click: Scan4D used the nearest surface in front of it.")
         self.corrects = self.corrects and bool(landmark.keys)
         self.selected, self._arrows_in = landmark.name, point.frame
         self.context.change(name, self.made.with_landmark(landmark.with_key(point)), merge=merge)
@@ -502,6 +502,6 @@ COMMANDS = {
 }  # fmt: skip
 MOUSE = (
     ("Click while placing", "Place the next landmark"),
-    ("Drag a landmark while placing", "Correct it in this frame"),
-    ("Arrows after placing or choosing a landmark", "Move it by a pixel, until the frame changes"),
+    ("Drag a landmark while placing", "Correct the landmark in this frame"),
+    ("Arrows after placing or choosing a landmark", "Move the landmark by a pixel, until the frame changes"),
 )

@@ -54,7 +54,7 @@ class Exchange:
             OPEN, "Import landmarks", "A file of landmarks, or a template",
             (".json", *landmark_suffixes()), self._read, redraw,
         )  # fmt: skip
-        about = "Saves names, mirror partners and measures, for use in other scans"
+        about = "Saves the landmarks' names, mirror partners and measures, for use in other scans"
         self._template_saving = FileDialog(
             SAVE, "Save template", about, (".json",), self._save_template, redraw
         )
@@ -125,7 +125,7 @@ class Exchange:
             found = read_landmarks(path, unit)
             problem = None if is_sure else why_apart(found, _bounds(found, timeline, frame))
             if problem is not None:
-                raise InputError(problem, path, "Import the file again to use them anyway")
+                raise InputError(problem, path, "Import the file again to use these landmarks anyway")
             return found, landmarks_of(found, timeline.visit, len(timeline), frame, known)
 
         def take(result: tuple[LandmarkSet, tuple[Landmark, ...]]) -> None:

@@ -179,7 +179,7 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
 
 def _draw_partner(tool: Tool, landmark: Landmark) -> None:
     """Declare the choice of the landmark that is another's mirror image."""
-    widgets.label("Mirror partner", "The landmark on the other side, its mirror image")
+    widgets.label("Mirror partner", "The landmark at the same place on the other side of the body")
     if imgui.begin_combo("##partner", widgets.unhidden(landmark.partner or _NONE)):
         for name in ("", *(one.name for one in tool.made.listed if one.name != landmark.name)):
             label = widgets.labelled(name or _NONE, f"partner {name}")

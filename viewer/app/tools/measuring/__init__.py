@@ -123,7 +123,7 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         end = SurfacePoint.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
-            self.context.note("No data there: placed on the nearest surface in front.")
+            self.context.note("No point at the click: Scan4D used the nearest surface in front of it.")
         log.debug("end at %r, point %s, frame %d", end.position, end.id, end.frame)
         self.set_end(end)
         return True

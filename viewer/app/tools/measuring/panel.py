@@ -55,7 +55,7 @@ def _draw_row(tool: Tool, one: DistanceRow) -> bool:
     imgui.text(widgets.fitted(text, button - imgui.get_cursor_pos_x()))
     about = "± covers the true distance in 95 % of cases. It includes point spacing, pixel size and tracking"
     if any(end.covariance is None for end in one.ends):
-        about = "Its uncertainty is not known: measure it again"
+        about = "The uncertainty of this distance is not known: measure the distance again"
     widgets.tooltip("\n".join([text, *(_end_words(end, scale) for end in one.ends), about]))
     imgui.same_line(button)
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")
@@ -77,7 +77,7 @@ def _end_words(end: SurfacePoint, scale: Scale) -> str:
     what = "surface" if end.id is None else f"at point {end.id}"
     position = ", ".join(f"{scale.factor * v:.9g}" for v in end.position)
     spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"
-    seen = f", filled from level {end.level}" if end.level else ""
-    seen += ", at an outline: it may lie on the surface in front or behind" if end.at_outline else ""
+    seen = f", in a hole that the renderer filled from level {end.level}" if end.level else ""
+    seen += ", at an outline: the point may lie on the surface in front or behind" if end.at_outline else ""
     sure = "" if end.uncertainty is None else f" ± {scale.factor * end.uncertainty:.2g}"
     return f"{what}, {frame_in_words(end.frame)}: {position}{sure} {scale.unit}, spacing {spacing}{seen}"

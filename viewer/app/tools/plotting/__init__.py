@@ -286,7 +286,9 @@ class Tool:
         """Put amplitude, onset, peak and duration of each curve into the clipboard, as a table."""
         rows = [NUMBER_COLUMNS, *number_rows(self.shown.curves)]
         imgui.set_clipboard_text(to_text(rows, "\t"))
-        self.context.note(f"Copied the numbers of {len(self.shown.curves)} curves as a table.")
+        self.context.note(
+            f"Copied amplitude, onset, peak and duration of {len(self.shown.curves)} curves as a table."
+        )
 
     def ask_to_save(self) -> None:
         """Open the dialog that saves, with a name that is free."""

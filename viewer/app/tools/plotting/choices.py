@@ -53,12 +53,15 @@ class Settings:
     )
     bands: bool = param(True, "Band around a curve that covers the true value in 95 % of cases", title="±")
     seconds: float = param(
-        0.3, "Width of the smoothing window, for speeds, accelerations and the numbers under the plot",
+        0.3, (
+            "Width of the window, in seconds, that smooths speeds, accelerations and the numbers under "
+            "the plot"
+        ),
         low=0.02, high=5.0, unit="s", title="Smoothing",
     )  # fmt: skip
     lines: bool = param(True, "Draw each measure in the view, with its value", title="In the view")
     least: float = param(
-        0.5, "Smallest height of a peak that counts as a repeat, as a share of the curve's range",
+        0.5, "Smallest height of a repeat's peak, as a share of the curve's range",
         low=0.05, high=1.0, title="Smallest repeat",
     )  # fmt: skip
     trajectories: bool = param(

@@ -105,7 +105,10 @@ class Lasso:
 
     def prompt(self) -> str:
         """The words that say what a drag does."""
-        return "Press on the surface, draw round the region, let go. Esc to stop."
+        return (
+            "Press the mouse button on the surface, draw round the region, and release the button. Esc "
+            "to stop."
+        )
 
 
 def without_overlap(positions: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -82,7 +82,8 @@ def _draw_noise(tool: Tool) -> None:
     scale, noise = tool.context.scale, tool.choices.noise
     widgets.label(
         "Scanner noise (SD)",
-        "Standard deviation of a coordinate. Scan4D adds it to the uncertainty of measures",
+        "Standard deviation of a coordinate that the scanner measures. Scan4D includes this noise in "
+        "the uncertainty of measures",
     )
     low, high, speed = 0.0, 1e9, 0.01
     changed, new = imgui.drag_float(
@@ -102,11 +103,11 @@ def _draw_paths(tool: Tool) -> None:
         imgui.table_setup_column("landmark", imgui.TableColumnFlags_.width_stretch.value)
         for words, about in (
             ("", ""),
-            ("path", "Draw its path over the picture"),
+            ("path", "Draw the path of this landmark over the picture"),
             (
                 "rigid reference",
-                "A landmark on a part that does not deform, such as the forehead. Scan4D removes the "
-                "motion of these landmarks",
+                "Tick landmarks on a part of the subject that does not deform, such as the forehead. "
+                "Scan4D subtracts their common motion from paths and speeds",
             ),
         ):
             imgui.table_next_column()

@@ -108,10 +108,13 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         imgui.set_next_item_width(_COMBO * em)
         share = imgui.slider_float("##least", 100 * least, 5, 100, "at least %.0f %%")[1]
         least = round(share) / 100
-        widgets.tooltip("Smallest height of a peak that counts as a repeat, in percent of the curve's range")
+        widgets.tooltip("Smallest height of a repeat's peak, in percent of the curve's range")
     widgets.same_line(widgets.check_width("±"))
     bands = imgui.checkbox("±", settings.bands)[1]
-    widgets.tooltip("Band of ±, which holds the true value in 95 % of cases. Repeats: one standard deviation")
+    widgets.tooltip(
+        "Band around each curve, which holds the true value in 95 % of cases. For repeats, the band is "
+        "one standard deviation to each side"
+    )
     widgets.same_line(_SLIDER * em)
     imgui.set_next_item_width(_SLIDER * em)
     points = (
@@ -129,8 +132,8 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         logarithmic,
     )[1]
     widgets.tooltip(
-        "Width of the smoothing window (Savitzky-Golay), for speed, acceleration and the numbers under "
-        "the plot"
+        "Width of the window, in seconds, that smooths speed, acceleration and the numbers under the "
+        "plot (Savitzky-Golay)"
     )
     tool.settings = replace(
         settings, mode=mode, order=order, bands=bands, least=least, seconds=float(f"{seconds:.3g}")
@@ -330,4 +333,4 @@ def _draw_name(tool: Tool, curve: Curve) -> None:
         tool.context.seek(nearest(curve.times, curve.movement.peak))
     if imgui.is_item_hovered():
         tool.pointed = curve.name
-    widgets.tooltip("Click to go to the peak")
+    widgets.tooltip("Click to go to the frame of the peak")
