@@ -145,6 +145,7 @@ class PointContents:
     stated:   what the file states about itself
     remarks:  comments, and other lines of the header
     faces:    reads the faces between the points, in pieces; None where there are none
+    topology: name of the faces, see `PointCloud`; None where there are none
     texture:  of the faces
     head:     text files: the first lines
     held:     bytes of the file in memory, for the admission of what is made of it; None: not packed
@@ -156,6 +157,7 @@ class PointContents:
     stated: Stated = field(default_factory=Stated)
     remarks: tuple[str, ...] = ()
     faces: Callable[[], Iterator[Faces]] | None = None
+    topology: str | None = None
     texture: TextureContents | None = None
     head: TextHead | None = None
     held: int | None = None

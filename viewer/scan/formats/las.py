@@ -3,8 +3,8 @@
 Damaged LAZ can end the process that unpacks it, as the unpacker takes what memory the file asks for: it is
 done in a process of its own.
 
-Coordinates are whole numbers times a scale and an offset, as float64. Colours count as 16 bit, as 8 bit where
-none is above 255, as many programs write them. Intensity, classification, returns, times and extra dimensions
+Coordinates are whole numbers times a scale and an offset, as float64. Colours are of 16 bit, or of 8 bit as
+many programs write them. Intensity, classification, returns, times and extra dimensions
 are scalars; those that are the same for all points are left out.
 """
 
@@ -26,9 +26,6 @@ from ...task import checkpoint
 from ...unfinished import temporary_folder
 from ..admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
 from ..contents import PointContents
-from ..points import PointCloud
-from ..reading.cloud import assemble
-from ..reading.sequence import Decided
 from ._columns import named
 
 if TYPE_CHECKING:
@@ -49,8 +46,8 @@ _LOOK = 0.1  # seconds between looks at whether reading is cancelled
 _SAID = 200  # letters of what the unpacker says
 
 
-def read(path: Path, frame: int, decided: Decided) -> PointCloud:
-    """All finite points of a LAS or LAZ file. Raises InputError."""
+def contents(path: Path, frame: int = 0) -> PointContents:
+    """All points of a LAS or LAZ file. Raises InputError."""
     import laspy
 
     logging.getLogger("laspy").setLevel(logging.CRITICAL)  # the exception says what is wrong
@@ -59,13 +56,12 @@ def read(path: Path, frame: int, decided: Decided) -> PointCloud:
         if not _checked_format(stream.read(_FIRST.size), held) & _PACKED:
             stream.seek(0)
             with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
-                return assemble(PointContents(columns=_columns(reader, held)), decided)
+                return PointContents(columns=_columns(reader, held))
     with temporary_folder() as folder:
         plain = folder / "plain.las"
         _unpack_beside(path, plain)
         with laspy.open(plain) as reader:
-            columns = _columns(reader, plain.stat().st_size)
-            return assemble(PointContents(columns=columns), decided)
+            return PointContents(columns=_columns(reader, plain.stat().st_size))
 
 
 def unpack_laz(packed: str, plain: str) -> None:

@@ -9,6 +9,7 @@ from typing import BinaryIO
 from ..admission import admit, opened, size_of
 from ..points import PointCloud
 from ..reading.cloud import cloud_of
+from ..reading.sequence import Decided
 from ._stored import StoredArray
 
 TITLE = "NPY"
@@ -21,13 +22,13 @@ def frame_count(path: Path) -> int:
         return math.prod(_positions(stream).sequence)
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
+def read(path: Path, frame: int, decided: Decided) -> PointCloud:
     """One frame of the positions; the other frames are not read. Raises InputError."""
     with opened(path) as stream:
         positions = _positions(stream)
         share = frame if positions.sequence else None
         admit(size_of(stream), positions.memory(share))
-        return cloud_of([positions.read(share)], {}, {}, held=size_of(stream))
+        return cloud_of([positions.read(share)], {}, {}, held=size_of(stream), decided=decided)
 
 
 def _positions(stream: BinaryIO) -> StoredArray:

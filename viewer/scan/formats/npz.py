@@ -32,6 +32,7 @@ from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ..pose import Scanned
 from ..reading.cloud import cloud_of
+from ..reading.sequence import Decided
 from ._array_views import makes_views, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
 from ._precision import within_decimals
@@ -83,7 +84,7 @@ def read_times(path: Path) -> NDArray[np.float64] | None:
         return _vector(arrays["times"], *sequence) if sequence and "times" in arrays else None
 
 
-def read(path: Path, frame: int = 0) -> Scanned:
+def read(path: Path, frame: int, decided: Decided) -> Scanned:
     """One frame; it reads no array that is not needed, and no other frame. Raises InputError."""
     with opened(path) as stream, _arrays(stream) as arrays:
         if _is_range_scan(arrays):
@@ -103,7 +104,7 @@ def read(path: Path, frame: int = 0) -> Scanned:
             for width in [array.memory(share) // (len(positions[0]) * array.dtype.itemsize)]
         }
         attributes = {name: values.pop(name) for name in _OF_POINTS if name in values}
-        cloud = cloud_of(positions, attributes, values, shift, held)
+        cloud = cloud_of(positions, attributes, values, shift, held, decided=decided)
         if origin is not None:
             cloud = replace(cloud, origin=origin)
         if "viewpoint" in arrays and arrays["viewpoint"].shape == (3,):

@@ -34,14 +34,11 @@ from ..admission import (
     too_few,
     whole_number,
 )
-from ..contents import PointContents
+from ..contents import PointContents, Stated
 from ..grids import view_of_camera
 from ..image_poses import from_camera_to_world, rotation_of
 from ..points import UNKNOWN_UNIT, PointCloud
-from ..pose import Scanned
 from ..range_view import RangeView
-from ..reading.cloud import assemble
-from ..reading.sequence import Decided
 from ._columns import (
     Columns,
     columns_from_cloud,
@@ -88,6 +85,7 @@ class _Header:
     size: int  # bytes
     grid: tuple[int, int] | None  # rows and columns of an organised cloud
     viewpoint: list[str]
+    remarks: tuple[str, ...]  # lines of comments
 
     @property
     def dtype(self) -> np.dtype:
@@ -95,8 +93,8 @@ class _Header:
         return np.dtype([(str(i), f"<{f.type}", (f.count,)) for i, f in enumerate(self.fields)])
 
 
-def read(path: Path, frame: int, decided: Decided) -> Scanned:
-    """All finite points of a PCD file, or the range view that they are. Raises InputError."""
+def contents(path: Path, frame: int = 0) -> PointContents | tuple[RangeView, ...]:
+    """All points of a PCD file and its remarks, or the range view that they are. Raises InputError."""
     with opened(path) as stream:
         header = _read_header(stream.read(_HEADER_LIMIT))
         if header.encoding not in _ENCODINGS:
@@ -109,8 +107,8 @@ def read(path: Path, frame: int, decided: Decided) -> Scanned:
             if (view := _camera_view(columns, header.grid, header.viewpoint)) is not None:
                 return (view,)
         held = size_of(stream) if packed else None
-        cloud = assemble(PointContents(columns=columns, held=held), decided)
-        return replace(cloud, viewpoint=_sensor(header.viewpoint))
+        stated = Stated(viewpoint=_sensor_pose(header.viewpoint))
+        return PointContents(columns=columns, held=held, stated=stated, remarks=header.remarks)
 
 
 def _camera_view(columns: Columns, shape: tuple[int, int], viewpoint: list[str]) -> RangeView | None:
@@ -126,8 +124,8 @@ def _camera_view(columns: Columns, shape: tuple[int, int], viewpoint: list[str])
     return replace(view, color=color.reshape(*shape, 3)) if color.dtype == np.uint8 else None
 
 
-def _sensor(viewpoint: list[str]) -> NDArray[np.float64] | None:
-    """Place of the sensor that a VIEWPOINT tells, (3,); None where it tells nothing."""
+def _sensor_pose(viewpoint: list[str]) -> NDArray[np.float64] | None:
+    """The pose of the sensor that a VIEWPOINT states, (4, 4) world_from_sensor; None where it states none."""
     try:
         numbers = np.array(viewpoint or _HERE, np.float64)
     except ValueError:
@@ -135,7 +133,11 @@ def _sensor(viewpoint: list[str]) -> NDArray[np.float64] | None:
     is_stated = (
         numbers.shape == (7,) and np.isfinite(numbers).all() and (numbers != np.array(_HERE, float)).any()
     )
-    return numbers[:3].copy() if is_stated else None
+    if not is_stated:
+        return None
+    pose = np.eye(4)  # the rotation of clouds is not used
+    pose[:3, 3] = numbers[:3]
+    return pose
 
 
 def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
@@ -182,6 +184,7 @@ def _read_header(head: bytes) -> _Header:
         raise InputError("is not a PCD file: it has no DATA line")
     lines = head[: end.start()].decode("utf-8", "replace").splitlines()
     words = {line.split()[0].upper(): line.split()[1:] for line in lines if line.strip()}
+    remarks = tuple(line.strip("# \t") for line in lines if line.lstrip().startswith("#"))
     for key in ("FIELDS", *(["WIDTH", "HEIGHT"] if "POINTS" not in words else [])):
         if not words.get(key):
             raise InputError(f"the PCD header has no {key} line")
@@ -199,9 +202,8 @@ def _read_header(head: bytes) -> _Header:
         raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
     check_count(sum(counts), MOST_COLUMNS, "values a point")
     fields = [_Field(n, (t + s).lower(), c) for n, t, s, c in zip(names, types, sizes, counts, strict=True)]
-    return _Header(
-        fields, points, end[1].decode().lower(), end.end(), _grid(words, points), words.get("VIEWPOINT", [])
-    )
+    encoding, viewpoint = end[1].decode().lower(), words.get("VIEWPOINT", [])
+    return _Header(fields, points, encoding, end.end(), _grid(words, points), viewpoint, remarks)
 
 
 def _grid(words: dict[str, list[str]], points: int) -> tuple[int, int] | None:

@@ -49,7 +49,7 @@ from ._ply_header import (
     negative_list,
     parse_header,
 )
-from ._topology import with_topology
+from ._topology import topology_of
 
 TITLE = "PLY"
 SUFFIXES = (".ply",)
@@ -59,8 +59,8 @@ _NORMALS = {"nx", "ny", "nz"}
 _GRID, _CELL_BYTES = "range_grid", 64  # bytes of memory for a cell of it
 
 
-def read(path: Path, frame: int, decided: Decided) -> PointCloud:
-    """The vertices of a PLY file, ascii or binary. Raises InputError."""
+def contents(path: Path, frame: int = 0) -> PointContents:
+    """The vertices of a PLY file, ascii or binary, and its remarks. Raises InputError."""
     with opened(path) as stream:
         header = parse_header(stream.read(LONGEST_HEADER))
         names = [element.name for element in header.elements]
@@ -80,8 +80,10 @@ def read(path: Path, frame: int, decided: Decided) -> PointCloud:
             _skip(stream, element, header.encoding)
         read_rows = _read_ascii if header.encoding == "ascii" else _read_binary
         columns = read_rows(stream, vertex, header.encoding)
-        cloud = assemble(PointContents(columns=columns), decided)
-        return with_topology(cloud, _faces(stream, header, len(before) + 1))
+        faces = _faces(stream, header, len(before) + 1)
+        return PointContents(
+            columns=columns, remarks=header.remarks, topology=topology_of(vertex.count, faces)
+        )
 
 
 def _as_stored(vertex: Element, held: int) -> Element:
@@ -118,7 +120,7 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
         admit(size_of(stream), cells * _CELL_BYTES)
         stream.seek(header.size)
         lists = Faces.joined(_faces(stream, header, of=_GRID))
-    cloud = read(path, 0, Decided())
+    cloud = assemble(contents(path), Decided())
     points = np.full((len(cloud) + cloud.dropped, 3), np.nan)
     points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
     if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():

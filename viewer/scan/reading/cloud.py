@@ -5,7 +5,8 @@ Few arrays are held beside what they become.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 
@@ -15,8 +16,11 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..admission import admit
+from ..colors import rgba8
 from ..contents import Deferred, PointContents
-from ..points import PointCloud, choose_origin, finite_rows
+from ..points import PointCloud, choose_origin, retained_rows
+from . import axes, colors, missing, splats
+from .normals import with_usable_normals
 from .record import Decision, Source
 from .sequence import Decided
 
@@ -50,43 +54,89 @@ def assemble(contents: PointContents, decided: Decided) -> PointCloud:
     much memory.
     """
     columns = _by_role(contents, decided)
-    names = {name.lower(): name for name in columns}
-
-    def found(choices: Sequence[Sequence[str]]) -> list[str]:
-        complete = (choice for choice in choices if all(name in names for name in choice))
-        return [names[name] for name in next(complete, ())]
-
-    def take(chosen: Sequence[str]) -> NDArray:
-        return _joined([np.asarray(columns.pop(name)) for name in chosen])
+    decided.note(axes.decide(contents.remarks, decided.corrections))
 
     def native(name: str) -> NDArray:
         column = np.asarray(columns.pop(name))
         return column.astype(column.dtype.newbyteorder("="), copy=False)
 
-    chosen = found(_POSITIONS)
+    chosen = _complete(_POSITIONS, columns)
     if not chosen:
         raise InputError(f"no x, y and z among the columns: {listed(columns)}")
-    normals, colors, radii, ellipses = (found(choices) for choices in (_NORMALS, _COLORS, _RADII, [ELLIPSES]))
-    normals, colors = (
-        [] if _is_left_out(key, names, columns, decided) else names
-        for key, names in (("normals", normals), ("colors", colors))
+    positions = [_taken(columns, chosen)]
+    attributes = _splats(columns, positions[0], decided) or _attributes(columns)
+    used = [name for choices in (_NORMALS, _COLORS, _RADII) for name in _complete(choices, columns)]
+    scalars = {
+        name: Deferred(partial(native, name), columns[name].dtype) for name in columns if name not in used
+    }
+    cloud = cloud_of(positions, attributes, scalars, held=contents.held, at_hand=True, decided=decided)
+    sensor = contents.stated.viewpoint
+    return replace(
+        cloud, topology=contents.topology, viewpoint=None if sensor is None else sensor[:3, 3].copy()
+    )
+
+
+def _attributes(columns: dict[str, NDArray]) -> dict[str, Deferred]:
+    """Normals, colours, radii and half-axes of the columns that have these names, taken when asked for."""
+    normals, colors, radii, ellipses = (
+        _complete(choices, columns) for choices in (_NORMALS, _COLORS, _RADII, [ELLIPSES])
     )
     attributes: dict[str, Deferred] = {}
     if normals:
-        attributes["normals"] = Deferred(lambda: take(normals), columns[normals[0]].dtype, 3)
+        attributes["normals"] = Deferred(lambda: _taken(columns, normals), columns[normals[0]].dtype, 3)
     if colors:
-        kind = columns[colors[0]].dtype
-        attributes["colors"] = Deferred(lambda: _scaled(take(colors), decided), kind, len(colors))
+        attributes["colors"] = Deferred(
+            lambda: _taken(columns, colors), columns[colors[0]].dtype, len(colors)
+        )
     if radii:
-        attributes["radii"] = Deferred(lambda: take(radii)[:, 0], columns[radii[0]].dtype)
-    positions = [take(chosen)]
+        attributes["radii"] = Deferred(lambda: _taken(columns, radii)[:, 0], columns[radii[0]].dtype)
     if ellipses:
-        axes, mean = _half_axes(take(ellipses))
+        half_axes, mean = _half_axes(_taken(columns, ellipses))
         attributes.setdefault("radii", Deferred(lambda: mean, mean.dtype))
-        attributes["axes"] = Deferred(lambda: axes, axes.dtype, 4)
-    rest = columns.keys() - {*normals, *colors, *radii}
-    scalars = {name: Deferred(partial(native, name), columns[name].dtype) for name in columns if name in rest}
-    return cloud_of(positions, attributes, scalars, held=contents.held, at_hand=True)
+        attributes["axes"] = Deferred(lambda: half_axes, half_axes.dtype, 4)
+    return attributes
+
+
+def _splats(columns: dict[str, NDArray], points: NDArray, decided: Decided) -> dict[str, Deferred]:
+    """Colours, normals and half-axes of Gaussian splats, whose columns are taken; {} where these are none."""
+    found = splats.splat_columns(columns)
+    decision = splats.decide(found, decided.corrections)
+    if decision.value is not None:
+        decided.note(decision)
+    if found is None or not decision.value:
+        return {}
+    for text in splats.unused(found):
+        decided.note_unused(text)
+    for name in (*found.higher, *_complete(_NORMALS, columns)):  # programs write zeros as normals
+        del columns[name]
+    rgba = splats.splat_colors(_taken(columns, found.colors), _taken(columns, [found.opacity])[:, 0])
+    scales, rotation = _taken(columns, found.scales), _taken(columns, found.rotation)
+    half_axes, normals = splats.splat_ellipses(scales, rotation, points)
+    decided.note(Decision("normals", "stored", "file", "the rotations of splats"))
+    return {
+        "normals": Deferred(lambda: normals, normals.dtype, 3),
+        "colors": Deferred(lambda: rgba, rgba.dtype, 4),
+        "axes": Deferred(lambda: half_axes, half_axes.dtype, 4),
+    }
+
+
+def _complete(choices: Sequence[Sequence[str]], columns: Mapping[str, NDArray]) -> list[str]:
+    """The columns of the first choice of names that is complete, in any case; none where none is."""
+    names = {name.lower(): name for name in columns}
+    complete = (choice for choice in choices if all(name in names for name in choice))
+    return [names[name] for name in next(complete, ())]
+
+
+def _taken(columns: dict[str, NDArray], chosen: Sequence[str]) -> NDArray:
+    """The values of columns, (N, C), which go from the others."""
+    return _joined([np.asarray(columns.pop(name)) for name in chosen])
+
+
+def _colors_of(samples: Iterable[PointContents]) -> Iterator[NDArray]:
+    """The colours of frames, (N, C), of those that have some."""
+    for sample in samples:
+        if names := _complete(_COLORS, sample.columns):
+            yield _taken(sample.columns, names)
 
 
 def listed(names: Iterable[str], most: int = 12, longest: int = 24) -> str:
@@ -113,28 +163,6 @@ def _by_role(contents: PointContents, decided: Decided) -> dict[str, NDArray]:
     return by_role
 
 
-def _is_left_out(key: str, found: list[str], columns: dict[str, NDArray], decided: Decided) -> bool:
-    """Whether the user has Scan4D leave out these columns, which then go."""
-    if not found:
-        return False
-    if decided.corrections.get(key) != "none":
-        if key == "normals":
-            decided.note(decided.corrections.decision(key) or Decision(key, "stored"))
-        return False
-    decided.note(Decision(key, "none", "user", "--read"))
-    for name in found:
-        del columns[name]
-    return True
-
-
-def _scaled(colors: NDArray, decided: Decided) -> NDArray:
-    """Colours as PointCloud takes them; notes the largest value that they can have."""
-    made = _bytes_or_units(colors)
-    full = 65535 if made.dtype == np.uint16 else 255 if made.dtype.kind == "u" else 1
-    decided.note(Decision("colors", full, "file" if colors.dtype == np.uint8 else "assumed"))
-    return made
-
-
 def cloud_of(
     positions: list[NDArray],
     attributes: Mapping[str, Deferred],
@@ -142,19 +170,38 @@ def cloud_of(
     origin: NDArray[np.float64] | None = None,
     held: int | None = None,
     at_hand: bool = False,
+    decided: Decided | None = None,
 ) -> PointCloud:
-    """`PointCloud.from_arrays` of deferred arrays.
+    """`PointCloud.from_arrays` of deferred arrays as a file has them, whose meaning is decided here.
 
-    positions: (N, 3), alone in a list that gives it away. held: bytes of the file, which has to admit what
-    that takes; None: its rows are not packed. at_hand: whether what the others are made of is in memory.
-    Raises InputError.
+    positions: (N, 3), alone in a list that gives it away. attributes: "colors" on any scale, and "normals"
+    that may be zero. held: bytes of the file, which has to admit what that takes; None: its rows are not
+    packed. at_hand: whether what the others are made of is in memory. decided: the decisions about the scan;
+    None: the file stands alone. Raises InputError.
     """
+    decided, given = decided or Decided(), dict(attributes)
+    unmeasured = missing.find_in_frame(positions[0], decided)
+    if decided.corrections.get("colors") == colors.NONE and given.pop("colors", None):
+        decided.note(colors.decide([], decided.corrections))
+    if "colors" in given:
+        given["colors"] = _in_bytes(given["colors"], decided)
     if held is not None:
-        admit(held, _memory(positions[0], attributes, scalars, origin, at_hand))
+        admit(held, _memory(positions[0], given, scalars, origin, at_hand, unmeasured))
     points = Deferred(positions.pop, positions[0].dtype, 3)
-    return PointCloud.from_arrays(
-        points, **attributes, scalars=scalars, origin=origin, precise=True, unmeasured=None
+    cloud = PointCloud.from_arrays(
+        points, **given, scalars=scalars, origin=origin, precise=True, unmeasured=unmeasured
     )
+    return with_usable_normals(cloud, decided)
+
+
+def _in_bytes(stored: Deferred, decided: Decided) -> Deferred:
+    """Colours in 8 bit, (N, 4), of colours on the scale of the scan."""
+
+    def make() -> NDArray[np.uint8]:
+        values = np.asarray(stored)
+        return rgba8(values, colors.settled_scale(values, decided, lambda: _colors_of(decided.samples())))
+
+    return Deferred(make, stored.dtype, stored.size // stored.dtype.itemsize)
 
 
 def _memory(
@@ -163,9 +210,10 @@ def _memory(
     scalars: Mapping[str, Deferred],
     origin: NDArray[np.float64] | None,
     at_hand: bool,
+    unmeasured: missing.Unmeasured | None,
 ) -> int:
     """Bytes that are held at most at a time, step by step as `PointCloud.from_arrays` goes."""
-    rows, finite = len(points), finite_rows(points)
+    rows, (finite, _) = len(points), retained_rows(points, unmeasured)
     retained = rows if finite is None else int(np.count_nonzero(finite))
     moved = points.dtype != np.float32 or (
         finite is not None or bool(choose_origin(points).any()) if origin is None else bool(origin.any())
@@ -216,24 +264,6 @@ def _joined(columns: Sequence[NDArray]) -> NDArray:
 
 def _address(array: NDArray) -> int:
     return array.__array_interface__["data"][0]
-
-
-def _bytes_or_units(colors: NDArray) -> NDArray:
-    """Colours as PointCloud takes them. Floats beyond 1 and small uint16 count in 0..255."""
-    if colors.dtype.kind == "f" and np.nanmax(colors, initial=0) > 1:
-        return _in_bytes(colors)
-    if colors.dtype == np.uint16 and colors.max(initial=0) <= 255:
-        return colors.astype(np.uint8)
-    return colors
-
-
-def _in_bytes(colors: NDArray) -> NDArray[np.uint8]:
-    """Floats in 0..255 rounded; NaN: 0."""
-    rounded = np.empty(colors.shape, np.uint8)
-    for start in range(0, len(colors), _AT_ONCE):
-        part = colors[start : start + _AT_ONCE]
-        rounded[start : start + _AT_ONCE] = np.rint(np.clip(np.nan_to_num(part), 0, 255))
-    return rounded
 
 
 def _half_axes(ellipses: NDArray) -> tuple[NDArray, NDArray]:

@@ -6,7 +6,7 @@ therefore says whether one frame is enough to be certain.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ from ...errors import InputError
 from ..points import strided
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
+from .sequence import Decided
 
 KEY = "colors"
 SCALES = (1, 255, 65535)
@@ -88,6 +89,24 @@ def contradicts(evidence: ColorEvidence, full: int) -> bool:
     return own.is_certain and own.full > full
 
 
+def settled_scale(colors: NDArray, decided: Decided, others: Callable[[], Iterable[NDArray]] = tuple) -> int:
+    """The scale of the colours (N, C) of a frame: that of its scan, which the first frame settles.
+
+    others: reads the colours of some other frames, for when those of the first are not enough.
+    """
+    evidence = evidence_of(colors)
+
+    def settle() -> Decision:
+        is_enough = KEY in decided.corrections or scale_of(evidence).is_certain
+        more = [] if is_enough else [evidence_of(each) for each in others()]
+        return decide([evidence, *more], decided.corrections)
+
+    full: int = decided.settle(KEY, settle).value
+    if contradicts(evidence, full):
+        decided.contradict(KEY, f"its colours reach {evidence.top:g}, but full brightness is {full}")
+    return full
+
+
 def decide(evidence: Sequence[ColorEvidence], corrections: Corrections = NOTHING_CORRECTED) -> Decision:
     """The scale of the colours of a scan, from one frame or several; null where it has none.
 
@@ -103,7 +122,10 @@ def decide(evidence: Sequence[ColorEvidence], corrections: Corrections = NOTHING
     top = max(each.top for each in evidence)
     if scale.is_certain:
         return Decision(
-            KEY, scale.full, "file", why=f"The type and the largest value, {top:g}, tell the scale"
+            KEY,
+            scale.full,
+            "file",
+            why="" if evidence[0].kind[1:] == "1" else f"The largest value is {top:g}",
         )
     others = [str(other) for other in SCALES if other != scale.full and other >= top]
     why = f"No colour exceeds {top:g}, so the scale may be larger"

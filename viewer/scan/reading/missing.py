@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..points import strided
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
+from .sequence import Decided
 
 KEY = "missing"
 ZEROS = "0 0 0"  # how the record names rows of zeros
@@ -105,6 +106,20 @@ def find(points: NDArray, corrections: Corrections = NOTHING_CORRECTED) -> Unmea
     if stated is None:
         return unmeasured_points(points)
     return None if stated == NONE else rows_with(points, stated)
+
+
+def find_in_frame(points: NDArray, decided: Decided) -> Unmeasured | None:
+    """The rows of a frame's points (N, 3) that were not measured, which the record then names.
+
+    Where zeros mean that in an earlier frame, they do so in this one, however few they are.
+    """
+    found = find(points, decided.corrections)
+    if found is None and KEY not in decided.corrections and decided.reading[KEY].value == ZEROS:
+        rows = (points == 0).all(axis=1)
+        found = Unmeasured(ZEROS, rows) if rows.any() else None
+    if found is not None or KEY in decided.corrections:
+        decided.note(decide(found, decided.corrections))
+    return found
 
 
 def decide(found: Unmeasured | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:

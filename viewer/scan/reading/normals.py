@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..points import PointCloud
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
+from .sequence import Decided
 
 KEY = "normals"
 STORED, PARTLY, DROPPED, NONE = "stored", "partly", "dropped", "none"
 _AT_ONCE = 1 << 18  # rows
+_REPORTS = {
+    DROPPED: "all stored normals are zero or not finite, so Scan4D estimates them",
+    PARTLY: "some stored normals are zero or not finite: Scan4D draws these points without light",
+}
 
 
 class NormalsFound(NamedTuple):
@@ -68,3 +75,16 @@ def decide(found: NormalsFound | None, corrections: Corrections = NOTHING_CORREC
         why = f"{found.bad:,} of {found.points:,} normals are zero or not finite"
         return Decision(KEY, PARTLY, "file", why=why)
     return Decision(KEY, STORED, "file")
+
+
+def with_usable_normals(cloud: PointCloud, decided: Decided) -> PointCloud:
+    """The cloud without normals that are zero or not finite, which the record and a message name."""
+    found = None if cloud.normals is None else usable_normals(cloud.normals)
+    decision = decide(found, decided.corrections)
+    if decision.value is not None:
+        decided.note(decision)
+    if decision.value in _REPORTS:
+        decided.report("normals", _REPORTS[decision.value])
+    if decision.value == NONE:
+        return replace(cloud, normals=None)
+    return cloud if found is None or found.normals is cloud.normals else replace(cloud, normals=found.normals)
