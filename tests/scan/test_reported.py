@@ -110,7 +110,6 @@ def near(found: Any, wanted: Any, within: float = 1e-5) -> None:
 # --- splats, normals, colours ---------------------------------------------------------------
 
 
-@POINT_FILES
 def test_01_splats_have_their_colors_and_opacity(reported: Path) -> None:
     cloud = only(reported / "01_gaussian_splats.ply")
     assert cloud.colors is not None
@@ -120,7 +119,6 @@ def test_01_splats_have_their_colors_and_opacity(reported: Path) -> None:
     near(cloud.colors[:, 3], 0.982 * 255, 1)
 
 
-@POINT_FILES
 def test_01_splats_are_ellipses_that_face_outward(reported: Path) -> None:
     cloud = only(reported / "01_gaussian_splats.ply")
     assert cloud.axes is not None
@@ -132,13 +130,12 @@ def test_01_splats_are_ellipses_that_face_outward(reported: Path) -> None:
     assert not {name for name in cloud.scalars if name.startswith(("f_dc", "rot_", "scale_", "opacity"))}
 
 
-@POINT_FILES
 def test_02_zero_normals_count_as_none(reported: Path, info: Callable[..., Any]) -> None:
     assert only(reported / "02_zero_normals.ply").normals is None
     facts = info(reported / "02_zero_normals.ply")
     assert "normals" not in facts["attributes"]
     assert decision(facts, "normals")["value"] == "dropped"
-    assert facts["told"].count("normals") == 1
+    assert facts["told"].replace("02_zero_normals", "").count("normals") == 1
 
 
 @TABLES
@@ -181,7 +178,6 @@ def test_07_a_count_too_small_loses_no_row(reported: Path) -> None:
     assert colors(cloud)[2] == [70, 80, 90]
 
 
-@POINT_FILES
 def test_08_zeros_that_saw_nothing_are_left_out(reported: Path, info: Callable[..., Any]) -> None:
     facts = info(reported / "08_not_measured_is_zero.ply")
     assert facts["points"] == 800
@@ -190,12 +186,10 @@ def test_08_zeros_that_saw_nothing_are_left_out(reported: Path, info: Callable[.
     assert decision(facts, "missing")["value"] == "0 0 0"
 
 
-@POINT_FILES
 def test_09_float_colors_up_to_255(reported: Path) -> None:
     assert colors(only(reported / "09_colors_float_255.npz")) == [[200, 100, 50], [10, 20, 30], BLUE]
 
 
-@POINT_FILES
 def test_10_the_color_range_is_that_of_the_sequence(reported: Path) -> None:
     firsts = [colors(cloud)[0] for cloud in clouds(reported / "10_dark_frame")]
     assert firsts == [[156, 78, 39], [1, 1, 0], [156, 78, 39]]

@@ -181,7 +181,7 @@ def _as_text(facts: dict[str, Any], record: Reading, verbose: bool) -> str:
         poses += f", {times['first']:g} to {times['last']:g} s, {1 / times['median_step']:g} a second"
     points = f"{facts['points']:,}"
     if facts["dropped"]:
-        points += f" ({facts['dropped']:,} with a NaN or infinite coordinate left out)"
+        points += f" ({facts['dropped']:,} not finite or not measured left out)"
     rows = [
         ("scan", facts["name"]),
         *([("read by", facts["package"])] if facts["package"] else []),

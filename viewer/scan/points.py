@@ -59,8 +59,8 @@ class PointCloud:
     scalars:   name -> (N,) array of any real type
     ids:       (N,) uint32, increasing, the index in the file before anything was dropped; None: 0..N-1
     dropped:   how many points were dropped because a coordinate was NaN or infinite, or was not measured
-    dropped_by: reason -> how many points were dropped for it: `NOT_FINITE`, or the value that means "not
-               measured", such as "0 0 0"
+    dropped_by: reason -> how many were dropped for it: `NOT_FINITE`, or the value that means "not measured",
+               such as "0 0 0"
     shortened: how many splats were, to a million times the extent of the points
     remainders: (N, 3) float32, scan units, or None: what the coordinates have beyond their float32 offsets,
                which are right to 3e-8 of the extent; None where they have nothing
@@ -159,6 +159,14 @@ class PointCloud:
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    @property
+    def dropped_in_words(self) -> str:
+        """The points that were left out, by reason, for a message: "12 points without finite coordinates"."""
+        reasons = {**self.dropped_by}
+        rest = self.dropped - sum(reasons.values()) + reasons.pop(NOT_FINITE, 0)
+        parts = [f"{count:,} points at {value}, which were not measured" for value, count in reasons.items()]
+        return " and ".join([*parts, *([f"{rest} points without finite coordinates"] if rest else [])])
 
     @property
     def nbytes(self) -> int:

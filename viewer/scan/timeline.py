@@ -38,7 +38,7 @@ _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 class ScanMessage:
     """A message about a scan for the user.
 
-    kind: "broken" (the frame cannot be read), "dropped" (points with a NaN or infinite coordinate were left
+    kind: "broken" (the frame cannot be read), "dropped" (points that are not finite or not measured were left
     out), "shortened" (splats far larger than the scan were), "unit" (lengths in another unit than the scan's,
     or a name of it that is no unit), "assumed" (what range views do not state), "times" or "beside"
     (files in its folder may be another scan), "normals", "camera", "aside" (files that the scan leaves out),
@@ -385,7 +385,7 @@ class Timeline:
             del self._loading[index]
             pose = self._timed(pose)  # where times have changed meanwhile
             if pose.dropped and index not in self._sizes:
-                what = f"{pose.label}: Scan4D leaves out {pose.dropped} points without finite coordinates"
+                what = f"{pose.label}: Scan4D leaves out {pose.cloud.dropped_in_words}"
                 self.messages.append(ScanMessage("dropped", what, index))
             if (shortened := pose.overview.shortened) and index not in self._sizes:
                 what = f"{pose.label}: Scan4D shrinks {shortened} splats that are far larger than the scan"

@@ -6,6 +6,7 @@ Read here and not by a library because those at hand drop vertices that no trian
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Iterator
 from io import TextIOWrapper
 from itertools import islice
@@ -15,8 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..admission import opened
+from ..contents import Deferred
 from ..faces import Faces
 from ..points import PointCloud
+from ..reading import axes
+from ..reading.cloud import cloud_of
+from ..reading.sequence import Decided
 from ._columns import batches, bounded_lines, parse_table, whole_numbers
 from ._topology import with_topology
 
@@ -25,20 +30,29 @@ SUFFIXES = (".obj",)
 
 _CORNERS_AT_ONCE = 1 << 18
 _FACES_AT_ONCE = 1 << 12
+_MARK = BOM_UTF8.decode("latin-1")
+_HEAD = 100  # lines among which remarks state the axes
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
 
 
-def read(path: Path, frame: int = 0) -> PointCloud:
+def read(path: Path, frame: int, decided: Decided) -> PointCloud:
     """The vertices (`v x y z [w]` or `v x y z r g b`) and their normals (`vn`). Raises InputError."""
     with opened(path) as stream:
         text = TextIOWrapper(stream, "latin-1")
-        table = parse_table(_lines(text, "v"))
-        cloud = PointCloud.from_arrays(
-            table[:, :3],
-            normals=_normals(text, len(table)),
-            colors=table[:, 3:6] if table.shape[1] >= 6 else None,
-        )
+        table, given = parse_table(_lines(text, "v")), {}
+        if (normals := _normals(text, len(table))) is not None:
+            given["normals"] = Deferred(lambda: normals, normals.dtype, 3)
+        if table.shape[1] >= 6:
+            given["colors"] = Deferred(lambda: table[:, 3:6], table.dtype, 3)
+        decided.note(axes.decide(_remarks(text), decided.corrections))
+        cloud = cloud_of([table[:, :3]], given, {}, decided=decided)
         return with_topology(cloud, _faces(text))
+
+
+def _remarks(text: TextIOWrapper) -> list[str]:
+    """The comments among the first lines."""
+    text.seek(0)
+    return [line[1:].strip() for line in islice(bounded_lines(text), _HEAD) if line.startswith("#")]
 
 
 def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
@@ -60,7 +74,7 @@ def _polygons(text: TextIOWrapper) -> Iterator[tuple[list[str], int]]:
     vertices = 0
     text.seek(0)
     for line in bounded_lines(text):
-        if line.startswith(("v ", "v\t")):
+        if line.removeprefix(_MARK).startswith(("v ", "v\t")):
             vertices += 1
         elif line.startswith(("f ", "f\t")):
             words = line.split()[1:]
@@ -97,6 +111,7 @@ def _lines(text: TextIOWrapper, keyword: str) -> Iterator[str]:
     starts = (keyword + " ", keyword + "\t")
     text.seek(0)
     for line in bounded_lines(text):
+        line = line.removeprefix(_MARK)
         if line.startswith(starts):
             yield line[len(keyword) :]
 

@@ -180,6 +180,8 @@ def cloud_of(
     None: the file stands alone. Raises InputError.
     """
     decided, given = decided or Decided(), dict(attributes)
+    if positions[0].shape[1:] != (3,):
+        raise InputError(f"positions have shape {positions[0].shape}, expected (N, 3)")
     unmeasured = missing.find_in_frame(positions[0], decided)
     if decided.corrections.get("colors") == colors.NONE and given.pop("colors", None):
         decided.note(colors.decide([], decided.corrections))

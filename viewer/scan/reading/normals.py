@@ -64,8 +64,13 @@ def bad_rows(normals: NDArray) -> NDArray[np.intp]:
 
 def decide(found: NormalsFound | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
     """Decide what becomes of the normals of a file. found: None where it has none: the value is null."""
+    decision = _of_file(found)
     if corrections.get(KEY) == NONE:
         return Decision(KEY, NONE, "user", "--read", "Scan4D estimates normals instead")
+    return replace(decision, source="user", where="--read") if KEY in corrections else decision
+
+
+def _of_file(found: NormalsFound | None) -> Decision:
     if found is None or not found.points:
         return Decision(KEY, None, "file")
     if found.normals is None:
