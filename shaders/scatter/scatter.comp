@@ -1,6 +1,11 @@
 // Scatter: items go to cells. A file with `scatter(i)` says which an item visits; what becomes of a visit
 // says another: the best per cell (scatter/best.glsl), sums (scatter/sums.glsl), a list (bins/lists.glsl).
 // ITEMS: how many there are; list_count: as a list has, which the first file then includes.
+// WIDE: cells are 64-bit words.
+#ifdef WIDE
+#extension GL_ARB_gpu_shader_int64 : require
+#extension GL_NV_shader_atomic_int64 : require
+#endif
 #include "common/item.glsl"
 
 #include <target>

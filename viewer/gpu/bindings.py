@@ -135,6 +135,8 @@ class Storage(IntEnum):
     KEYS = 0
     BEST = 1
     HITS = 7  # cells that were hit
+    WIDE = 0  # keys and items in 64-bit words
+    SPLIT_KEYS = 2  # the keys of these, beside best
     # Chunks of points, beside a list.
     FARTHEST_TILES = 0
     BOXES = 0

@@ -30,6 +30,7 @@ T = TypeVar("T")
 Program = moderngl.Program | moderngl.ComputeShader
 Uniform = bool | int | float | tuple[float, ...]
 REQUIRED_VERSION = 430
+WIDE_EXTENSIONS = {"GL_ARB_gpu_shader_int64", "GL_NV_shader_atomic_int64"}
 _OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
 _FILLED = 4  # words that an invocation fills
@@ -73,6 +74,9 @@ class Built:
 class Gpu:
     """A context with its shader programs and timers.
 
+    wide_atomics: whether shaders have 64-bit atomics. reads_first: whether they read a cell before an atomic
+    on it, which graphics cards gain from. clears_by_shader: see `clear`.
+
     Make one with `headless()`, or give it the context of a window. Raises NoOpenGLError
     where the context lacks what the project needs.
     """
@@ -97,6 +101,8 @@ class Gpu:
         self.software = any(word in self.device.lower() for word in _SOFTWARE)
         self.timers = Timers(ctx, self.software)
         self.staging = Staging(ctx, self.software)
+        self.wide_atomics = ctx.version_code >= 450 and ctx.extensions >= WIDE_EXTENSIONS
+        self.reads_first = not self.software
         self._spare_binding = gl.storage_bindings() - 1
         self.clears_by_shader = not self.software and self._spare_binding > max(Storage)
         self.max_storage_bytes = gl.max_storage_block_bytes()

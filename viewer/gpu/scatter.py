@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,7 +45,9 @@ class Visits:
         sets what that one reads and writes."""
         parts = {"target": target, "cells": self.cells}
         listed = int(self.listed is not None)
-        given = {"ITEMS": ("item_count", "list_count")[listed], "LISTED": listed, **defines, **self.defines}
+        items = ("item_count", "list_count")[listed]
+        given = {"ITEMS": items, "LISTED": listed, "READS_FIRST": int(gpu.reads_first)}
+        given |= {**defines, **self.defines}
         program = gpu.compute("scatter/scatter.comp", given, parts, self.params)
         bind(program)
         self.bind(program)
@@ -74,10 +78,104 @@ def scatter(
     nothing went. hits: is filled with the cells that were hit; all of them are clear then.
     """
     if hits is None:
-        gpu.clear(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
-        gpu.clear(best.buffer, NOTHING)
+        with nearest_of(gpu, keys, best) as nearest:
+            nearest.take(visits)
+        return
     take_keys(gpu, visits, keys)
     take_items(gpu, visits, keys, best, hits)
+
+
+@contextmanager
+def nearest_of(
+    gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture, shown: Callable[[], Visits] | None = None
+) -> Iterator[TwoPasses | OnePass]:
+    """Keep the best of all visits that are taken inside, as `scatter` does of one.
+
+    shown: gives visits that have all the best ones; None: all of them may.
+    """
+    is_wide = gpu.wide_atomics and 2 * keys.buffer.size <= gpu.max_storage_bytes
+    nearest = (OnePass if is_wide else TwoPasses)(gpu, keys, best)
+    yield nearest
+    nearest.finish(shown)
+
+
+class TwoPasses:
+    """Visits whose keys are found first, then the items: 32-bit atomics, which all drivers have."""
+
+    def __init__(self, gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture) -> None:
+        self._gpu, self._keys, self._best = gpu, keys, best
+        self._visits: list[Visits] = []
+        gpu.clear(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
+        gpu.clear(best.buffer, NOTHING)
+
+    def take(self, visits: Visits) -> None:
+        """Take visits to cells."""
+        self._visits.append(visits)
+        take_keys(self._gpu, visits, self._keys)
+
+    def show_keys(self) -> None:
+        """Let `keys` hold the least keys so far."""
+
+    def finish(self, shown: Callable[[], Visits] | None) -> None:
+        """Let `keys` and `best` hold what all visits found. shown: see `nearest_of`."""
+        for visits in self._visits if shown is None else (shown(),):
+            take_items(self._gpu, visits, self._keys, self._best)
+
+
+class OnePass:
+    """Visits whose keys and items are found at once: 64-bit atomics, to cells that are split in the end. The
+    result is that of `TwoPasses` to the bit."""
+
+    def __init__(self, gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture) -> None:
+        self._gpu, self._keys, self._best = gpu, keys, best
+        self._wide, self._cells = gpu.cached(_WideCells), keys.buffer.size // 4
+        self._wide.begin(self._cells)
+
+    def take(self, visits: Visits) -> None:
+        """Take visits to cells."""
+        with self._gpu.timers.measure("depth"):
+            visits.send(self._gpu, "scatter/best.glsl", lambda _: self._wide.bind(), PASS=0, LISTS=0, WIDE=1)
+
+    def show_keys(self) -> None:
+        """Let `keys` hold the least keys so far."""
+        self._split(0)
+
+    def finish(self, _: Callable[[], Visits] | None) -> None:
+        """Let `keys` and `best` hold what all visits found."""
+        self._split(1)
+        self._wide.is_clear = True
+
+    def _split(self, last: int) -> None:
+        program = self._gpu.compute("scatter/split.comp", {"LAST": last})
+        with self._gpu.timers.measure("id"):
+            self._wide.bind()
+            self._keys.buffer.bind_to_storage_buffer(Storage.SPLIT_KEYS)
+            self._best.buffer.bind_to_storage_buffer(Storage.BEST)
+            self._gpu.dispatch(program, self._cells)
+
+
+class _WideCells:
+    """64-bit cells that all pictures share. is_clear: whether nothing went to any."""
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._buffer: moderngl.Buffer | None = None
+        self.is_clear = False
+
+    def begin(self, cells: int) -> None:
+        """Make room for so many cells, and clear them unless they are."""
+        if self._buffer is None or self._buffer.size < 8 * cells:
+            self._gpu.discard(self._buffer)
+            self._buffer, self.is_clear = self._gpu.buffer(reserve=8 * cells), False
+        if not self.is_clear:
+            clear = np.array([NOTHING, NO_DEPTH], np.uint32)  # the item is the lower word
+            self._buffer.write(np.tile(clear, self._buffer.size // 8))
+        self.is_clear = False
+
+    def bind(self) -> None:
+        """Bind them for shaders."""
+        assert self._buffer is not None
+        self._buffer.bind_to_storage_buffer(Storage.WIDE)
 
 
 def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:

@@ -22,7 +22,7 @@ _LINES = 100_000
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _UNIFORMS = re.compile(r"\buniform\b([^;{]*);")  # a declaration, of one or more
 _IN_BRACKETS = re.compile(r"\([^()]*\)|\[[^][]*\]")
-_HEADER = "#version 430 core\n" + bindings_glsl() + constants_glsl()
+_TABLES = bindings_glsl() + constants_glsl()
 
 
 class ShaderError(Scan4DError):
@@ -53,7 +53,8 @@ class Source:
         self._params = params
         macros = "".join(f"#define {key} {value}\n" for key, value in (defines or {}).items())
         self.body = self._expand(name)
-        self.text = _HEADER + macros + self.body
+        version = 450 if "WIDE" in (defines or {}) else 430  # of 64-bit atomics, and of all else
+        self.text = f"#version {version} core\n{_TABLES}{macros}{self.body}"
 
     @cached_property
     def uniforms(self) -> frozenset[str]:

@@ -241,8 +241,11 @@ class CulledChunks:
 
     def shown(self, surface: RenderTarget) -> IndexList:
         """All chunks that the picture may show."""
-        surface.stats.counted["chunks"] = lambda: counts_of(self._boxes.seen(surface))
         return self._list(surface, _GIVE)
+
+    def note_counts(self, surface: RenderTarget) -> None:
+        """Let the statistics tell how many chunks the picture shows."""
+        surface.stats.counted["chunks"] = lambda: counts_of(self._boxes.seen(surface))
 
     def _list(self, surface: RenderTarget, step: int) -> IndexList:
         listed = self._lists[step]

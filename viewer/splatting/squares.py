@@ -16,7 +16,7 @@ from ..gpu.bindings import Texture
 from ..gpu.compact import IndexList
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
-from ..gpu.scatter import HitCells, Visits, scatter, take_items, take_keys
+from ..gpu.scatter import HitCells, Visits, nearest_of, scatter
 from ..picture.frame_view import Before
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
@@ -122,11 +122,9 @@ def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before:
         Visits("points/cells.glsl", count, bind, {**defines, "KEPT": 1}, numbers, listed),
         Visits("points/cells.glsl", turns, bind, {**defines, "STRIDED": 1}, numbers),
     )
-    surface.clear()
-    for visits in both:
-        take_keys(pose.gpu, visits, surface.depths)
-    for visits in both:
-        take_items(pose.gpu, visits, surface.depths, surface.rows)
+    with nearest_of(pose.gpu, surface.depths, surface.rows) as nearest:
+        for visits in both:
+            nearest.take(visits)
     if _touching(pose, surface.view) <= size:
         surface.cached(ClosedGaps).close(surface, _STEP * pose.stored.remember(_reach))
 
@@ -167,10 +165,12 @@ def _draw_chunks(
         left_out = max(chunks.count - found[1], 0)
         surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} points are in groups out of view"
         return
-    surface.clear()
-    take_keys(pose.gpu, visits(chunks.start(surface, margin)), surface.depths)
-    take_keys(pose.gpu, visits(chunks.late(surface)), surface.depths)
-    take_items(pose.gpu, visits(chunks.shown(surface)), surface.depths, surface.rows)
+
+    with nearest_of(pose.gpu, surface.depths, surface.rows, lambda: visits(chunks.shown(surface))) as nearest:
+        nearest.take(visits(chunks.start(surface, margin)))
+        nearest.show_keys()
+        nearest.take(visits(chunks.late(surface)))
+    chunks.note_counts(surface)
 
 
 def _defines(

@@ -19,7 +19,9 @@ in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
-copy, get and map for buffers that the CPU reads, and --clearing one of shader and driver.
+copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32, 64,
+32-read and 64-read (whether a cell is read before), and --order file draws all points in the order of the file,
+without chunks.
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ from viewer.drawing.frame import render_frame
 from viewer.drawing.request import Request
 from viewer.drawing.timing import pass_ms
 from viewer.errors import Scan4DError
-from viewer.gpu import gl
+from viewer.gpu import chunks, gl
 from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
@@ -302,6 +304,11 @@ def _choose(options: Namespace) -> None:
         gpu.staging.reading = options.reading
     if options.clearing:
         gpu.clears_by_shader = options.clearing == "shader"
+    if options.atomics:
+        gpu.wide_atomics = options.atomics.startswith("64")
+        gpu.reads_first = options.atomics.endswith("read")
+    if options.order == "file":
+        chunks.LEAST = 1 << 40
 
 
 def _sizes(options: Namespace) -> list[int]:
@@ -565,6 +572,8 @@ EXPERIMENT = Script(
         "limit": 0.0,
         "reading": "",
         "clearing": "",
+        "atomics": "",
+        "order": "",
     },
 )
 

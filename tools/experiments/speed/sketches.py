@@ -38,7 +38,7 @@ class Sketch:
         for step in range(3):
             defines = {"BITS": bits, "STEP": step, "DISCS": int(radius > 0)}
             head = "".join(f"#define {name} {value}\n" for name, value in defines.items())
-            program = gpu.ctx.compute_shader(f"#version 430 core\n{head}{text}")
+            program = gpu.ctx.compute_shader(f"#version {430 if bits == 32 else 450} core\n{head}{text}")
             is_of_pixels = step == 0 or (step == 2 and bits == 64)
             self.steps.append((program, pixels if is_of_pixels else self.count))
         self.positions, self.colors = gpu.ctx.buffer(cloud.positions), gpu.ctx.buffer(cloud.colors)
