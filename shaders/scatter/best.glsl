@@ -8,7 +8,7 @@
 #endif
 
 #ifdef WIDE
-layout(std430, binding = STORAGE_WIDE) buffer Wide { uint64_t wide[]; };
+layout(std430, binding = STORAGE_KEYS) buffer Wide { uint64_t wide[]; };
 #elif PASS == 0
 layout(std430, binding = STORAGE_KEYS) buffer Keys { uint keys[]; };
 #else

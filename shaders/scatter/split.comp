@@ -2,7 +2,7 @@
 // clear again then.
 #include "common/item.glsl"
 
-layout(std430, binding = STORAGE_WIDE) buffer Wide { uvec2 wide[]; };  // item, key
+layout(std430, binding = STORAGE_KEYS) buffer Wide { uvec2 wide[]; };  // item, key
 layout(std430, binding = STORAGE_BEST) writeonly buffer Best { uint best[]; };
 layout(std430, binding = STORAGE_SPLIT_KEYS) writeonly buffer Keys { uint keys[]; };
 

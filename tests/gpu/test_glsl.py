@@ -34,10 +34,11 @@ from viewer.camera import Camera
 from viewer.drawing.frame import render_frame, supersample
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
-from viewer.gpu import chunks
+from viewer.gpu import chunks, gl
 from viewer.gpu.bindings import Storage, Texture, UniformBlock
 from viewer.gpu.context import Gpu, headless
 from viewer.gpu.pyramid import Image, expand
+from viewer.gpu.scatter import OnePass
 from viewer.gpu.shader import Source
 from viewer.look import Look
 from viewer.picture.present import Presenter
@@ -263,6 +264,10 @@ def use_primitives(gpu: Gpu) -> None:
     gpu.activate()
     gpu.clears_by_shader = True
     gpu.clear(gpu.buffer(reserve=64), 0)
+    cells = [gl.BufferTexture(gpu.buffer(reserve=64), gl.R32UI) for _ in range(2)]
+    nearest = OnePass(gpu, *cells)
+    nearest.show_keys()
+    nearest.finish(None)
     flagged(gpu, np.arange(5000) % 3 == 0)
     for ordered in (False, True):
         filled(gpu, some_visits(100, 30), 30, ordered)

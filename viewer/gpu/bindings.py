@@ -135,8 +135,7 @@ class Storage(IntEnum):
     KEYS = 0
     BEST = 1
     HITS = 7  # cells that were hit
-    WIDE = 0  # keys and items in 64-bit words
-    SPLIT_KEYS = 2  # the keys of these, beside best
+    SPLIT_KEYS = 2  # of 64-bit cells, which are bound as keys; beside best
     # Chunks of points, beside a list.
     FARTHEST_TILES = 0
     BOXES = 0

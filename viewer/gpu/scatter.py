@@ -175,7 +175,7 @@ class _WideCells:
     def bind(self) -> None:
         """Bind them for shaders."""
         assert self._buffer is not None
-        self._buffer.bind_to_storage_buffer(Storage.WIDE)
+        self._buffer.bind_to_storage_buffer(Storage.KEYS)
 
 
 def take_keys(gpu: Gpu, visits: Visits, keys: gl.BufferTexture) -> None:

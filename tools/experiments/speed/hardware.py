@@ -19,9 +19,8 @@ in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
-copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32, 64,
-32-read and 64-read (whether a cell is read before), and --order file draws all points in the order of the file,
-without chunks.
+copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32,
+64, 32-read and 64-read (whether a cell is read before). --order file draws all points without chunks.
 """
 
 from __future__ import annotations
