@@ -78,7 +78,7 @@ def scatter(
     nothing went. hits: is filled with the cells that were hit; all of them are clear then.
     """
     if hits is None:
-        with nearest_of(gpu, keys, best) as nearest:
+        with keeping_nearest(gpu, keys, best) as nearest:
             nearest.take(visits)
         return
     take_keys(gpu, visits, keys)
@@ -86,7 +86,7 @@ def scatter(
 
 
 @contextmanager
-def nearest_of(
+def keeping_nearest(
     gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture, shown: Callable[[], Visits] | None = None
 ) -> Iterator[TwoPasses | OnePass]:
     """Keep the best of all visits that are taken inside, as `scatter` does of one.
@@ -117,7 +117,7 @@ class TwoPasses:
         """Let `keys` hold the least keys so far."""
 
     def finish(self, shown: Callable[[], Visits] | None) -> None:
-        """Let `keys` and `best` hold what all visits found. shown: see `nearest_of`."""
+        """Let `keys` and `best` hold what all visits found. shown: see `keeping_nearest`."""
         for visits in self._visits if shown is None else (shown(),):
             take_items(self._gpu, visits, self._keys, self._best)
 

@@ -16,7 +16,7 @@ from ..gpu.bindings import Texture
 from ..gpu.compact import IndexList
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
-from ..gpu.scatter import HitCells, Visits, nearest_of, scatter
+from ..gpu.scatter import HitCells, Visits, keeping_nearest, scatter
 from ..picture.frame_view import Before
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
@@ -122,7 +122,7 @@ def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before:
         Visits("points/cells.glsl", count, bind, {**defines, "KEPT": 1}, numbers, listed),
         Visits("points/cells.glsl", turns, bind, {**defines, "STRIDED": 1}, numbers),
     )
-    with nearest_of(pose.gpu, surface.depths, surface.rows) as nearest:
+    with keeping_nearest(pose.gpu, surface.depths, surface.rows) as nearest:
         for visits in both:
             nearest.take(visits)
     if _touching(pose, surface.view) <= size:
@@ -166,7 +166,9 @@ def _draw_chunks(
         surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} points are in groups out of view"
         return
 
-    with nearest_of(pose.gpu, surface.depths, surface.rows, lambda: visits(chunks.shown(surface))) as nearest:
+    with keeping_nearest(
+        pose.gpu, surface.depths, surface.rows, lambda: visits(chunks.shown(surface))
+    ) as nearest:
         nearest.take(visits(chunks.start(surface, margin)))
         nearest.show_keys()
         nearest.take(visits(chunks.late(surface)))
