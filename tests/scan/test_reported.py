@@ -138,7 +138,6 @@ def test_02_zero_normals_count_as_none(reported: Path, info: Callable[..., Any])
     assert facts["told"].replace("02_zero_normals", "").count("normals") == 1
 
 
-@TABLES
 def test_03_rows_of_unit_length_are_normals(reported: Path) -> None:
     cloud = only(reported / "03_floor_with_normals.xyz")
     assert cloud.colors is None
@@ -149,14 +148,12 @@ def test_03_rows_of_unit_length_are_normals(reported: Path) -> None:
 # --- tables ---------------------------------------------------------------------------------
 
 
-@TABLES
 def test_04_decimal_commas_with_blanks(reported: Path) -> None:
     cloud = only(reported / "04_decimal_commas.xyz")
     near(cloud.world(), [(1.25, 2.5, -3.75), (4.5, 5.25, 6.12), (1000.5, -0.5, 7)])
     assert cloud.normals is None
 
 
-@TABLES
 def test_05_semicolons_and_decimal_commas(reported: Path, info: Callable[..., Any]) -> None:
     near(
         only(reported / "05_german.csv").world(), [(1.25, 2.5, -3.75), (4.5, 5.25, 6.125), (1000.5, -0.5, 7)]
@@ -164,14 +161,12 @@ def test_05_semicolons_and_decimal_commas(reported: Path, info: Callable[..., An
     assert decision(info(reported / "05_german.csv"), "decimal")["value"] == ","
 
 
-@TABLES
 def test_06_a_number_in_front_is_no_coordinate(reported: Path) -> None:
     cloud = only(reported / "06_number_first.txt")
     near(cloud.world().min(axis=0), (10.5, 20.5, 30.5))
     assert len(cloud) == 9
 
 
-@TABLES
 def test_07_a_count_too_small_loses_no_row(reported: Path) -> None:
     cloud = only(reported / "07_count_too_small.pts")
     near(cloud.world(), [(1.5, 2.5, 3.5), (4.5, 5.5, 6.5), (7.5, 8.5, 9.0)])
@@ -255,7 +250,6 @@ def test_16_a_film_shows_each_pose_until_the_next(
     near(film_changes(command, reported / "16_gap", tmp_path / "x.mp4"), (0, 0.04, 0.2), 1e-3)
 
 
-@TABLES
 def test_17_a_frame_column_makes_frames(reported: Path) -> None:
     found = clouds(reported / "17_frame_column.csv")
     assert [len(cloud) for cloud in found] == [2, 2, 2]
@@ -270,7 +264,6 @@ def test_18_a_texture_gives_the_vertices_their_colors(reported: Path) -> None:
     near(cloud.world()[:4], [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
 
 
-@TABLES
 @pytest.mark.parametrize("name", ["cameras.txt", "camera.txt"])
 def test_19_cameras_are_no_points(reported: Path, command: Callable[..., Done], name: str) -> None:
     done = command("info", reported / "19_cameras" / name)
@@ -294,7 +287,6 @@ def test_20_landmarks_in_the_axes_that_the_file_states(
     )
 
 
-@TABLES
 def test_21_landmarks_of_slicers_table(reported: Path) -> None:
     found = read_landmarks(reported / "21_slicer_table.csv")
     assert found.names == ("nose", "eyeL")
@@ -302,7 +294,6 @@ def test_21_landmarks_of_slicers_table(reported: Path) -> None:
     near(found.positions[0], [(1, 2, 3), (4, 5, 6)])
 
 
-@TABLES
 def test_21_slicers_table_in_ras_with_a_gap(tmp_path: Path) -> None:
     table = tmp_path / "points.csv"
     table.write_text(
@@ -344,21 +335,18 @@ def test_23_depth_of_a_value_socket(reported: Path) -> None:
 # --- tables with other heads ----------------------------------------------------------------
 
 
-@TABLES
 def test_24_columns_as_paraview_names_them(reported: Path) -> None:
     cloud = only(reported / "24_paraview.csv")
     near(cloud.world(), [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
     assert colors(cloud) == [RED, GREEN, BLUE]
 
 
-@TABLES
 def test_25_units_in_names_of_columns(reported: Path) -> None:
     with open_scan(reported / "25_units_in_names.csv") as timeline:
         near(timeline.pose(0).cloud.world(), [(1, 2, 3), (4, 5, 6), (7, 8, 10)])
         assert timeline.unit == "mm"
 
 
-@TABLES
 def test_26_a_label_in_front(reported: Path) -> None:
     near(only(reported / "26_label_first.csv").world(), [(1, 2, 3), (4, 5, 6), (7, 8, 9.5)])
 
@@ -375,13 +363,11 @@ def test_28_types_beyond_the_standard(reported: Path, name: str) -> None:
     assert len(only(reported / name)) == 3
 
 
-@TABLES
 @pytest.mark.parametrize("suffix", ["asc", "xyzrgb"])
 def test_29_colors_by_suffix(reported: Path, suffix: str) -> None:
     assert colors(only(reported / f"29_rows.{suffix}")) == [RED, GREEN, BLUE]
 
 
-@TABLES
 def test_29_normals_by_suffix(reported: Path) -> None:
     cloud = only(reported / "29_rows.xyzn")
     assert cloud.colors is None
@@ -407,7 +393,6 @@ def test_31_six_columns(reported: Path) -> None:
     near(cloud.world(), [(0, 0, 0), (1, 0, 0), (0, 1, 0)])  # whose other columns are colours or normals
 
 
-@TABLES
 def test_32_sparse_points_of_colmap(reported: Path) -> None:
     cloud = only(reported / "32_sparse" / "points3D.txt")
     near(cloud.world(), [(1.5, 0.25, 0.5), (2, 0.125, -0.25), (1.75, 0.5, 0.75)])
@@ -488,10 +473,10 @@ def test_a_depth_channel_of_any_name(tmp_path: Path, channel: str) -> None:
 @pytest.mark.parametrize(
     "names",
     [
-        pytest.param("Points_0,Points_1,Points_2", marks=TABLES),
-        pytest.param('"X (mm)","Y (mm)","Z (mm)"', marks=TABLES),
+        "Points_0,Points_1,Points_2",
+        '"X (mm)","Y (mm)","Z (mm)"',
         "//X Y Z",
-        pytest.param("x_mm y_mm z_mm", marks=TABLES),
+        "x_mm y_mm z_mm",
     ],
 )
 def test_heads_of_other_programs(tmp_path: Path, names: str) -> None:

@@ -141,6 +141,7 @@ class PointContents:
     columns:  name -> (N,), of the file's type and in its order; emptied as they are used, so that few are
               held in memory together
     is_named: False where the file names no columns; they are called column_1, column_2 and so on
+    has_roles: whether the columns are called by the roles that the user states
     arrays:   NPY and NPZ: array by name, of which only the header is read
     stated:   what the file states about itself
     remarks:  comments, and other lines of the header
@@ -153,6 +154,7 @@ class PointContents:
 
     columns: dict[str, NDArray] = field(default_factory=dict)
     is_named: bool = True
+    has_roles: bool = False
     arrays: Mapping[str, ArrayInFile] = field(default_factory=dict)
     stated: Stated = field(default_factory=Stated)
     remarks: tuple[str, ...] = ()

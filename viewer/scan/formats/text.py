@@ -1,150 +1,194 @@
-"""Text tables of points: XYZ, CSV, TXT and PTS.
+"""Text tables of points: XYZ, CSV, TXT, ASC and PTS.
 
-A row a point, values between blanks, tabs, commas or semicolons; `#` and `//` start comments. A line
-of names may stand above the rows, also as a comment, and the count of the points (PTS).
+A row a point; `reading/tables.py` finds what stands above the rows, and how they are written. A column of
+frames or times makes several moments of one table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
+from threading import Lock
+from typing import TextIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..admission import MOST_COLUMNS, check_count, opened, whole_number
-from ..contents import PointContents
+from ..admission import MOST_FRAMES, check_count, opened
+from ..contents import PointContents, Stated, TextHead
 from ..points import PointCloud
+from ..reading import columns, numbers
+from ..reading.camera_tables import cameras_in_table
 from ..reading.cloud import assemble
+from ..reading.record import Decision
 from ..reading.sequence import Decided
-from ._columns import bounded_lines, first_repeated, named, parse_table
-from ._matrices import camera_matrices
+from ..reading.tables import NAMES_HELP, TableHead, head_of
+from ..times import DEFAULT_FPS
+from ._columns import bounded_lines, named
 
 TITLE = "a text table"
-SUFFIXES = (".xyz", ".csv", ".txt", ".pts")
-
-_ENCODING = "utf-8-sig"
-_MOST_ABOVE = 1 << 16  # lines above the rows
-_NAMES_HELP = "If the numbers are points, put a line of names above them, such as: x y z"
+SUFFIXES = (".xyz", ".csv", ".txt", ".pts", ".asc", ".xyzn", ".xyzrgb", ".xyznrgb", ".xyzi")
 
 
-@dataclass(frozen=True)
-class _Layout:
-    """The head of a file: what stands above the rows and how they are written."""
+def contents(path: Path, frame: int, decided: Decided) -> PointContents | PointCloud:
+    """The columns of a table, parsed as float64; of one that holds several moments the points of one.
 
-    skip: int  # lines above the first row
-    columns: list[int]  # that are numbers
-    names: list[str] | None  # of those columns
-    delimiter: str | None
-    promised: int | None  # rows
-
-
-def read(path: Path, frame: int, decided: Decided) -> PointCloud:
-    """All finite points of a text table, parsed as float64. Raises InputError."""
-    with opened(path) as stream:
-        text = TextIOWrapper(stream, _ENCODING, errors="replace")
-        layout = _look(bounded_lines(text))
-        text.seek(0)
-        lines = islice(bounded_lines(text), layout.skip, None)
-        table = parse_table(lines, layout.columns, layout.delimiter, layout.promised)
-    if layout.promised is not None and len(table) < layout.promised:
-        raise InputError(f"holds {len(table)} of the {layout.promised} points that it promises")
-    if layout.names is None and (matrices := camera_matrices(table)):
-        raise InputError(f"looks like {matrices}, not like points", hint=_NAMES_HELP)
-    names = layout.names or guess_names(table, intensity_first=path.suffix.lower() == ".pts")
-    columns = named(zip(names, table.T, strict=True))
-    return assemble(PointContents(columns=columns, is_named=layout.names is not None), decided)
-
-
-def guess_names(table: NDArray[np.float64], intensity_first: bool = False) -> list[str]:
-    """Names for the columns of a table without any, (N, C).
-
-    After x, y and z, from left to right: three columns of colours (whole numbers in 0..255, or all in
-    0..1), three of normals (all in -1..1; any other three, where the table has six columns), a column
-    behind the colours that is full everywhere (alpha), `intensity`, and then `column_8` for the eighth.
-    intensity_first: the fourth column is the intensity, as in PTS files.
+    Raises InputError.
     """
-    finite = np.isfinite(table).all(axis=1)
-    table = table if finite.all() else table[finite]
-    width = table.shape[1]
-    names = ["x", "y", "z", *["intensity"][: intensity_first and width > 3]]
-    missing = {"red", "nx", "intensity"} - {*names}
-    while (at := len(names)) < width:
-        three = table[:, at : at + 3]
-        if "red" in missing and three.shape[1] == 3 and _are_colors(three):
-            names += ["red", "green", "blue"]
-        elif "nx" in missing and three.shape[1] == 3 and (width == 6 or (np.abs(three) <= 1.001).all()):
-            names += ["nx", "ny", "nz"]
-        elif names[-1] == "blue" and any((three[:, 0] == full).all() for full in (1, 255)):
-            names.append("alpha")
-        else:
-            names.append("intensity" if "intensity" in missing else f"column_{at + 1}")
-        missing -= {*names[at:]}
-    return names
+    several = _moments(path, decided)
+    return _whole(path, decided) if several is None else Frames(path, decided).read(frame)
 
 
-def _are_colors(block: NDArray[np.float64]) -> bool:
-    in_bytes = (block >= 0).all() and (block <= 255).all() and (block == np.rint(block)).all()
-    return bool(in_bytes or ((block >= 0).all() and (block <= 1).all()))
+def _whole(path: Path, decided: Decided) -> PointContents:
+    """The columns of a table, all moments of it."""
+    with _text_of(path, decided) as (text, encoding):
+        head = head_of(bounded_lines(text), decided.corrections)
+        _check_points(head.instead)
+        text.seek(0)
+        lines = islice(bounded_lines(text), head.skip, None)
+        counts: list[int] = []
+        table = numbers.parse_numbers(lines, head.columns, head.dialect, counts=counts)
+    if head.names is None:
+        _check_points(cameras_in_table(table))
+    _note_writing(head, encoding, decided)
+    promised = None if head.promised is None else head.promised + sum(counts)
+    if promised not in (None, len(table)):
+        what = f"the count above its rows is {promised:,}, but there are {len(table):,} rows"
+        decided.report("contradiction", f"{path.name}: {what}. Scan4D reads all rows")
+    names = _names(head, table, path.suffix.lower(), decided)
+    return PointContents(
+        columns=named(zip(names, table.T, strict=True)),
+        is_named=head.names is not None,
+        has_roles="columns" in decided.corrections,
+        stated=Stated(unit=columns.unit_in_names(head.names or ()), promised=promised),
+        remarks=head.remarks,
+        head=TextHead(encoding.value, head.remarks),
+    )
 
 
-def _look(lines: Iterable[str]) -> _Layout:
-    """Read down to the first row of numbers. Raises InputError where there is none."""
-    names: list[str] | None = None
-    remark: list[str] = []
-    promised = None
-    for number, line in enumerate(islice(lines, _MOST_ABOVE)):
-        if line.isspace():
-            continue
-        comment = line.lstrip().startswith(("#", "//"))
-        words, delimiter = _split(line.lstrip("#/ \t") if comment else line)
-        check_count(0 if comment else len(words), MOST_COLUMNS, "columns")
-        if comment:
-            remark = words if _are_names(words) else remark
-        elif not any(words):
-            continue
-        elif not _is_number(words[0]):
-            if not _are_names(words):
-                raise InputError(_not_names(number + 1, line, words))
-            names = words
-        elif len(words) == 1 and words[0].isdecimal() and promised is None:
-            promised = whole_number(words[0], "the count of its points")
-        else:
-            if names is None and len(remark) == len(words):
-                names = remark
-            columns = [i for i, word in enumerate(words[: len(names or words)]) if _is_number(word)]
-            if names is None and len(columns) < 3:
-                raise InputError(f"line {number + 1} has fewer than three numbers")
-            chosen = None if names is None else [names[i] for i in columns]
-            return _Layout(number, columns, chosen, delimiter, promised)
-    raise InputError(f"holds no rows of numbers in its first {_MOST_ABOVE:,} lines")
+def frame_count(path: Path, decided: Decided) -> int:
+    """How many moments a table holds; it reads the columns of frames, times and ids where they have names."""
+    moments = _moments(path, decided)
+    return 1 if moments is None else len(moments.numbers)
 
 
-def _split(line: str) -> tuple[list[str], str | None]:
-    """The words of a line and the delimiter between them (None: blanks)."""
-    line = line.strip()
-    delimiter = next((mark for mark in (";", ",", "\t") if mark in line), None)
-    return [word.strip().strip("\"'") for word in line.split(delimiter)], delimiter
+def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
+    """The times of the moments, (T,) seconds, from their column or the numbers of the frames."""
+    moments = _moments(path, decided)
+    if moments is None:
+        return None
+    if moments.times is not None:
+        return moments.times
+    return (moments.numbers - moments.numbers[0]) / DEFAULT_FPS
 
 
-def _are_names(words: list[str]) -> bool:
-    return {"x", "y", "z"} <= {word.lower() for word in words}
+def read_unit(path: Path, decided: Decided) -> str | None:
+    """The unit of length that the names of x, y and z state, as `x [mm]` does."""
+    return columns.unit_in_names(_head(path, decided).names or ())
 
 
-def _not_names(number: int, line: str, words: Sequence[str]) -> str:
-    twice = first_repeated(word.lower() for word in words)
-    if {"x", "y", "z"} & {word.lower() for word in words} and twice:
-        return f"line {number} names '{twice}' twice, and lacks x, y or z"
-    return f"line {number} is neither numbers nor names with x, y, z: {line[:60]!r}"
+class Frames:
+    """The moments of one table, which is parsed once. Any thread may read."""
+
+    def __init__(self, path: Path, decided: Decided) -> None:
+        """Raises InputError where the file holds no table."""
+        self._path = path
+        self._decided = decided
+        self._moments = _moments(path, decided)
+        self._columns: PointContents | None = None
+        self._reading = Lock()
+
+    def read(self, frame: int) -> PointCloud:
+        """All finite points of one moment. Raises InputError."""
+        if self._moments is None:
+            return assemble(_whole(self._path, self._decided), self._decided)
+        with self._reading:
+            if self._columns is None:
+                self._columns = _whole(self._path, self._decided)
+            whole = self._columns
+        start, end = self._moments.starts[frame : frame + 2]
+        rows = self._moments.order[start:end]
+        parts = {name: np.asarray(column)[rows] for name, column in whole.columns.items()}
+        cloud = assemble(replace(whole, columns=parts), self._decided)
+        if self._moments.ids is None:
+            return cloud
+        ids = self._moments.ids[start:end]
+        return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
 
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+# --- head ---------------------------------------------------------------------------------------
+
+
+@contextmanager
+def _text_of(path: Path, decided: Decided) -> Iterator[tuple[TextIO, Decision]]:
+    """A file as text, and its encoding. Bytes that the encoding does not have become U+FFFD."""
+    with opened(path) as stream:
+        start = stream.read(numbers.HEAD)
+        stream.seek(0)
+        encoding = numbers.encoding_decision(start, decided.corrections.get("encoding"))
+        text = TextIOWrapper(stream, numbers.codec_of(encoding, start), errors="replace")
+        yield text, encoding
+        text.detach()  # else it would close the stream
+
+
+def _head(path: Path, decided: Decided) -> TableHead:
+    with _text_of(path, decided) as (text, _):
+        return head_of(bounded_lines(text), decided.corrections)
+
+
+def _check_points(instead: str | None) -> None:
+    """Raise InputError where a table holds something else than points."""
+    if instead is not None:
+        raise InputError(f"looks like {instead}, not like points", hint=NAMES_HELP)
+
+
+def _note_writing(head: TableHead, encoding: Decision, decided: Decided) -> None:
+    """Put into the record how the rows are written."""
+    skip = decided.corrections.decision("skip") or Decision("skip", head.skip)
+    separator, decimal = head.dialect.decisions(decided.corrections)
+    decided.note(encoding, separator, decimal, skip)
+
+
+def _names(head: TableHead, table: NDArray[np.float64], suffix: str, decided: Decided) -> list[str]:
+    """The names of the columns that are read, and a decision about them."""
+    if (stated := decided.corrections.decision(columns.KEY)) is not None:
+        decided.note(stated)
+        return [*(head.names or ())]
+    if head.names is not None:
+        decided.note(columns.decide_named(head.names))
+        return columns.canonical_names(head.names)
+    decision = decided.settle(columns.KEY, lambda: columns.decide(table, suffix))
+    if len(decision.value) != table.shape[1]:
+        had, has = len(decision.value), table.shape[1]
+        decided.contradict(columns.KEY, f"it has {has} columns, but the frames before it have {had}")
+        decision = columns.decide(table, suffix)
+    return columns.names_of(decision.value)
+
+
+# --- moments ------------------------------------------------------------------------------------
+
+
+def _moments(path: Path, decided: Decided) -> columns.Moments | None:
+    """The moments of a table, by those of its columns that tell them; None where it is one."""
+    with _text_of(path, decided) as (text, _):
+        head = head_of(bounded_lines(text), decided.corrections)
+        found = columns.moment_columns(head.names or ())
+        if not found.can_split or decided.corrections.get("frames") == "cloud" or head.instead:
+            return None
+        text.seek(0)
+        lines = islice(bounded_lines(text), head.skip, None)
+        chosen = [at for at in found[:3] if at is not None]
+        table = numbers.parse_numbers(lines, [head.columns[at] for at in chosen], head.dialect, counts=[])
+    by_index = dict(zip(chosen, table.T, strict=True))
+    frame, time, id = (None if at is None else by_index[at] for at in found[:3])
+    moments = columns.moments_of(frame, time, id, found.seconds)
+    if moments is None:
+        return None
+    check_count(len(moments.numbers), MOST_FRAMES, "frames")
+    decided.note(Decision("frames", f"by column {(head.names or ())[chosen[0]]}", why=moments.why))
+    return moments

@@ -150,6 +150,8 @@ def _by_role(contents: PointContents, decided: Decided) -> dict[str, NDArray]:
     """The columns by what they are: as the user says, else as the file or its reader names them."""
     columns = contents.columns
     stated = decided.corrections.get("columns")
+    if contents.has_roles:
+        return columns
     if stated is None:
         source: Source = "file" if contents.is_named else "assumed"
         decided.note(Decision("columns", list(columns), source, changes_numbers=True))
