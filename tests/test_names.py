@@ -14,13 +14,13 @@ import pytest
 import source_code
 from source_code import PACKAGE, syntax_of
 
-BY_PROTOCOL = {"Params", "Tool", "Settings"}  # each backend, and each tool, declares its own
+BY_PROTOCOL = {"Frames", "Params", "Tool", "Settings"}  # each backend, and each tool, declares its own
 
 # Functions that modules of a kind have under one name, or that do the work of one of that name.
 FUNCTIONS_BY_PROTOCOL = {
     "add_arguments", "find", "run", "draw", "check", "contents", "frame_count", "read", "read_faces",
     "read_times", "read_unit", "write", "write_poses", "render",
-    "lacks", "owns", "decide",
+    "lacks", "owns", "decide", "contents",
 }  # fmt: skip
 
 # A docstring begins with a noun or a verb that names its subject. These begin without one.

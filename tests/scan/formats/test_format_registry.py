@@ -33,7 +33,7 @@ def test_unknown_suffix_lists_the_known(tmp_path: Path) -> None:
     for suffix in (".json", ".svg"):  # near to one that is another format
         path = tmp_path / f"scan{suffix}"
         path.write_text("{}")
-        with pytest.raises(InputError, match=r"unknown file suffix '\..*'\. Known: \.csv, ") as caught:
+        with pytest.raises(InputError, match=r"unknown file suffix '\..*'\. Known: \.asc, \.csv, ") as caught:
             formats.read(path)
         assert "Did you mean" not in str(caught.value)
     with pytest.raises(InputError, match=r"cannot write '\.obj' files.*\.npz, \.pcd, \.ply"):

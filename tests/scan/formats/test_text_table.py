@@ -9,7 +9,8 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.formats import read
-from viewer.scan.formats.text import guess_names
+from viewer.scan.reading import columns
+from viewer.scan.reading.sequence import Decided
 
 
 def save(path: Path, text: str) -> Path:
@@ -59,11 +60,22 @@ def test_comments_among_the_rows(tmp_path: Path) -> None:
 
 def test_the_count_of_a_pts_file(tmp_path: Path) -> None:
     path = tmp_path / "scan.pts"
-    cloud = read(save(path, "2\n1 2 3 200 10 20 30\n4 5 6 90 40 50 60\n7 8 9 1 1 1 1\n"))
-    np.testing.assert_array_equal(cloud.scalars["intensity"], [200, 90])
-    np.testing.assert_array_equal(cloud.colors[:, :3], [[10, 20, 30], [40, 50, 60]])
-    with pytest.raises(InputError, match="holds 1 of the 1000000000 points"):
-        read(save(path, "1000000000\n1 2 3\n"))
+    decided = Decided()
+    cloud = read(save(path, "2\n1 2 3 200 10 20 30\n4 5 6 90 40 50 60\n7 8 9 1 1 1 1\n"), decided=decided)
+    np.testing.assert_array_equal(cloud.scalars["intensity"], [200, 90, 1])
+    np.testing.assert_array_equal(cloud.colors[:, :3], [[10, 20, 30], [40, 50, 60], [1, 1, 1]])
+    (report,) = decided.reports()
+    assert (
+        report.text == "scan.pts: the count above its rows is 2, but there are 3 rows. Scan4D reads all rows"
+    )
+    assert len(read(save(path, "1000000000\n1 2 3\n"))) == 1
+
+
+def test_several_blocks_of_a_pts_file(tmp_path: Path) -> None:
+    decided = Decided()
+    cloud = read(save(tmp_path / "scan.pts", "2\n1 2 3 9\n4 5 6 9\n1\n7 8 9 9\n"), decided=decided)
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3], [4, 5, 6], [7, 8, 9]])
+    assert not decided.reports()
 
 
 ROW = [5.0, 6.0, 7.0]
@@ -93,7 +105,7 @@ NORMAL = [0.0, -0.6, 0.8]
 )
 def test_guesses_without_names(values: list[float], names: str) -> None:
     table = np.array([[*ROW, *values], [1, 2, 3, *values], [np.nan] * (3 + len(values))])
-    assert guess_names(table) == ["x", "y", "z", *names.split()]
+    assert columns.names_of(columns.decide(table).value) == ["x", "y", "z", *names.split()]
 
 
 @pytest.mark.parametrize(
@@ -148,9 +160,9 @@ def test_names_are_guessed_in_one_pass() -> None:
             looked_at += isinstance(key, tuple)
             return super().__getitem__(key)
 
-    names = guess_names(np.full((2, 3000), 7.5).view(Counting))
-    assert len(names) == 3000
-    assert looked_at < 3 * 3000
+    roles = columns.decide(np.full((2, 3000), 7.5).view(Counting)).value
+    assert len(roles) == 3000
+    assert looked_at < 5 * 3000
 
 
 @pytest.mark.parametrize("suffix", [".xyz", ".obj", ".ply", ".pcd"])

@@ -59,7 +59,9 @@ def _intrinsics_in_a_row(table: NDArray[np.float64]) -> str | None:
     if len(table) != 1:
         return None
     row = table[0]
-    is_sized = len(row) >= 6 and (row[:2] == np.rint(row[:2])).all() and (row[4:6] < row[:2]).all()
+    centers = row[4:6] if len(row) >= 6 else row[:0]
+    is_sized = len(centers) and (row[:2] == np.rint(row[:2])).all() and (centers > 1).all()
+    is_sized = is_sized and (centers < row[:2]).all()
     numbers = row[2:] if is_sized else row
     if len(numbers) < 4 or (numbers[:4] <= _SHORTEST).any():
         return None

@@ -231,7 +231,7 @@ def _candidates(table: NDArray[np.float64], intensity_first: bool) -> list[_Cand
 
 
 def _fronts(table: NDArray[np.float64]) -> Iterator[tuple[list[str], str]]:
-    """What may stand before x, y and z, with the reason."""
+    """Roles that may stand before x, y and z, each with the reason."""
     count, width = table.shape
     if count < _LEAST or width < 4:
         return
@@ -255,7 +255,7 @@ def _is_grid(table: NDArray[np.float64]) -> bool:
     if not ordered or (pair == pair[0]).all(axis=0).any():
         return False
     with np.errstate(all="ignore"):
-        related = np.abs(np.corrcoef(table[:, :5].T)[:2, 2:]) > _RELATED
+        related = np.abs(np.asarray(np.corrcoef(table[:, :5].T))[:2, 2:]) > _RELATED
     return bool(related.any(axis=1).all() and related.any(axis=0).sum() >= 2)
 
 
@@ -284,7 +284,7 @@ def _behind(front: list[str], table: NDArray[np.float64], intensity_first: bool)
 
 
 def _block(three: NDArray[np.float64], width: int) -> tuple[str | None, str]:
-    """What three columns are, "r", "nx" or None, and why; width: of the table."""
+    """The kind of three columns, "r", "nx" or None, and why. width: of the table."""
     if not len(three):
         return None, ""
     length = np.sqrt((three**2).sum(axis=1))

@@ -210,8 +210,8 @@ def is_comment(line: str) -> bool:
 def dialect_of(lines: Iterable[str], separator: str | None = None, decimal: str | None = None) -> Dialect:
     """How the rows among the first lines of a text are written; names and remarks may stand above them.
 
-    Of all separators and decimal marks, those count that find the most numbers in most of the lines. Decimal
-    commas count only where more numbers are found with them. separator, decimal: stated by the user.
+    Those separators and decimal marks count that find the most numbers, and the least else, in most lines.
+    Decimal commas count only where more numbers are found with them. separator, decimal: stated by the user.
     """
     sample = [*islice(_filled(lines), _LOOKED_AT)][-_SAMPLE:]
     text = "".join(sample)
@@ -228,7 +228,7 @@ def dialect_of(lines: Iterable[str], separator: str | None = None, decimal: str 
     scores = [_score(one, sample) for one in candidates]
     most = max((score.lines for score in scores), default=0)
     usable = [(score, one) for score, one in zip(scores, candidates, strict=True) if 2 * score.lines >= most]
-    best = max(usable, key=lambda pair: pair[0][1:])[1] if usable else PLAIN
+    best = max(usable, key=lambda pair: pair[0].fit)[1] if usable else PLAIN
     if best.decimal == "," and decimal is None and _could_be_thousands(best, sample):
         return Dialect(best.separator, ",", is_certain=False)
     return best
@@ -245,11 +245,10 @@ def _occurs(dialect: Dialect, text: str) -> bool:
 
 
 class _Score(NamedTuple):
-    """How well a dialect fits: lines with as many words as most others, their numbers, the share of these."""
+    """How well a dialect fits: lines with as many words as most others; their numbers times their share."""
 
     lines: int
-    numbers: int
-    share: float
+    fit: float
 
 
 def _score(dialect: Dialect, sample: Sequence[str]) -> _Score:
@@ -259,9 +258,9 @@ def _score(dialect: Dialect, sample: Sequence[str]) -> _Score:
         if found := sum(is_numeral(word, dialect.decimal) for word in words):
             counts.setdefault(len(words), []).append(found)
     if not counts:
-        return _Score(0, 0, 0)
+        return _Score(0, 0)
     width, each = max(counts.items(), key=lambda item: (len(item[1]), item[0]))
-    return _Score(len(each), sum(each), sum(each) / (len(each) * width))
+    return _Score(len(each), sum(each) ** 2 / (len(each) * width))
 
 
 def _is_spaced(sample: Sequence[str], separator: str | None, decimal: str | None) -> bool:

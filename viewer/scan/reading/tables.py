@@ -135,11 +135,11 @@ class _Search:
         text = line.lstrip("#/% \t")
         if "POINT3D_ID" in text:
             self.remark = _SPARSE
-        elif has_positions(words := names_in(text)):
+        elif has_positions(words := split_names(text)):
             self.remark = words
 
     def _take_text(self, number: int, line: str) -> None:
-        words = names_in(line)
+        words = split_names(line)
         check_count(len(words), MOST_COLUMNS, "columns")
         if has_positions(words):
             self.names = words
@@ -226,7 +226,7 @@ class _Search:
         )
 
 
-def names_in(line: str) -> list[str]:
+def split_names(line: str) -> list[str]:
     """The names of columns in a line, by its own separator; units in brackets belong to names before them."""
     line = line.strip().lstrip("#/% \t")
     separator = next((name for name, mark in numbers.SEPARATORS.items() if mark and mark in line), "blank")
@@ -277,7 +277,7 @@ class TablePreview(NamedTuple):
     decimal:   "." or ","
     skip:      lines above the first row
     problem:   why it cannot be read; empty where it can
-    count:     rows among the lines
+    row_count: rows among the lines
     """
 
     lines: tuple[str, ...]
@@ -287,7 +287,7 @@ class TablePreview(NamedTuple):
     decimal: str
     skip: int
     problem: str
-    count: int
+    row_count: int
 
 
 def preview(path: Path, corrections: Corrections = NOTHING_CORRECTED) -> TablePreview:

@@ -1,0 +1,163 @@
+"""Heads of text tables: names, remarks, labels, counts; tables of no points; the preview of the dialog."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.errors import InputError
+from viewer.scan import formats
+from viewer.scan.open import open_scan
+from viewer.scan.reading.corrections import Corrections
+from viewer.scan.reading.sequence import Decided
+from viewer.scan.reading.tables import head_of, split_names, preview
+
+ROWS = [[1, 2, 3], [4, 5, 6], [7, 8, 10]]
+
+
+def save(path: Path, text: str, encoding: str = "utf-8") -> Path:
+    path.write_bytes(text.encode(encoding))
+    return path
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "Scan of 2024\nUnits: mm\nx y z\n1 2 3\n4 5 6\n7 8 10\n",
+        "Measured 2024 05 01\nby hand\n1 2 3\n4 5 6\n7 8 10\n",
+        "nose 1 2 3\neye 4 5 6\nchin 7 8 10\n",
+        "name,x,y,z\nleft eye,1,2,3\nnose,4,5,6\nchin,7,8,10\n",
+        "id;label;x;y;z\n1;a;1,0;2,0;3,0\n2;b;4,0;5,0;6,0\n3;c;7,0;8,0;10,0\n",
+        "//X Y Z\n3\n1 2 3\n4 5 6\n7 8 10\n",
+        "640 480\n1 2 3\n4 5 6\n7 8 10\n",
+        "x [mm] y [mm] z [mm]\n1 2 3\n4 5 6\n7 8 10\n",
+        '"x","y","z"\n"1","2","3"\n"4","5","6"\n"7","8","10"\n',
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"])
+def test_heads_of_other_programs(text: str, encoding: str, tmp_path: Path) -> None:
+    cloud = formats.read(save(tmp_path / "scan.txt", text, encoding))
+    np.testing.assert_allclose(cloud.world(), ROWS)
+    assert cloud.colors is None
+
+
+def test_numbers_that_are_not_finite_in_the_first_row(tmp_path: Path) -> None:
+    cloud = formats.read(save(tmp_path / "scan.csv", "x,y,z,q\n1,2,3,1.#QNAN\n4,5,6,7\n1.#IND,2,3,4\n"))
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(cloud.scalars["q"], [np.nan, 7])
+    assert cloud.dropped == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "what"),
+    [
+        ("1 PINHOLE 640 480 525 525 319.5 239.5\n", "a list of cameras"),
+        ("# IMAGE_ID, ...\n1 0.8 0.6 0 0 1 2 3 1 a.jpg\n10 20 -1 30 40 5\n", "a list of camera poses"),
+        ("525.0 525.0 319.5 239.5\n", "intrinsics of a camera"),
+        ("525.0 525.0 319.5 239.5 0.1 -0.2 0 0 0\n", "intrinsics of a camera"),
+        ("640 480 525.0 525.0 319.5 239.5\n", "intrinsics of a camera"),
+        ("fx fy cx cy\n525 525 319.5 239.5\n", "intrinsics of a camera"),
+        ("1.0 0 0 0 0 0 0 1\n2.0 0 1 0 0 0 0.6 0.8\n", "a camera trajectory"),
+        ("0 0 0 0 0 0 1\n0 1 0 0 0 0.6 0.8\n", "2 camera poses"),
+        ("timestamp, frame, x, y, z, qx, qy, qz, qw\n1, 0, 0,0,0,0,0,0,1\n", "a camera trajectory"),
+        ("ncols 3\nnrows 2\ncellsize 1\n1 2 3\n4 5 6\n", "a grid of heights"),
+    ],
+)
+def test_tables_that_hold_no_points(text: str, what: str, tmp_path: Path) -> None:
+    path = save(tmp_path / "table.txt", text)
+    with pytest.raises(InputError, match=f"looks like {what}"):
+        formats.read(path)
+
+
+@pytest.mark.parametrize("tracks", ["16 65 15 73", "16 65"])
+@pytest.mark.parametrize(
+    "head", ["", "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, IDX)\n"]
+)
+def test_sparse_points_with_tracks(head: str, tracks: str, tmp_path: Path) -> None:
+    rows = f"63 1.5 0.25 0.5 115 121 122 1.3 {tracks} 6 67\n64 2.0 0.125 -0.25 102 209 250 1.7 16 19\n"
+    cloud = formats.read(save(tmp_path / "points3D.txt", head + rows))
+    np.testing.assert_allclose(cloud.world(), [[1.5, 0.25, 0.5], [2, 0.125, -0.25]])
+    np.testing.assert_array_equal(cloud.colors[:, :3], [[115, 121, 122], [102, 209, 250]])
+
+
+def test_unknown_names_are_no_remark(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"neither numbers nor names with x, y, z: 'a,b,c"):
+        formats.read(save(tmp_path / "scan.csv", "a,b,c\n1,2,3\n"))
+
+
+def test_commas_between_and_inside_numbers(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="decimal marks"):
+        formats.read(save(tmp_path / "scan.csv", "1,25,2,50,-3,05\n4,50,5,25,6,12\n"))
+
+
+def test_moments_of_a_table(tmp_path: Path) -> None:
+    text = "time [ms];id;x;y;z\n0;1;1,5;2;3\n0;0;4;5;6\n50;0;4;5;6,5\n50;1;NaN;2;3\n"
+    with open_scan(save(tmp_path / "scan.csv", text)) as timeline:
+        assert len(timeline) == 2
+        assert timeline.times.tolist() == [0, 0.05]
+        first, second = (timeline.pose(index).cloud for index in range(2))
+        assert timeline.reading["frames"].value == "by column time [ms]"
+    np.testing.assert_array_equal(first.world(), [[4, 5, 6], [1.5, 2, 3]])
+    assert (first.ids.tolist(), second.ids.tolist()) == ([0, 1], [0])
+    assert second.dropped == 1
+
+
+def test_a_user_can_have_one_cloud_of_all_moments(tmp_path: Path) -> None:
+    path = save(tmp_path / "scan.csv", "frame,x,y,z\n0,1,2,3\n0,4,5,6\n1,1,2,3\n1,4,5,6\n")
+    with open_scan(path) as timeline:
+        assert len(timeline) == 2
+    with open_scan(path, read={"frames": "cloud"}) as timeline:
+        assert len(timeline.pose(0).cloud) == 4
+
+
+def test_columns_that_the_user_states(tmp_path: Path) -> None:
+    path = save(tmp_path / "scan.txt", "a b c d e\nnose 9 1 2 3\nchin 8 4 5 6\n")
+    decided = Decided(Corrections.parse({"columns": "label intensity x y z", "skip": "1"}))
+    cloud = formats.read(path, decided=decided)
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3], [4, 5, 6]])
+    assert cloud.scalars["intensity"].tolist() == [9, 8]
+    assert (decided.reading["columns"].source, decided.reading["skip"].value) == ("user", 1)
+
+
+def test_a_frame_of_other_columns_contradicts(tmp_path: Path) -> None:
+    decided = Decided()
+    formats.read(save(tmp_path / "a.xyz", "1 2 3 9.5\n4 5 6 8.5\n"), decided=decided)
+    cloud = formats.read(save(tmp_path / "b.xyz", "1 2 3\n4 5 6\n"), decided=decided.at(1))
+    assert len(cloud) == 2
+    (found,) = decided.reading.contradictions
+    assert (found.frame, found.key) == (1, "columns")
+
+
+def test_names_by_their_own_separator() -> None:
+    assert split_names('"Points:0","Points 1"\n') == ["Points:0", "Points 1"]
+    assert split_names("// x [mm] y [mm]\n") == ["x [mm]", "y [mm]"]
+
+
+def test_a_preview_of_a_table(tmp_path: Path) -> None:
+    path = save(tmp_path / "scan.txt", "A remark\nnose 1,5 2,5 3,5\nchin 4,5 5,5 6,5\n")
+    shown = preview(path)
+    assert shown.cells == (("nose", "1,5", "2,5", "3,5"), ("chin", "4,5", "5,5", "6,5"))
+    assert shown.roles == ("-", "x", "y", "z")
+    assert (shown.separator, shown.decimal, shown.skip, shown.problem, shown.row_count) == (
+        "blank",
+        ",",
+        1,
+        "",
+        2,
+    )
+    stated = preview(path, Corrections.parse({"columns": "label z y x"}))
+    assert stated.roles == ("label", "z", "y", "x")
+
+
+def test_a_preview_of_what_cannot_be_read(tmp_path: Path) -> None:
+    shown = preview(save(tmp_path / "scan.csv", "a;b;c\n1;2;3\n"))
+    assert "neither numbers nor names" in shown.problem
+    assert shown.lines == ("a;b;c", "1;2;3")
+    assert shown.row_count == 0
+
+
+def test_the_head_is_found_below_many_remarks() -> None:
+    head = head_of([*(f"remark {number}\n" for number in range(60)), "1 2 3\n", "4 5 6\n"] + ["7 8 9\n"] * 60)
+    assert (head.skip, head.columns) == (60, (0, 1, 2))
