@@ -12,7 +12,7 @@ from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.reading.corrections import Corrections
 from viewer.scan.reading.sequence import Decided
-from viewer.scan.reading.tables import head_of, split_names, preview
+from viewer.scan.reading.tables import head_of, preview, split_names
 
 ROWS = [[1, 2, 3], [4, 5, 6], [7, 8, 10]]
 
