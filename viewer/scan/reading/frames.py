@@ -1,0 +1,112 @@
+"""Which files are frames: copies and reference files beside them are left aside."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+from ...errors import InputError, shortened
+from .corrections import NOTHING_CORRECTED, Corrections
+from .names import in_order, numbered_name
+from .record import Aside, Decision
+
+KEY = "frames"
+_LEAST = 3  # frames of one pattern, beside which other files are no frames
+_MOST_REFERENCES = 2
+_ALL = "*"
+
+_WORDS = r"copy|copie|kopie|copia|cópia|kopia|kopija|duplicate|コピー|副本"
+_COPIES = tuple(
+    re.compile(pattern, re.IGNORECASE)
+    for pattern in (
+        r"(?P<base>.+?) ?\(\d{1,3}\)",
+        rf"(?P<base>.+?)(?: ?- ?|[ _])(?:{_WORDS})(?: ?\(?\d{{1,3}}\)?)?",
+        rf"(?:{_WORDS})(?: of| von| de| di)? (?P<base>.+)",
+        r"(?P<base>.+?) ?\([^()]*(?:conflict|konflikt|conflit|conflicto)[^()]*\)",
+        r"(?P<base>.+?)\.sync-conflict-[0-9]{8}-[0-9]{6}(?:-[A-Z0-9]+)?",
+        r"(?P<base>.+?)(?:~|\.bak|\.orig|\.backup)",
+    )
+)
+
+
+class Frames(NamedTuple):
+    """The files that are frames, in order, and those that are left aside."""
+
+    names: list[str]
+    decision: Decision
+    aside: tuple[Aside, ...]
+
+
+def copies(names: Sequence[str]) -> dict[str, str]:
+    """Name of a copy -> the name that it is a copy of, which is among the names.
+
+    None are copies where fewer than two other files would remain: "scan.ply", "scan (1).ply" and
+    "scan (2).ply" are a sequence.
+    """
+    there, found = set(names), {}
+    for name in names:
+        folder, file = os.path.split(name)
+        stem, suffix = os.path.splitext(file)
+        for pattern in _COPIES:
+            match = pattern.fullmatch(stem)
+            if match and (base := os.path.join(folder, match["base"] + suffix)) in there:
+                found[name] = base
+                break
+    return found if len(there) - len(found) >= 2 else {}
+
+
+def references(names: Sequence[str]) -> list[str]:
+    """Names of one or two files without a number, where three or more others share a numbered pattern."""
+    numbered = [numbered_name(name) for name in names]
+    patterns = {(found.before, found.after) for found in numbered if found is not None}
+    odd = [name for name, found in zip(names, numbered, strict=True) if found is None]
+    is_one = len(patterns) == 1 and len(names) - len(odd) >= _LEAST
+    return odd if is_one and 1 <= len(odd) <= _MOST_REFERENCES else []
+
+
+def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -> Frames:
+    """The frames among files of one kind, in order.
+
+    names: at least one; relative to a common folder. Raises InputError where no file has the user's pattern.
+    """
+    stated = corrections.get(KEY)
+    if stated is not None and any(sign in stated for sign in "*?[."):
+        matching = [name for name in names if fnmatchcase(os.path.basename(name), stated)]
+        if not matching:
+            raise InputError(f"no file matches '{shortened(stated)}'", hint="Correct --read frames")
+        aside = tuple(Aside(name, "not chosen") for name in in_order([*{*names} - {*matching}]))
+        return Frames(in_order(matching), Decision(KEY, stated, "user", "--read"), aside)
+    copied = copies(names)
+    rest = [name for name in names if name not in copied]
+    odd = {*references(rest)}
+    aside = tuple(
+        Aside(
+            os.path.basename(name),
+            f"copy of {os.path.basename(copied[name])}" if name in copied else "reference",
+        )
+        for name in in_order([*copied, *odd])
+    )
+    used = in_order([name for name in rest if name not in odd])
+    if not aside:
+        return Frames(used, Decision(KEY, _counted(used), "folder"), ())
+    why = f"Scan4D leaves aside {', '.join(row.file for row in aside[:3])}, by the names"
+    return Frames(used, Decision(KEY, _counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
+
+
+def _counted(names: Sequence[str]) -> str | None:
+    """The frames in words; None where there is one."""
+    if len(names) < 2:
+        return None
+    return f"{len(names)} files, {os.path.basename(names[0])} to {os.path.basename(names[-1])}"
+
+
+def message(frames: Frames) -> str:
+    """The report of files that are left aside, for the user; empty where there is none."""
+    if not frames.aside or frames.decision.source == "user":
+        return ""
+    listed = ", ".join(f"{row.file} ({row.why})" for row in frames.aside[:3])
+    more = f" and {len(frames.aside) - 3} more" if len(frames.aside) > 3 else ""
+    return f"Scan4D leaves aside {listed}{more}. Use them with --read frames='*'"
