@@ -16,7 +16,7 @@ from source_code import modules, syntax_of
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.csv_text import save_rows, text_of_cell, to_text
-from viewer.scan.times import read_times_csv
+from viewer.scan.reading.times import read_times_csv
 
 FORMULAS = ("=1+1", "+1+1", "-1-cmd", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "=cmd|' /C calc'!A0", "-", "+")
 WIDE_FORMULAS = ("\uff1d1+1", "\uff0b1", "\uff0d1", "\uff20SUM(A1)", "'\uff1d1")

@@ -203,7 +203,6 @@ def test_12_fps_of_an_archive(reported: Path) -> None:
 # --- which files are frames, and when -------------------------------------------------------
 
 
-@FRAMES
 def test_13_two_takes_are_two_scans(reported: Path, info: Callable[..., Any]) -> None:
     """The first take opens, the message names both, and --take chooses."""
     facts = info(reported / "13_two_takes")
@@ -214,7 +213,6 @@ def test_13_two_takes_are_two_scans(reported: Path, info: Callable[..., Any]) ->
     assert (other["poses"], other["label"]) == (3, "take2_frame001.ply")
 
 
-@FRAMES
 def test_14_conflict_copies_are_left_aside(reported: Path, info: Callable[..., Any]) -> None:
     facts = info(reported / "14_conflict_copies")
     assert facts["poses"] == 3
@@ -222,7 +220,6 @@ def test_14_conflict_copies_are_left_aside(reported: Path, info: Callable[..., A
     assert aside == {"f002 (PC-7's conflicted copy 2024-05-01).ply", "f003 - Copy.ply"}
 
 
-@FRAMES
 def test_15_dates_are_no_frame_numbers(reported: Path) -> None:
     near(times(reported / "15_dates"), (0, 0.04, 0.08))
 
@@ -377,7 +374,6 @@ def test_29_normals_by_suffix(reported: Path) -> None:
     near(cloud.normals, np.broadcast_to([0, 0, 1], (3, 3)))
 
 
-@FRAMES
 def test_30_times_of_a_german_spreadsheet(reported: Path) -> None:
     near(times(reported / "30_times_excel"), (0, 0.033, 0.066))
 
@@ -406,7 +402,6 @@ def test_33_point_maps_are_frames(reported: Path) -> None:
     assert [len(cloud) for cloud in clouds(reported / "33_point_maps.npz")] == [768, 768]
 
 
-@FRAMES
 def test_34_a_film_of_time_stamps(reported: Path, command: Callable[..., Done], tmp_path: Path) -> None:
     near(times(reported / "34_stamps"), (0, 0.033, 0.066323, 0.166323), 1e-6)
     near(film_changes(command, reported / "34_stamps", tmp_path / "x.mp4"), (0, 0.033, 0.0663, 0.1663), 1e-3)

@@ -16,10 +16,12 @@ from typing import Literal
 from ..errors import InputError
 from ..files import absolute
 from . import formats
-from .open import entries, find_source, folder_frames, is_demo, matches
+from .open import entries, find_source, folder_frames, is_demo, matches, scan_frames
 from .range_folders import find_range_frames
+from .reading.names import frame_counts
+from .reading.sequence import Decided
 from .sources import FileSequence
-from .times import TIMES_FILE, frame_numbers, natural_key
+from .times import TIMES_FILE, natural_key
 
 _UNLIKE = 2.0  # times the size of the smallest file: frames of one scan differ less
 _DIGITS = re.compile("[0-9]+")
@@ -197,7 +199,9 @@ def _frames(folder: Path) -> tuple[int, set[Path]]:
         if found is not None:
             return len(found), set(found.files)
         frames = folder_frames(folder)
-        return 0 if is_collection(frames) else len(frames), set()
+        if is_collection(frames):
+            return 0, set()
+        return len(scan_frames(frames, Decided())) if len(frames) > 1 else len(frames), set()
     except InputError:
         return 0, set()
 
@@ -214,7 +218,7 @@ def _sequences(files: Sequence[Path]) -> dict[str, list[Path]]:
     return {
         str(members[0].with_name(f"{before}%0{width}d{after}" if width else f"{before}%d{after}")): members
         for (before, after, width), members in groups.items()
-        if len(members) > 1 and _is_plain(members[0]) and frame_numbers([file.name for file in members])
+        if len(members) > 1 and _is_plain(members[0]) and frame_counts([file.name for file in members])
     }
 
 

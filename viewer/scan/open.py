@@ -11,18 +11,21 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..errors import InputError, shortened
 from . import formats
 from .range_folders import find_range_frames, lacking_part, pods
+from .reading import frames as deciding_frames
+from .reading import takes as deciding_takes
 from .reading.corrections import NOTHING_CORRECTED, Corrections
 from .reading.record import Aside, Decision
 from .reading.sequence import Decided
+from .reading.times import Times, counted_times, times_in_names
+from .reading.times import decide as decide_times
 from .reading.unit import decide as decide_unit
 from .sources import FACES_FILE, FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
-from .times import DEFAULT_FPS, TIMES_FILE, frame_numbers, natural_key, paced_times, times_in_names
+from .times import TIMES_FILE, natural_key
 from .units import checked_unit, usable_unit
 
 DEMO = "demo"
@@ -64,16 +67,16 @@ def open_scan(
     if unit is not None:
         corrections = corrections.amended({"unit": checked_unit(unit)})
     source = find_source(path, corrections)
-    recorded = source.times()
-    measured = recorded is not None and isinstance(source, FileSequence)  # by a times.csv
-    if recorded is None or (fps is not None and not measured):
-        recorded = _paced(source, DEFAULT_FPS if fps is None else fps)
-    stated, others = source.unit, left_aside(path, source)
+    times = _times_of(source, fps, corrections)
+    stated = source.unit
     unit_decision = decide_unit(stated, corrections=corrections)
-    timeline = Timeline(source, recorded, unit_decision.value)
-    timeline.is_measured = measured
-    timeline.decided.replace(unit_decision)
-    _note_frames(timeline, fps)
+    timeline = Timeline(source, times.seconds, unit_decision.value)
+    timeline.is_measured = times.is_measured
+    timeline.decided.replace(unit_decision, times.decision)
+    if isinstance(source, MultiFrameFile):
+        timeline.decided.note(Decision("frames", f"{len(source)} in one file", "file"))
+    aside = {row.file for row in timeline.reading.aside}
+    others = [name for name in left_aside(path, source) if name not in aside]
     timeline.decided.leave_aside(*(Aside(name, "may be a scan of its own") for name in others))
     if others:
         what = f"The folder also holds {_listed(others)}, which this scan does not use"
@@ -81,7 +84,7 @@ def open_scan(
     if stated and not usable_unit(stated):
         what = f"the scan has the unit of length '{shortened(stated)}', which is not a short word such as mm"
         timeline.messages.append(ScanMessage("unit", f"{what}: the unit stays unknown"))
-    if measured and fps is not None:
+    if fps is not None and times.decision.source == "neighbour":
         timeline.messages.append(
             ScanMessage("times", f"Scan4D takes the times from {TIMES_FILE}, and ignores {fps:g} fps")
         )
@@ -105,41 +108,21 @@ def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> Non
     source = timeline.source
     stated = times_in_names(_labels(source)) if by_names and not timeline.is_measured else None
     if stated is None and fps is not None and not timeline.is_measured:
-        stated = _paced(source, fps)
+        stated = counted_times(_labels(source), fps, len(source))
     timeline.retime(timeline.opened_with if stated is None else stated)
     if stated is not None:
         value = "names" if fps is None or by_names else f"fps:{fps:g}"
         timeline.decided.replace(Decision("times", value, "user", "the panel", changes_numbers=True))
 
 
-def _note_frames(timeline: Timeline, fps: float | None) -> None:
-    """Put into the record which files are frames, and when the frames are."""
-    source, count = timeline.source, len(timeline)
-    if count < 2:
-        return
-    if isinstance(source, FileSequence):
-        names = [source.label(0), source.label(count - 1)]
-        why = f"{count} files in the order of their names"
-        timeline.decided.note(Decision("frames", f"{names[0]} to {names[1]}", "folder", why=why))
-    elif isinstance(source, MultiFrameFile):
-        timeline.decided.note(Decision("frames", f"{count} in one file", "file"))
-    timeline.decided.note(_times_decision(source, fps, timeline.is_measured))
-
-
-def _times_decision(source: FrameSource, fps: float | None, measured: bool) -> Decision:
-    if measured:
-        return Decision("times", TIMES_FILE, "neighbour", TIMES_FILE, changes_numbers=True)
-    if fps is not None:
-        return Decision("times", f"fps:{fps:g}", "user", "--fps", changes_numbers=True)
-    if source.times() is not None:
-        return Decision("times", "stored", "file", changes_numbers=True)
-    numbered = frame_numbers(_labels(source)) is not None
-    why = "Nothing states the times. Scan4D takes " + (
-        "the numbers in the names as frame numbers" if numbered else "the frames as evenly spaced"
-    )
-    others = ("names",) if times_in_names(_labels(source)) is not None else ()
-    value = f"fps:{DEFAULT_FPS:g}"
-    return Decision("times", value, "assumed", "", why, (*others, "fps:30", "fps:50", "fps:60"), True)
+def _times_of(source: FrameSource, fps: float | None, corrections: Corrections) -> Times:
+    """The times of all frames. Raises InputError where a table or a correction is unusable."""
+    table = source.times_file if isinstance(source, FileSequence) else None
+    folder = source.files[0].parent if source.files else None
+    return decide_times(
+        _labels(source), folder, count=len(source), table=table, fps=fps, corrections=corrections,
+        stored=None if table else source.times(),
+    )  # fmt: skip
 
 
 def has_times_in_names(timeline: Timeline) -> bool:
@@ -150,12 +133,6 @@ def has_times_in_names(timeline: Timeline) -> bool:
 def _labels(source: FrameSource) -> list[str]:
     """The names of the frames, where these are files of their own."""
     return [] if isinstance(source, MultiFrameFile) else [source.label(i) for i in range(len(source))]
-
-
-def _paced(source: FrameSource, fps: float) -> NDArray[np.float64]:
-    if isinstance(source, MultiFrameFile):  # of perhaps a million, whose labels tell nothing more
-        return np.arange(len(source)) / fps
-    return paced_times(_labels(source), fps)
 
 
 def find_source(path: str | os.PathLike[str], corrections: Corrections = NOTHING_CORRECTED) -> FrameSource:
@@ -265,9 +242,30 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
 
 
 def _open_frames(files: list[Path], name: str, decided: Decided) -> FrameSource:
-    if len(files) == 1 and (count := formats.frame_count(files[0], decided)) > 1:
-        return MultiFrameFile(files[0], count, decided)
-    return FileSequence(files, name, decided)
+    if len(files) == 1:
+        count = formats.frame_count(files[0], decided)
+        return MultiFrameFile(files[0], count, decided) if count > 1 else FileSequence(files, name, decided)
+    return FileSequence(scan_frames(files, decided), name, decided)
+
+
+def scan_frames(files: Sequence[Path], decided: Decided) -> list[Path]:
+    """The files that one scan plays, in order: without copies, reference files and other takes. They are
+    decided by the names, and put into the record.
+
+    files: several of one kind. Raises InputError where a correction is unusable.
+    """
+    folder = Path(os.path.commonpath([file.parent for file in files]))
+    named = {file.relative_to(folder).as_posix(): file for file in files}
+    frames = deciding_frames.decide(list(named), decided.corrections)
+    takes = deciding_takes.decide(frames.names, decided.corrections)
+    decided.replace(frames.decision, takes.decision)
+    decided.leave_aside(*frames.aside, *takes.aside)
+    decided.note_takes(takes.takes)
+    if words := deciding_frames.message(frames):
+        decided.report("aside", words)
+    if words := deciding_takes.message(takes):
+        decided.report("take", words)
+    return [named[name] for name in takes.names]
 
 
 def _nothing_there(path: str) -> InputError:

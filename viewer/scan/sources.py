@@ -21,7 +21,8 @@ from .faces import Faces
 from .points import PointCloud
 from .pose import Scanned
 from .reading.sequence import Decided
-from .times import TIMES_FILE, frame_in_words, read_times_csv
+from .reading.times import read_times_csv
+from .times import TIMES_FILE, frame_in_words
 
 _SAMPLES = 4  # frames beside the first one that an uncertain decision looks at
 FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces that all of them have
@@ -86,14 +87,16 @@ class FileSequence:
         """The file's name; with its folder where the sequence spans several."""
         return printable(self.files[index].relative_to(self._folder).as_posix())
 
+    @property
+    def times_file(self) -> Path | None:
+        """The times.csv beside the frames, or beside their folder where that is called `frames`."""
+        return None if len(self) == 1 else self._beside(TIMES_FILE)
+
     def times(self) -> NDArray[np.float64] | None:
-        """Times of a times.csv beside the frames, or beside their folder where that is called `frames`."""
-        if len(self) == 1:
-            return None
-        file = self._beside(TIMES_FILE)
-        return (
-            None if file is None else read_times_csv(file, [self.label(index) for index in range(len(self))])
-        )
+        """Times of the times.csv."""
+        file = self.times_file
+        labels = [self.label(index) for index in range(len(self))]
+        return None if file is None else read_times_csv(file, labels)
 
     def load(self, index: int) -> Scanned:
         path = self.files[index]

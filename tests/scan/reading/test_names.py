@@ -13,6 +13,7 @@ from viewer.scan.reading.names import (
     small_stamps,
     stamped_seconds,
 )
+from viewer.scan.times import natural_key
 
 
 @pytest.mark.parametrize(
@@ -29,6 +30,13 @@ from viewer.scan.reading.names import (
 )
 def test_names_are_in_the_order_of_a_person(names: list[str]) -> None:
     assert in_order(names[::-1]) == names
+
+
+def test_natural_order() -> None:
+    names = ["f10.ply", "F2.ply", "f1.ply", "f01.ply", "f2b.ply", "10.ply", "9.ply", "a.ply"]
+    in_order = ["9.ply", "10.ply", "a.ply", "f01.ply", "f1.ply", "F2.ply", "f2b.ply", "f10.ply"]
+    assert sorted(names, key=natural_key) == in_order
+    assert sorted(reversed(names), key=natural_key) == in_order
 
 
 @pytest.mark.parametrize(

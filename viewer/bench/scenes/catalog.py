@@ -16,9 +16,10 @@ from ...scan.demo import DemoSource
 from ...scan.open import find_source
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
+from ...scan.reading.times import counted_times
 from ...scan.sources import FrameSource
 from ...scan.spacing import typical_spacing
-from ...scan.times import DEFAULT_FPS, paced_times
+from ...scan.times import DEFAULT_FPS
 from ..truth import tessellation
 from ..truth.shapes import AnalyticScene, AnalyticSurface, Cuboid, Plane, Sphere, Torus
 from . import samples
@@ -120,7 +121,7 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
         (path,) = request.paths
         source = find_source(path)
         labels = [source.label(index) for index in range(len(source))]
-        times = paced_times(labels, DEFAULT_FPS)
+        times = counted_times(labels, DEFAULT_FPS)
 
         def load(index: int) -> Moment:
             return _of_mesh(_frame(source, index), request, index, float(times[index]), labels[index])

@@ -40,6 +40,7 @@ def decide(
     labels: Sequence[str],
     folder: Path | None = None,
     *,
+    count: int | None = None,
     table: Path | None = None,
     stored: NDArray[np.float64] | None = None,
     fps: float | None = None,
@@ -48,31 +49,31 @@ def decide(
     """The times of frames with these names, the first of: what the user states, the table, `fps`, the times
     stored in the file, real times in the names, and 25 frame numbers a second.
 
-    folder: where files that the user names are looked for. table: a times.csv. stored: (T,) seconds.
-    Raises InputError where the table or a correction is unusable.
+    count: of the frames, where they have no names of their own. folder: of files that the user names.
+    table: a times.csv. stored: (T,) seconds. Raises InputError where the table or a correction is unusable.
     """
     stated = corrections.get(KEY)
     if stated is not None and not (stated.startswith(_COLUMN) and stored is not None):
-        return _as_stated(labels, folder, stated)
+        return _as_stated(labels, folder, stated, count)
     if stated is not None:
         return Times(_array(stored), Decision(KEY, stated, "user", "--read"))
     if table is not None:
         seconds = read_times_csv(table, labels)
         return Times(seconds, Decision(KEY, table.name, "neighbour", table.name), is_measured=True)
     if fps is not None:
-        return Times(counted_times(labels, fps), Decision(KEY, f"{_FPS}{fps:g}", "user", "--fps"))
+        return Times(counted_times(labels, fps, count), Decision(KEY, f"{_FPS}{fps:g}", "user", "--fps"))
     if stored is not None:
         return Times(_array(stored), Decision(KEY, STORED, "file"))
     stamps = stamped_seconds(labels)
     if stamps is not None:
         return Times(_array(stamps), Decision(KEY, NAMES, "folder", why="The names of the files are times"))
-    return _assumed(labels)
+    return _assumed(labels, count)
 
 
-def _assumed(labels: Sequence[str]) -> Times:
+def _assumed(labels: Sequence[str], count: int | None) -> Times:
     """25 frame numbers a second, or frames."""
-    seconds = counted_times(labels)
-    if len(labels) < 2:
+    seconds = counted_times(labels, count=count)
+    if len(seconds) < 2:
         return Times(seconds, Decision(KEY, None, "file"))
     counted = "frame numbers" if frame_counts(labels) else "frames"
     why = f"Nothing states the times. Scan4D assumes {DEFAULT_FPS:g} {counted} per second"
@@ -89,7 +90,7 @@ def _assumed(labels: Sequence[str]) -> Times:
     )
 
 
-def _as_stated(labels: Sequence[str], folder: Path | None, stated: str) -> Times:
+def _as_stated(labels: Sequence[str], folder: Path | None, stated: str, count: int | None) -> Times:
     decision = Decision(KEY, stated, "user", "--read")
     if stated == NAMES:
         seconds = times_in_names(labels)
@@ -98,20 +99,25 @@ def _as_stated(labels: Sequence[str], folder: Path | None, stated: str) -> Times
             raise InputError("the names of the files give no times that increase", hint=hint)
         return Times(seconds, decision)
     if stated == INDEX:
-        return Times(np.arange(len(labels)) / DEFAULT_FPS, decision)
+        return Times(np.arange(len(labels) if count is None else count) / DEFAULT_FPS, decision)
     if stated.startswith(_FPS):
-        return Times(counted_times(labels, float(stated.removeprefix(_FPS))), decision)
+        return Times(counted_times(labels, float(stated.removeprefix(_FPS)), count), decision)
     if stated.startswith(_COLUMN):
         raise InputError(f"there is no column for '{shortened(stated)}'", hint="Use it for a table of frames")
     path = Path(stated) if folder is None or Path(stated).is_absolute() else folder / stated
     return Times(read_times_csv(path, labels), decision, is_measured=True)
 
 
-def counted_times(labels: Sequence[str], fps: float = DEFAULT_FPS) -> NDArray[np.float64]:
+def counted_times(
+    labels: Sequence[str], fps: float = DEFAULT_FPS, count: int | None = None
+) -> NDArray[np.float64]:
     """(T,) seconds from the first frame on, at `fps` frame numbers a second.
 
-    A number missing from the labels leaves a gap; labels without frame numbers count 0, 1, 2...
+    A number missing from the labels leaves a gap; labels without frame numbers count 0, 1, 2... count: of the
+    frames, where they have no names of their own.
     """
+    if count is not None and len(labels) != count:
+        return np.arange(count) / fps
     numbers = frame_counts(labels) or range(len(labels))
     return np.array([number - numbers[0] for number in numbers], np.float64) / fps
 
