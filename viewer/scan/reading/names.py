@@ -254,7 +254,8 @@ def _moment(date: Sequence[str], clock: Sequence[str], part: Sequence[str] = ())
     if not _YEARS[0] <= year <= _YEARS[1]:
         return None
     try:
-        moment = datetime(year, month, day, *(int(text) for text in clock))
+        hour, minute, second = (int(text) for text in clock) if clock else (0, 0, 0)
+        moment = datetime(year, month, day, hour, minute, second)
     except ValueError:
         return None
     return moment + timedelta(seconds=float(f"0.{part[0]}")) if part else moment
