@@ -261,9 +261,9 @@ def scan_frames(files: Sequence[Path], decided: Decided) -> list[Path]:
     decided.replace(frames.decision, takes.decision)
     decided.leave_aside(*frames.aside, *takes.aside)
     decided.note_takes(takes.takes)
-    if words := deciding_frames.message(frames):
+    if words := deciding_frames.message_of_files(frames):
         decided.report("aside", words)
-    if words := deciding_takes.message(takes):
+    if words := deciding_takes.message_of_takes(takes):
         decided.report("take", words)
     return [named[name] for name in takes.names]
 

@@ -6,7 +6,7 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.reading.corrections import Corrections
-from viewer.scan.reading.frames import decide, message
+from viewer.scan.reading.frames import decide, message_of_files
 
 FRAMES = ["f001.ply", "f002.ply", "f003.ply"]
 
@@ -25,7 +25,7 @@ def test_a_copy_is_left_aside(copy: str) -> None:
     assert found.names == FRAMES
     assert [(row.file, row.why) for row in found.aside] == [(copy, "copy of f002.ply")]
     assert (found.decision.source, found.decision.alternatives) == ("assumed", ("*",))
-    assert copy in message(found)
+    assert copy in message_of_files(found)
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_other_names_are_frames(names: list[str]) -> None:
     found = decide(names)
     assert sorted(found.names) == sorted(names)
     assert found.aside == ()
-    assert message(found) == ""
+    assert message_of_files(found) == ""
 
 
 @pytest.mark.parametrize("name", ["reference.ply", "mean.ply", "template.ply", "a.ply"])
@@ -61,7 +61,7 @@ def test_a_user_chooses_by_a_pattern() -> None:
     found = decide(names, Corrections.parse({"frames": "f00?.ply"}))
     assert found.names == FRAMES
     assert found.decision.source == "user"
-    assert message(found) == ""
+    assert message_of_files(found) == ""
     with pytest.raises(InputError, match="no file matches"):
         decide(names, Corrections.parse({"frames": "g*.ply"}))
 

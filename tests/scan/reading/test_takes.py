@@ -8,7 +8,7 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.reading.corrections import Corrections
-from viewer.scan.reading.takes import decide, message, split, take_names, takes_in
+from viewer.scan.reading.takes import decide, message_of_takes, split, take_names, takes_in
 
 TAKES = [f"take{take}_frame00{frame}.ply" for take in (1, 2) for frame in (1, 2, 3)]
 
@@ -59,7 +59,8 @@ def test_the_first_take_opens_and_the_message_names_all() -> None:
     assert takes.decision.alternatives == ("take2", "all")
     assert [row.file for row in takes.aside] == TAKES[3:]
     assert all(
-        words in message(takes) for words in ("take1_frame*.ply (3)", "take2_frame*.ply (3)", "--take")
+        words in message_of_takes(takes)
+        for words in ("take1_frame*.ply (3)", "take2_frame*.ply (3)", "--take")
     )
 
 
@@ -68,7 +69,7 @@ def test_a_user_chooses_a_take(wanted: str) -> None:
     takes = decide(TAKES, Corrections.parse({"take": wanted}))
     assert takes.names == TAKES[3:]
     assert takes.decision.source == "user"
-    assert message(takes) == ""
+    assert message_of_takes(takes) == ""
 
 
 def test_a_user_plays_all() -> None:

@@ -32,7 +32,7 @@ _COPIES = tuple(
 )
 
 
-class Frames(NamedTuple):
+class FrameFiles(NamedTuple):
     """The files that are frames, in order, and those that are left aside."""
 
     names: list[str]
@@ -40,7 +40,7 @@ class Frames(NamedTuple):
     aside: tuple[Aside, ...]
 
 
-def copies(names: Sequence[str]) -> dict[str, str]:
+def copies_in(names: Sequence[str]) -> dict[str, str]:
     """Name of a copy -> the name that it is a copy of, which is among the names.
 
     None are copies where fewer than two other files would remain: "scan.ply", "scan (1).ply" and
@@ -58,7 +58,7 @@ def copies(names: Sequence[str]) -> dict[str, str]:
     return found if len(there) - len(found) >= 2 else {}
 
 
-def references(names: Sequence[str]) -> list[str]:
+def references_in(names: Sequence[str]) -> list[str]:
     """Names of one or two files without a number, where three or more others share a numbered pattern."""
     numbered = [numbered_name(name) for name in names]
     patterns = {(found.before, found.after) for found in numbered if found is not None}
@@ -67,7 +67,7 @@ def references(names: Sequence[str]) -> list[str]:
     return odd if is_one and 1 <= len(odd) <= _MOST_REFERENCES else []
 
 
-def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -> Frames:
+def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -> FrameFiles:
     """The frames among files of one kind, in order.
 
     names: at least one; relative to a common folder. Raises InputError where no file has the user's pattern.
@@ -78,10 +78,10 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
         if not matching:
             raise InputError(f"no file matches '{shortened(stated)}'", hint="Correct --read frames")
         aside = tuple(Aside(name, "not chosen") for name in in_order([*{*names} - {*matching}]))
-        return Frames(in_order(matching), Decision(KEY, stated, "user", "--read"), aside)
-    copied = copies(names)
+        return FrameFiles(in_order(matching), Decision(KEY, stated, "user", "--read"), aside)
+    copied = copies_in(names)
     rest = [name for name in names if name not in copied]
-    odd = {*references(rest)}
+    odd = {*references_in(rest)}
     aside = tuple(
         Aside(
             os.path.basename(name),
@@ -91,9 +91,9 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
     )
     used = in_order([name for name in rest if name not in odd])
     if not aside:
-        return Frames(used, Decision(KEY, _counted(used), "folder"), ())
+        return FrameFiles(used, Decision(KEY, _counted(used), "folder"), ())
     why = f"Scan4D leaves aside {', '.join(row.file for row in aside[:3])}, by the names"
-    return Frames(used, Decision(KEY, _counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
+    return FrameFiles(used, Decision(KEY, _counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
 
 
 def _counted(names: Sequence[str]) -> str | None:
@@ -103,7 +103,7 @@ def _counted(names: Sequence[str]) -> str | None:
     return f"{len(names)} files, {os.path.basename(names[0])} to {os.path.basename(names[-1])}"
 
 
-def message(frames: Frames) -> str:
+def message_of_files(frames: FrameFiles) -> str:
     """The report of files that are left aside, for the user; empty where there is none."""
     if not frames.aside or frames.decision.source == "user":
         return ""

@@ -207,7 +207,7 @@ def _clock_seconds(names: Sequence[str]) -> list[float] | None:
 
 
 class _Form(NamedTuple):
-    """Which numbers of a name are a date, a clock and a part of a second; the date and the part may lack."""
+    """The numbers of a name that are a date, a clock and a part of a second; date and part may lack."""
 
     date: tuple[int, ...]
     clock: tuple[int, ...]

@@ -125,7 +125,7 @@ def _named(wanted: str, takes: Sequence[Take]) -> Take:
     return found[0]
 
 
-def message(takes: Takes) -> str:
+def message_of_takes(takes: Takes) -> str:
     """The report of several takes for the user; empty where there is one, or the user has chosen."""
     if not takes.takes or takes.decision.source == "user":
         return ""
