@@ -40,7 +40,7 @@ class FrameFiles(NamedTuple):
     aside: tuple[Aside, ...]
 
 
-def copies_in(names: Sequence[str]) -> dict[str, str]:
+def copied_names(names: Sequence[str]) -> dict[str, str]:
     """Name of a copy -> the name that it is a copy of, which is among the names.
 
     None are copies where fewer than two other files would remain: "scan.ply", "scan (1).ply" and
@@ -79,7 +79,7 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
             raise InputError(f"no file matches '{shortened(stated)}'", hint="Correct --read frames")
         aside = tuple(Aside(name, "not chosen") for name in in_order([*{*names} - {*matching}]))
         return FrameFiles(in_order(matching), Decision(KEY, stated, "user", "--read"), aside)
-    copied = copies_in(names)
+    copied = copied_names(names)
     rest = [name for name in names if name not in copied]
     odd = {*references_in(rest)}
     aside = tuple(
