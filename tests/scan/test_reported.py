@@ -25,7 +25,6 @@ TABLES = pytest.mark.xfail(strict=True, reason="tables of landmarks")
 POINT_FILES = pytest.mark.xfail(strict=True, reason="point files")
 ARRAYS = pytest.mark.xfail(strict=True, reason="arrays and pictures")
 FRAMES = pytest.mark.xfail(strict=True, reason="frames and times")
-MESHES = pytest.mark.xfail(strict=True, reason="meshes")
 
 RED, GREEN, BLUE, YELLOW = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]
 
@@ -254,7 +253,6 @@ def test_17_a_frame_column_makes_frames(reported: Path) -> None:
     near(times(reported / "17_frame_column.csv"), (0, 0.04, 0.08))
 
 
-@MESHES
 def test_18_a_texture_gives_the_vertices_their_colors(reported: Path) -> None:
     cloud = only(reported / "18_textured" / "face.obj")
     assert colors(cloud)[:4] == [RED, GREEN, BLUE, YELLOW]
@@ -350,7 +348,6 @@ def test_26_a_label_in_front(reported: Path) -> None:
     near(only(reported / "26_label_first.csv").world(), [(1, 2, 3), (4, 5, 6), (7, 8, 9.5)])
 
 
-@MESHES
 def test_27_some_vertices_with_colors(reported: Path) -> None:
     cloud = only(reported / "27_some_vertices_coloured.obj")
     assert len(cloud) == 6

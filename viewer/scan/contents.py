@@ -123,13 +123,15 @@ class TextureContents:
     images:    a picture a material, None where it has none; none of them is read
     colors:    (M, 3) float64, 0..1, the diffuse colour of each material
     uv:        (K, 2) float64, v up
-    corners:   (C,) int64, the row of `uv` of each corner of `faces`, -1 where it has none
-    materials: (F,) int64, the material of each face, -1 where it has none
+    vertices:  (C,) int64, the row of the point of each corner of a face
+    corners:   (C,) int64, the row of `uv` of each corner, -1 where it has none
+    materials: (C,) int64, the material of the face of each corner, -1 where it has none
     """
 
     images: tuple[Path | None, ...]
     colors: NDArray[np.float64]
     uv: NDArray[np.float64]
+    vertices: NDArray[np.int64]
     corners: NDArray[np.int64]
     materials: NDArray[np.int64]
 

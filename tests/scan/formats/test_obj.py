@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from viewer.errors import InputError
 from viewer.scan.formats import obj, read
+from viewer.scan.open import open_scan
 
 VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 
@@ -60,8 +62,8 @@ def test_normals_that_do_not_cover_the_vertices_are_left_out(faces: str, path: P
     ("text", "reason"),
     [
         ("# nothing here\n", "holds no points"),
-        ("v 1 2\n", "positions have shape"),
-        ("v 1 2 3\nv 1 2 3 4 5 6\n", "row 2 has 6 values, but the rows above have 3"),
+        ("v 1 2\n", "a vertex has 2 numbers"),
+        ("v 1 2 3\nv 1 2\n", "a vertex has 2 numbers"),
         ("v 1 2 three\n", "row 1, column 3: 'three' is not a number"),
     ],
 )
@@ -89,3 +91,78 @@ def test_corners_in_several_parts_tell_the_same_normals(
     whole = read(path).normals
     monkeypatch.setattr(obj, "_CORNERS_AT_ONCE", 7)
     np.testing.assert_array_equal(read(path).normals, whole)
+
+
+def test_some_vertices_have_colours_and_others_none(path: Path) -> None:
+    """Those without are white; numbers may have a weight before them, and lines may be indented."""
+    path.write_text("v 0 0 0 1 0 0\n  v 1 0 0\nv 0 1 0 1.0 0 0 1\n\tv 1 1 0 1.0\n")
+    cloud = read(path)
+    np.testing.assert_array_equal(cloud.world(), [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    np.testing.assert_array_equal(
+        cloud.colors[:, :3], [[255, 0, 0], [255, 255, 255], [0, 0, 255], [255, 255, 255]]
+    )
+
+
+def test_colours_up_to_255_and_a_byte_order_mark(path: Path) -> None:
+    path.write_bytes(b"\xef\xbb\xbfv 0 0 0 200 100 50\nv 1 1 1 10 20 30\n")
+    np.testing.assert_array_equal(read(path).colors[:, :3], [[200, 100, 50], [10, 20, 30]])
+
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+CORNERS_OF_PICTURE = "vt 0.125 0.125\nvt 0.875 0.125\nvt 0.875 0.875\nvt 0.125 0.875\n"
+RED, GREEN, BLUE, GREY = [255, 0, 0], [0, 255, 0], [0, 0, 255], [128, 128, 128]
+
+
+def save_picture(path: Path, *quarters: list[int]) -> None:
+    """A picture of 8 x 8 pixels: upper left, upper right, lower left, lower right."""
+    picture = np.repeat(np.repeat(np.array(quarters, np.uint8).reshape(2, 2, 3), 4, axis=0), 4, axis=1)
+    Image.fromarray(picture).save(path)
+
+
+def test_a_texture_gives_the_vertices_their_colours(path: Path) -> None:
+    """v points up. The name of the picture has a blank, options before it, and other capitals."""
+    save_picture(path.with_name("The Skin.png"), RED, GREEN, BLUE, GREY)
+    path.with_name("a.mtl").write_text(
+        "newmtl skin\nKd 1 1 1\nmap_Kd -s 1 1 1 -bm 0.5 textures\\The skin.PNG\n"
+    )
+    path.write_text(f"mtllib a.mtl\n{SQUARE}{CORNERS_OF_PICTURE}usemtl skin\nf 1/1 2/2 3/3 4/4\n")
+    with open_scan(path) as timeline:
+        cloud = timeline.pose(0).cloud
+        decision = timeline.reading["texture"]
+    np.testing.assert_array_equal(cloud.colors[:, :3], [BLUE, GREY, GREEN, RED])
+    assert (decision.value, decision.source, decision.where) == ("vertices", "neighbour", "The Skin.png")
+
+
+def test_several_materials_negative_numbers_and_groups(path: Path) -> None:
+    """A material without a picture gives its colour, and a vertex of two materials the mean."""
+    save_picture(path.with_name("a.png"), RED, RED, RED, RED)
+    path.with_name("a.mtl").write_text("newmtl skin\nmap_Kd a.png\n\nnewmtl plain\nKd 0 0 1\n")
+    path.write_text(
+        f"mtllib a.mtl\ng one\n{SQUARE}{CORNERS_OF_PICTURE}usemtl skin\nf -4/-4 -3/-3 -2/-2\n"
+        "g two\nusemtl plain\nf 1 3 4\nv 5 5 5\n"
+    )
+    np.testing.assert_array_equal(
+        read(path).colors[:, :3], [[128, 0, 128], RED, [128, 0, 128], BLUE, [255, 255, 255]]
+    )
+
+
+def test_a_missing_texture_is_reported(path: Path) -> None:
+    path.with_name("a.mtl").write_text("newmtl skin\nmap_Kd C:\\scans\\gone.jpg\n")
+    path.write_text(f"mtllib a.mtl\n{SQUARE}{CORNERS_OF_PICTURE}usemtl skin\nf 1/1 2/2 3/3\n")
+    with open_scan(path) as timeline:
+        assert timeline.pose(0).cloud.colors is None
+        assert timeline.reading["texture"].value == "none"
+        assert [m.text for m in timeline.messages if "gone.jpg" in m.text]
+
+
+def test_colours_of_vertices_win_over_a_texture_unless_the_user_says_otherwise(path: Path) -> None:
+    save_picture(path.with_name("a.png"), RED, RED, RED, RED)
+    path.with_name("a.mtl").write_text("newmtl skin\nmap_Kd a.png\n")
+    own = "v 0 0 0 0 1 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0.5 0\n"
+    path.write_text(f"mtllib a.mtl\n{own}{CORNERS_OF_PICTURE}usemtl skin\nf 1/1 2/2 3/3\n")
+    for read_as, color in ((None, GREEN), ({"texture": "vertices"}, RED)):
+        with open_scan(path, read=read_as) as timeline:
+            assert timeline.pose(0).cloud.colors[0, :3].tolist() == color
+    with open_scan(path, read={"texture": "none"}) as timeline:
+        assert timeline.pose(0).cloud.colors[0, :3].tolist() == GREEN
+        assert timeline.reading["texture"].source == "user"

@@ -45,7 +45,9 @@ from ..range_view import RangeView, in_one_unit, merge
 from ..reading.cloud import assemble
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
+from ..reading.textures import paint
 from ..times import frame_in_words
+from ._pictures import picture_colors
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
 _CONVERT = {  # what is not read, and what turns it into what is
@@ -160,7 +162,11 @@ def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Sc
 
 def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, decided: Decided) -> Scanned:
     """The points or views that a module's answer comes to."""
-    scanned = assemble(found, decided) if isinstance(found, PointContents) else found
+    if isinstance(found, PointContents):
+        paint(found, decided, picture_colors)
+        scanned: Scanned = assemble(found, decided)
+    else:
+        scanned = found
     decided.note(Decision("format", module.TITLE, "file", path.suffix.lower()))
     return _with_points(scanned)
 

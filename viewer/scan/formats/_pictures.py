@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 DEPTH_KINDS = ("PNG", "TIFF")  # as Pillow names them
 COLOR_KINDS = ("PNG", "JPEG", "TIFF")
+TEXTURE_KINDS = ("PNG", "JPEG", "TIFF", "BMP", "TGA")
 
 _BYTES = {
     "1": 4,
@@ -86,3 +88,22 @@ def srgb_of_picture(image: Image) -> NDArray[np.uint8]:
     if image.mode in ("I", "F") or image.mode.startswith("I;16"):
         raise InputError(f"is a picture of type {image.mode}, where Scan4D needs colours")
     return np.array(image if image.mode == "RGB" else image.convert("RGB"))
+
+
+def picture_colors(path: Path) -> NDArray[np.uint8]:
+    """The colours of a picture file, (H, W, 3), sRGB; the last one stays in memory, as frames often share it.
+
+    Raises InputError.
+    """
+    try:
+        status = path.stat()
+    except OSError as error:
+        what, hint = explained(error)
+        raise InputError(what, path, hint) from error
+    return _colors_of_file(path, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=1)
+def _colors_of_file(path: Path, *_changed: int) -> NDArray[np.uint8]:
+    with opened_picture(path, TEXTURE_KINDS) as image:
+        return srgb_of_picture(image)

@@ -1,13 +1,13 @@
 """OBJ: Wavefront's mesh format; its vertices are the points, with the common colour extension, and its
-faces tell the topology.
+faces tell the topology. Materials with pictures give the vertices their colours.
 
 Read here and not by a library because those at hand drop vertices that no triangle uses.
 """
 
 from __future__ import annotations
 
-from codecs import BOM_UTF8
 from collections.abc import Iterator
+from contextlib import suppress
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
@@ -15,51 +15,90 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ...errors import InputError
 from ..admission import opened
-from ..contents import Deferred
+from ..contents import PointContents, TextureContents
 from ..faces import Faces
-from ..points import PointCloud
-from ..reading import axes
-from ..reading.cloud import cloud_of
-from ..reading.sequence import Decided
 from ._columns import batches, bounded_lines, parse_table, whole_numbers
-from ._topology import with_topology
+from ._mtl import Material, read_materials
+from ._topology import topology_of
 
 TITLE = "OBJ"
 SUFFIXES = (".obj",)
 
 _CORNERS_AT_ONCE = 1 << 18
 _FACES_AT_ONCE = 1 << 12
-_MARK = BOM_UTF8.decode("latin-1")
-_HEAD = 100  # lines among which remarks state the axes
+_ROWS_AT_ONCE = 1 << 14
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
+_HEAD = 1 << 16  # lines in which `mtllib` stands
+# Numbers of a vertex -> where its red, green and blue begin; 4, 7 and 8 numbers have a weight behind z.
+_COLORS_AT = {6: 3, 7: 4, 8: 4}
+_MOST_NUMBERS = 8
 
 
-def read(path: Path, frame: int, decided: Decided) -> PointCloud:
-    """The vertices (`v x y z [w]` or `v x y z r g b`) and their normals (`vn`). Raises InputError."""
+def contents(path: Path, frame: int = 0) -> PointContents:
+    """The vertices (`v x y z [w] [r g b]`), their normals (`vn`) and textures. Raises InputError."""
     with opened(path) as stream:
-        text = TextIOWrapper(stream, "latin-1")
-        table, given = parse_table(_lines(text, "v")), {}
-        if (normals := _normals(text, len(table))) is not None:
-            given["normals"] = Deferred(lambda: normals, normals.dtype, 3)
-        if table.shape[1] >= 6:
-            given["colors"] = Deferred(lambda: table[:, 3:6], table.dtype, 3)
-        decided.note(axes.decide(_remarks(text), decided.corrections))
-        cloud = cloud_of([table[:, :3]], given, {}, decided=decided)
-        return with_topology(cloud, _faces(text))
-
-
-def _remarks(text: TextIOWrapper) -> list[str]:
-    """The comments among the first lines."""
-    text.seek(0)
-    return [line[1:].strip() for line in islice(bounded_lines(text), _HEAD) if line.startswith("#")]
+        text = TextIOWrapper(stream, "utf-8-sig", errors="surrogateescape")
+        positions, colors = _vertices(text)
+        columns = dict(zip("xyz", positions.T, strict=True))
+        normals = _normals(text, len(positions))
+        if normals is not None:
+            columns |= dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
+        if colors is not None:
+            columns |= dict(zip(("red", "green", "blue"), colors.T, strict=True))
+        return PointContents(
+            columns=columns, topology=topology_of(len(positions), _faces(text)), texture=_texture(text, path)
+        )
 
 
 def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
     """The faces of an OBJ file, in pieces. Raises InputError or ValueError where they cannot be used."""
     with opened(path) as stream:
-        text = TextIOWrapper(stream, "latin-1")  # closes the stream when it goes
+        text = TextIOWrapper(stream, "utf-8-sig", errors="surrogateescape")  # closes the stream when it goes
         yield from _faces(text)
+
+
+def _vertices(text: TextIOWrapper) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+    """Positions and colours, (N, 3) each; None where no vertex has a colour. Those without one are white."""
+    try:
+        table = parse_table(_lines(text, "v"))
+    except InputError:  # as a rule, since some vertices have colours and others have none
+        table = _uneven_rows(text)
+    if table.shape[1] < 3:
+        raise InputError(_bad_width(table.shape[1]))
+    if (at := _COLORS_AT.get(table.shape[1])) is None:
+        return table[:, :3], None
+    colors = table[:, at : at + 3]
+    if not (is_bare := np.isnan(colors).all(axis=1)).any():
+        return table[:, :3], colors
+    if is_bare.all():
+        return table[:, :3], None
+    colors = colors.copy()
+    colors[is_bare] = 255 if np.nanmax(colors) > 1 else 1
+    return table[:, :3], colors
+
+
+def _uneven_rows(text: TextIOWrapper) -> NDArray[np.float64]:
+    """Vertices of which some have colours: (N, 7) x y z w r g b, NaN where there is none."""
+    parts = [np.empty((0, 7))]
+    for lines in batches(_lines(text, "v"), _ROWS_AT_ONCE):
+        widths = np.array([len(line.split()) for line in lines])
+        part = np.full((len(lines), 7), np.nan)
+        for width in np.unique(widths):
+            rows = np.flatnonzero(widths == width)
+            numbers = parse_table([lines[row] for row in rows])
+            if len(numbers) != len(rows) or not 3 <= numbers.shape[1] <= _MOST_NUMBERS:
+                raise InputError(_bad_width(int(width)))
+            part[rows, :3] = numbers[:, :3]
+            if (at := _COLORS_AT.get(numbers.shape[1])) is not None:
+                part[rows, 4:] = numbers[:, at : at + 3]
+        parts.append(part)
+    return np.concatenate(parts)
+
+
+def _bad_width(width: int) -> str:
+    return f"a vertex has {width} numbers, expected 3, 4, 6, 7 or 8"
 
 
 def _faces(text: TextIOWrapper) -> Iterator[Faces]:
@@ -73,8 +112,8 @@ def _polygons(text: TextIOWrapper) -> Iterator[tuple[list[str], int]]:
     """The vertices of each face as written, and how many there are so far: negative ones count back."""
     vertices = 0
     text.seek(0)
-    for line in bounded_lines(text):
-        if line.removeprefix(_MARK).startswith(("v ", "v\t")):
+    for line in _unindented(text):
+        if line.startswith(("v ", "v\t")):
             vertices += 1
         elif line.startswith(("f ", "f\t")):
             words = line.split()[1:]
@@ -106,12 +145,88 @@ def _normals(text: TextIOWrapper, count: int) -> NDArray[np.float64] | None:
     return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), np.finfo(np.float32).tiny)
 
 
+def _texture(text: TextIOWrapper, path: Path) -> TextureContents | None:
+    """The textures that the faces have, None where no material has a picture."""
+    materials = _materials(text, path)
+    if not any(material.image for material in materials.values()):
+        return None
+    uv = parse_table(_lines(text, "vt"), (0, 1))
+    numbers = {name: number for number, name in enumerate(materials)}
+    pieces = [_textured(rows, numbers) for rows in batches(_textured_polygons(text), _FACES_AT_ONCE)] or [
+        np.empty((0, 3), np.int64)
+    ]
+    vertices, corners, used = np.concatenate(pieces).T
+    return TextureContents(
+        images=tuple(material.image for material in materials.values()),
+        colors=np.array([material.color for material in materials.values()], np.float64).reshape(-1, 3),
+        uv=uv,
+        vertices=vertices,
+        corners=corners,
+        materials=used,
+    )
+
+
+def _materials(text: TextIOWrapper, path: Path) -> dict[str, Material]:
+    """The materials of the files that `mtllib` names and that are there. The name of the only one is also ""."""
+    found: dict[str, Material] = {}
+    text.seek(0)
+    for line in islice(_unindented(text), _HEAD):
+        keyword, _, rest = line.strip().partition(" ")
+        if keyword != "mtllib":
+            continue
+        names = [rest.strip()] if (path.parent / rest.strip()).is_file() else rest.split()
+        for name in names:
+            with suppress(InputError, OSError, ValueError):
+                found |= read_materials(path.parent / name)
+    if len(found) == 1:
+        found[""] = next(iter(found.values()))
+    return found
+
+
+_Row = tuple[list[str], str, int, int]  # corners as written, the material, vertices and uv so far
+
+
+def _textured_polygons(text: TextIOWrapper) -> Iterator[_Row]:
+    vertices = positions = 0
+    material = ""
+    text.seek(0)
+    for line in _unindented(text):
+        if line.startswith(("v ", "v\t")):
+            vertices += 1
+        elif line.startswith(("vt ", "vt\t")):
+            positions += 1
+        elif line.startswith("usemtl"):
+            material = line[len("usemtl") :].strip()
+        elif line.startswith(("f ", "f\t")):
+            yield line.split()[1:], material, vertices, positions
+
+
+def _textured(rows: list[_Row], numbers: dict[str, int]) -> NDArray[np.int64]:
+    """Vertex, row of uv and material of each corner, (C, 3); -1 where there is none."""
+    words = [word for corners, *_ in rows for word in corners]
+    sizes = [len(corners) for corners, *_ in rows]
+    found = np.empty((len(words), 3), np.int64)
+    split = [word.split("/", 2) for word in words]
+    found[:, 0] = [int(parts[0]) for parts in split]
+    found[:, 1] = [int(parts[1]) if len(parts) > 1 and parts[1] else 0 for parts in split]
+    found[:, 2] = np.repeat([numbers.get(material, -1) for _, material, _, _ in rows], sizes)
+    so_far = np.repeat([(vertices, positions) for *_, vertices, positions in rows], sizes, axis=0)
+    stated = found[:, :2]
+    found[:, :2] = np.where(stated < 0, stated + so_far, stated - 1)
+    return found
+
+
+def _unindented(text: TextIOWrapper) -> Iterator[str]:
+    """The lines from where the text stands, without blanks in front."""
+    for line in bounded_lines(text):
+        yield line.lstrip() if line[:1].isspace() else line
+
+
 def _lines(text: TextIOWrapper, keyword: str) -> Iterator[str]:
     """The rest of every line that starts with the keyword; from the beginning of the file."""
     starts = (keyword + " ", keyword + "\t")
     text.seek(0)
-    for line in bounded_lines(text):
-        line = line.removeprefix(_MARK)
+    for line in _unindented(text):
         if line.startswith(starts):
             yield line[len(keyword) :]
 
