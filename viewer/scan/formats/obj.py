@@ -30,10 +30,11 @@ _CORNERS_AT_ONCE = 1 << 18
 _FACES_AT_ONCE = 1 << 12
 _ROWS_AT_ONCE = 1 << 14
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
-_HEAD = 1 << 16  # lines in which `mtllib` stands
+_HEAD = 1 << 16  # characters in which `mtllib` stands
 # Numbers of a vertex -> where its red, green and blue begin; 4, 7 and 8 numbers have a weight behind z.
 _COLORS_AT = {6: 3, 7: 4, 8: 4}
 _MOST_NUMBERS = 8
+_BLANKS = {" ", "\t"}
 
 
 def contents(path: Path, frame: int = 0) -> PointContents:
@@ -167,10 +168,10 @@ def _texture(text: TextIOWrapper, path: Path) -> TextureContents | None:
 
 
 def _materials(text: TextIOWrapper, path: Path) -> dict[str, Material]:
-    """The materials of the files that `mtllib` names and that are there. The name of the only one is also ""."""
+    """The materials of the files that `mtllib` names. The name of the only one is also ""."""
     found: dict[str, Material] = {}
     text.seek(0)
-    for line in islice(_unindented(text), _HEAD):
+    for line in text.read(_HEAD).splitlines():
         keyword, _, rest = line.strip().partition(" ")
         if keyword != "mtllib":
             continue
@@ -205,10 +206,15 @@ def _textured(rows: list[_Row], numbers: dict[str, int]) -> NDArray[np.int64]:
     """Vertex, row of uv and material of each corner, (C, 3); -1 where there is none."""
     words = [word for corners, *_ in rows for word in corners]
     sizes = [len(corners) for corners, *_ in rows]
-    found = np.empty((len(words), 3), np.int64)
-    split = [word.split("/", 2) for word in words]
-    found[:, 0] = [int(parts[0]) for parts in split]
-    found[:, 1] = [int(parts[1]) if len(parts) > 1 and parts[1] else 0 for parts in split]
+    found = np.zeros((len(words), 3), np.int64)
+    counts = {word.count("/") for word in words}
+    if len(counts) == 1 and counts <= {1, 2} and not any("//" in word for word in words):
+        stated, _ = whole_numbers([" ".join(words).replace("/", " ").split()])
+        found[:, :2] = stated.reshape(len(words), -1)[:, :2]
+    else:
+        split = [word.split("/", 2) for word in words]
+        found[:, 0] = [int(parts[0]) for parts in split]
+        found[:, 1] = [int(parts[1]) if len(parts) > 1 and parts[1] else 0 for parts in split]
     found[:, 2] = np.repeat([numbers.get(material, -1) for _, material, _, _ in rows], sizes)
     so_far = np.repeat([(vertices, positions) for *_, vertices, positions in rows], sizes, axis=0)
     stated = found[:, :2]
@@ -218,17 +224,18 @@ def _textured(rows: list[_Row], numbers: dict[str, int]) -> NDArray[np.int64]:
 
 def _unindented(text: TextIOWrapper) -> Iterator[str]:
     """The lines from where the text stands, without blanks in front."""
-    for line in bounded_lines(text):
-        yield line.lstrip() if line[:1].isspace() else line
+    return (line.lstrip() if line[:1] in _BLANKS else line for line in bounded_lines(text))
 
 
 def _lines(text: TextIOWrapper, keyword: str) -> Iterator[str]:
     """The rest of every line that starts with the keyword; from the beginning of the file."""
     starts = (keyword + " ", keyword + "\t")
     text.seek(0)
-    for line in _unindented(text):
+    for line in bounded_lines(text):
         if line.startswith(starts):
             yield line[len(keyword) :]
+        elif line[:1] in _BLANKS and (inner := line.lstrip()).startswith(starts):
+            yield inner[len(keyword) :]
 
 
 def _corners(text: TextIOWrapper) -> Iterator[str]:
