@@ -49,7 +49,10 @@ def contents(path: Path, frame: int = 0) -> PointContents:
         if colors is not None:
             columns |= dict(zip(("red", "green", "blue"), colors.T, strict=True))
         return PointContents(
-            columns=columns, topology=topology_of(len(positions), _faces(text)), texture=_texture(text, path)
+            columns=columns,
+            remarks=_remarks(text),
+            topology=topology_of(len(positions), _faces(text)),
+            texture=_texture(text, path),
         )
 
 
@@ -58,6 +61,13 @@ def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
     with opened(path) as stream:
         text = TextIOWrapper(stream, "utf-8-sig", errors="surrogateescape")  # closes the stream when it goes
         yield from _faces(text)
+
+
+def _remarks(text: TextIOWrapper) -> tuple[str, ...]:
+    """The comments at the beginning of the file."""
+    text.seek(0)
+    lines = text.read(_HEAD).splitlines()
+    return tuple(line.lstrip("# ") for line in lines if line.startswith("#"))
 
 
 def _vertices(text: TextIOWrapper) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
