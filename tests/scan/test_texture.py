@@ -22,7 +22,7 @@ def test_between_pixels_colours_are_mixed_and_beyond_the_edge_they_stay() -> Non
 
 def test_positions_beyond_the_picture_repeat_it() -> None:
     uv = np.array([(0.3, 0.6), (0.9, 0.1)])
-    np.testing.assert_allclose(sampled(PICTURE, uv + [3, -2]), sampled(PICTURE, uv), atol=1e-9)
+    np.testing.assert_allclose(sampled(PICTURE, uv + np.array([3, -2])), sampled(PICTURE, uv), atol=1e-9)
 
 
 def test_corners_that_name_nothing_change_no_vertex() -> None:
