@@ -283,3 +283,53 @@ def test_measures_that_are_none_are_told_with_their_place(run: Run, text: str, t
     assert done.code == 2
     assert told in done.err
     assert "measures.json" in done.err
+
+
+def asymmetric_cloud(path: Path, remark: str) -> np.ndarray:
+    """300 points on one side of the y axis as PLY, PCD or OBJ with a remark; the points."""
+    points = np.round(np.random.default_rng(2).random((300, 3)) * 20 + (5, 30, 0), 3)
+    rows = "".join("{} {} {}\n".format(*point) for point in points.tolist())
+    heads = {
+        ".ply": f"ply\nformat ascii 1.0\ncomment {remark}\nelement vertex 300\nproperty double x\n"
+        "property double y\nproperty double z\nend_header\n",
+        ".pcd": f"# {remark}\nVERSION 0.7\nFIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 300\n"
+        "HEIGHT 1\nPOINTS 300\nDATA ascii\n",
+        ".obj": f"# {remark}\n",
+    }
+    if path.suffix == ".obj":
+        rows = "".join(f"v {row}\n" for row in rows.splitlines())
+    path.write_text(heads[path.suffix] + rows)
+    return points
+
+
+def save_markups(path: Path, position: np.ndarray) -> None:
+    point = {"label": "tip", "position": position.tolist(), "positionStatus": "defined"}
+    markup = {"type": "Fiducial", "coordinateSystem": "LPS", "controlPoints": [point]}
+    path.write_text(json.dumps({"markups": [markup]}))
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".pcd", ".obj"])
+@pytest.mark.parametrize(
+    ("remark", "options", "turned"),
+    [
+        ("SPACE=RAS", [], True),
+        ("SPACE=LPS", [], False),
+        ("made by hand", [], False),
+        ("made by hand", ["--axes", "RAS"], True),
+        ("made by hand", ["--read", "axes=RAS"], True),
+        ("SPACE=RAS", ["--read", "axes=LPS"], False),
+        ("SPACE=RAS", ["--axes", "LPS"], False),
+    ],
+)
+def test_landmarks_are_read_in_the_axes_of_the_scan(
+    suffix: str, remark: str, options: list[str], turned: bool, run: Run
+) -> None:
+    points = asymmetric_cloud(Path(f"cloud{suffix}"), remark)
+    save_markups(Path("tip.mrk.json"), points[7] * ((-1, -1, 1) if turned else (1, 1, 1)))
+    done = run(
+        "measure", f"cloud{suffix}", "--landmarks", "tip.mrk.json", "-o", "out.csv", "--no-snap", *options
+    )
+    assert done.code == 0, done.err
+    with open("out.csv", newline="", encoding="utf-8-sig") as stream:
+        (row,) = [row for row in csv.DictReader(stream) if row["kind"] == "landmark"]
+    np.testing.assert_allclose([float(row[axis]) for axis in "xyz"], points[7], atol=1e-3)

@@ -22,7 +22,6 @@ from viewer.errors import InputError
 
 # What Scan4D does not read rightly yet, by area. A mark goes with the work that makes its test pass.
 TABLES = pytest.mark.xfail(strict=True, reason="tables of landmarks")
-POINT_FILES = pytest.mark.xfail(strict=True, reason="point files")
 ARRAYS = pytest.mark.xfail(strict=True, reason="arrays and pictures")
 FRAMES = pytest.mark.xfail(strict=True, reason="frames and times")
 
@@ -266,7 +265,6 @@ def test_19_cameras_are_no_points(reported: Path, command: Callable[..., Done], 
     assert "camera" in done.err.removeprefix(f"scan4d: {reported / '19_cameras' / name}")
 
 
-@POINT_FILES
 def test_20_landmarks_in_the_axes_that_the_file_states(
     reported: Path, command: Callable[..., Done], tmp_path: Path
 ) -> None:

@@ -56,13 +56,14 @@ from ..output.plots import (
 )
 from ..scan.inputs import scan_inputs
 from ..scan.points import UNKNOWN_UNIT
+from ..scan.reading.axes import landmark_space
 from ..scan.timeline import Timeline
 from ..scan.units import Scale
 from ..task import Task
 from ._console import progress, tell, warn
 from ._followed import check_on_scan, put_on_surface, tracks_in_frames, with_noise
 from ._outputs import add_output_argument, claim
-from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, open_timeline
+from ._scans import SCAN_HELP, add_pose_arguments, chosen_poses, first_readable, open_timeline
 
 _SUFFIXES = (".csv", ".json")
 _STEPS = 200  # of a progress bar
@@ -152,7 +153,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     how.add_argument("--no-snap", action="store_true", help="do not move landmarks onto the surface")
     how.add_argument(
-        "--axes", choices=AXES, default=AXES[0], help="axes of the scan's coordinates; default LPS"
+        "--axes", choices=AXES, help="axes of the scan's coordinates; default: those of the scan, else LPS"
     )
 
 
@@ -163,7 +164,7 @@ def run(args: Namespace) -> int:
         indices = sorted(chosen_poses(args, timeline) or range(len(timeline)))
         inputs = [args.landmarks, *([args.measures] if args.measures else [])]
         claim(outputs, [*scan_inputs(timeline), *inputs], args.force)
-        found = _landmarks(args, timeline)
+        found = _landmarks(args, timeline, indices)
         measures = _measures(args, found)
         for remark in found.remarks:
             warn(f"{args.landmarks}: {remark}")
@@ -188,10 +189,11 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _landmarks(args: Namespace, timeline: Timeline) -> LandmarkSet:
+def _landmarks(args: Namespace, timeline: Timeline, indices: Sequence[int]) -> LandmarkSet:
     """The landmarks of the file. Raises InputError where an argument names one that it lacks."""
+    first_readable(timeline, indices)  # whose file states the axes, perhaps
     unit = None if timeline.unit == UNKNOWN_UNIT else timeline.unit
-    found = read_landmarks(args.landmarks, unit, args.axes)
+    found = read_landmarks(args.landmarks, unit, args.axes or landmark_space(timeline.reading["axes"]))
     for name in (*(args.anchors or ()), *(args.traced or ())):
         if name not in found.names:
             raise unknown_name("landmark", name, found.names)

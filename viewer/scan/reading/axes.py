@@ -43,3 +43,8 @@ def decide(remarks: Iterable[str], corrections: Corrections = NOTHING_CORRECTED)
         return Decision(KEY, space, "file", f"comment {remark}")
     why = f"The file does not state its axes. Scan4D assumes {LPS} where landmark files need them"
     return Decision(KEY, UNKNOWN, "assumed", why=why, alternatives=(LPS, RAS))
+
+
+def landmark_space(decision: Decision) -> str:
+    """The space in which landmark files are read and written for a scan: its own, else LPS."""
+    return RAS if decision.value == RAS else LPS

@@ -28,6 +28,7 @@ from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....files import working_folder
 from ....scan.inputs import refuse_input
+from ....scan.reading.axes import landmark_space
 from ....scan.timeline import Timeline
 from ....scan.times import frame_in_words
 from ...file_dialog import OPEN, SAVE, FileDialog
@@ -122,7 +123,7 @@ class Exchange:
         self._doubted = path
 
         def read() -> tuple[LandmarkSet, tuple[Landmark, ...]]:
-            found = read_landmarks(path, unit)
+            found = read_landmarks(path, unit, landmark_space(timeline.reading["axes"]))
             problem = None if is_sure else why_apart(found, _bounds(found, timeline, frame))
             if problem is not None:
                 raise InputError(problem, path, "Import the file again to use these landmarks anyway")
@@ -156,7 +157,8 @@ class Exchange:
             pending = Track.pending(timeline.times)
             all_tracks = {one.name: tracks.get(one.name, pending) for one in landmarks}
             found = LandmarkSet.of_tracks(all_tracks, unit, {one.name: one.about for one in landmarks})
-            return write_landmarks(file, found.at(frame) if is_one else found)
+            axes = landmark_space(timeline.reading["axes"])
+            return write_landmarks(file, found.at(frame) if is_one else found, axes)
 
         def tell(remark: str | None) -> None:
             frames = frame_in_words(frame) if is_one else f"{len(timeline)} frames"
