@@ -85,7 +85,7 @@ _SYSTEM = {
     errno.EMFILE: ("too many files are open", "Close other programs, or raise 'ulimit -n'"),
     errno.ENFILE: ("too many files are open", "Close other programs"),
     errno.ENOMEM: ("not enough memory", "Close other programs"),
-    errno.EIO: ("the disk fails to read or write it", "Copy it to another disk"),
+    errno.EIO: ("the disk fails to read or write it", "Copy the file to another disk"),
 }
 _CUT_SHORT = re.compile(r"[0-9]+ requested and [0-9]+ written")  # all that numpy tells of a full disk
 

@@ -114,7 +114,7 @@ def parsed_json(text: str) -> Any:
     try:
         return json.loads(text)
     except RecursionError:
-        raise ValueError("it is nested too deeply") from None
+        raise ValueError("the JSON data are nested too deeply") from None
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
@@ -124,7 +124,7 @@ def parsed_toml(text: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise ValueError("it is nested too deeply") from None
+        raise ValueError("the JSON data are nested too deeply") from None
 
 
 def named_inside(folder: Path, name: str, where: object) -> Path:

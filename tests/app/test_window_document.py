@@ -311,7 +311,9 @@ def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
         return ended.stderr
 
     scan.rename(scan.parent / "gone")
-    assert f"its scan 'scans/wall' is missing. Name the scan: scan4d view SCAN {path}" in refused(path)
+    assert f"its scan 'scans/wall' is missing. Give the path of the scan: scan4d view SCAN {path}" in refused(
+        path
+    )
     data: dict[str, Any] = json.loads(path.read_text())
     path.write_text(json.dumps(data | {"document": 3}))
     assert f"{path}, document: is not an object with named values but 3" in refused(path)

@@ -118,7 +118,7 @@ def test_a_pose_that_does_not_exist(index: int) -> None:
     with timeline(Frames()) as scan:
         for ask in (scan.pose, scan.request, scan.prefetch, scan.label):
             with pytest.raises(
-                InputError, match=f"frames: there is no pose {index}. It has the poses 0 to 9"
+                InputError, match=f"frames: there is no pose {index}. The scan has the poses 0 to 9"
             ):
                 ask(index)
 

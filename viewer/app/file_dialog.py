@@ -33,7 +33,7 @@ def named_file(text: str, suffix: str, *others: str) -> Path:
     if not typed or os.path.isdir(path):
         raise InputError("is a folder", path, "Name a file in it")
     if not os.path.isdir(path.parent):
-        hint = "Create it first, or choose another folder"
+        hint = "Create the folder first, or choose another one"
         raise InputError("this folder does not exist", path.parent, hint)
     return path if path.name.lower().endswith((suffix, *others)) else path.with_name(f"{path.name}{suffix}")
 

@@ -235,7 +235,7 @@ def _class_of(module: ModuleType) -> type[Backend]:
     ]  # fmt: skip
     if len(classes) != 1:
         what = f"{module.__name__} defines {len(classes)} subclasses of Backend"
-        raise InputError(what, hint="Define exactly one in this module")
+        raise InputError(what, hint="Define exactly one subclass of Backend in this module")
     return classes[0]
 
 

@@ -56,9 +56,9 @@ class Params:
 
     passes: str = param(
         "auto",
-        "How overlapping splats become one surface. one: show the nearest splat; two: blend the "
+        "How Scan4D blends overlapping splats into one surface. one: show the nearest splat; two: blend the "
         "nearest splat with the splats close behind it; auto: two with enlarge=1, or one if two is "
-        "too slow in motion. The others give the pictures of Slomp 2014, Fig. 3, for comparison: "
+        "too slow in motion. The other values reproduce the pictures of Slomp 2014, Fig. 3, for comparison: "
         "one_blended (a), one_no_depth "
         "(b), visibility (c), two_large (e), and sorted, blended from back to front",
         choices=("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
@@ -107,7 +107,7 @@ class Params:
     )
     mask_cutoff: float = param(
         0.0183,
-        "Opacity at which a splat ends. It never extends beyond its radius",
+        "Opacity at which a splat ends. A splat never extends beyond its radius",
         low=0.0183,
         high=0.99,
         group="Splats",
@@ -153,9 +153,8 @@ class Surfels(Backend):
     }
     default_reasons = {
         "cull_back": "the camera can see the inside of an open scan: without splats that face "
-        "away, 2.2 % of the pixels of the bunny, which has no base, would show the background. No test for "
-        "closed scans was both safe and faster "
-        "(docs/how-it-works/surfels.md)"
+        "away, 2.2 % of the pixels of the bunny, which has no base, would show the background. We "
+        "found no test for closed scans that is both safe and faster (docs/how-it-works/surfels.md)"
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:

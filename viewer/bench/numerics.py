@@ -305,7 +305,9 @@ def _spoilt() -> Iterator[Row]:
             f"normals that deviate from the y axis by 10^{power} rad",
             lambda: _sheet().moved(turn=_QUARTER_TURN),
             partial(about_y, angle=10.0**power),
-            Tolerance(FLOAT32.error + 5 * 10.0**power, "a splat of 5 px, tilted by that angle"),
+            Tolerance(
+                FLOAT32.error + 5 * 10.0**power, ("a splat of 5 px, tilted by as much as the normals deviate")
+            ),
         )
 
     def matt() -> PointView:

@@ -62,5 +62,7 @@ def _parts(text: str, name: str, example: str) -> tuple[float, str]:
     except ValueError:
         number = math.nan
     if found is None or not (0 < number < math.inf):
-        raise InputError(f"'{shortened(text)}' is not a limit", name, f"Use more than 0, {example}")
+        raise InputError(
+            f"'{shortened(text)}' is not a limit of time or error", name, f"Use more than 0, {example}"
+        )
     return number, found[2]

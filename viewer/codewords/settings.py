@@ -47,7 +47,7 @@ class Params:
     )
     size_parts: int = param(
         2,
-        "Number of radii in the table for each pixel",
+        "Number of disc radii in the table of shapes, for each pixel of radius",
         low=1,
         high=8,
         group="Words",
@@ -87,7 +87,12 @@ class Params:
     )
     cull_back: bool = param(False, "Leave out discs that face away from the viewer", group="Splats")
     window: int = param(
-        16, "Number of picture lines that are drawn at once", low=8, high=64, affects="speed", group="Speed"
+        16,
+        "Number of picture lines that the engine draws at once",
+        low=8,
+        high=64,
+        affects="speed",
+        group="Speed",
     )
 
     @property

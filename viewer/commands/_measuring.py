@@ -143,7 +143,7 @@ class MeasuringPlan(NamedTuple):
             if not any(measured):
                 if bench.stopped:
                     raise KeyboardInterrupt
-                raise InputError("; ".join(bench.notes) or "there is nothing to measure")
+                raise InputError("; ".join(bench.notes) or "the options leave nothing to measure")
             stopped = ["Stopped before the end."] if bench.stopped else []
             write_notes(out, [*self.notes, *bench.notes, *stopped])
             report()

@@ -76,7 +76,7 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
 
 def _check_arguments(args: Namespace) -> None:
     if given := arguments.given(args, _OF_RECORDING):
-        hint = "The recording defines what to draw. Leave these options out"
+        hint = "Leave out these options, because the recording states what to draw"
         raise InputError(f"--replay cannot be combined with {', '.join(given)}", args.replay, hint)
 
 

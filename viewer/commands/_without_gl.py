@@ -57,7 +57,7 @@ def run(args: Namespace) -> int:
     _refuse(args, _NEED_GL, "applies only to pictures that OpenGL draws")
     if args.behind and args.out.suffix.lower() == SUFFIX:
         raise InputError(
-            f"is not stored in '{SUFFIX}' files", "--behind", "Use it when you draw the code words"
+            f"is not stored in '{SUFFIX}' files", "--behind", "Use this option when you draw the code words"
         )
     if args.progress:
         say(device="CPU")

@@ -111,7 +111,7 @@ def _named(names: list[str]) -> _Named:
 def _scan_of_session(session: SavedSession, path: Path) -> str:
     scan = scan_path(session.scan, path)
     if not is_there(scan):
-        hint = f"Name the scan: scan4d view SCAN {path}"
+        hint = f"Give the path of the scan: scan4d view SCAN {path}"
         raise InputError(f"its scan '{printable(session.scan)}' is missing", path, hint)
     return scan
 

@@ -29,18 +29,24 @@ class Marks:
 
     scale_bar: bool = param(
         False,
-        ("Scale bar of a round length. In perspective it is valid only at the depth of the camera's target"),
+        (
+            "Scale bar with a round length. In perspective, the scale bar is valid only at the depth of "
+            "the camera's target"
+        ),
     )
     color_bar: bool = param(
         False,
-        "Colour bar, if the colours show a number or a level, or mark holes",
+        "Colour bar, if the colours show values or levels, or mark holes",
     )
-    stamp: bool = param(False, "Number and time of the frame")
-    notes: bool = param(False, "Notes on positions and on the frame")
+    stamp: bool = param(False, "Number and time of the current frame")
+    notes: bool = param(False, "Notes at positions of the subject, and notes on the frame")
     landmarks: bool = param(False, "Landmarks of the frame")
     trajectories: bool = param(False, "Paths of landmarks through all frames, as shown in the view")
-    measure_lines: bool = param(False, "Distances and other measures in the frame, with their values")
-    plot: bool = param(False, "Plot of the measures, if the view shows it, with a line at the frame")
+    measure_lines: bool = param(False, "Distances and other measures in this frame, with their values")
+    plot: bool = param(
+        False,
+        ("Plot of the measures over time, if the view shows the plot, with a line at the current frame"),
+    )
 
     def __bool__(self) -> bool:
         return any(getattr(self, field.name) for field in fields(self))

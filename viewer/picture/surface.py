@@ -154,7 +154,7 @@ class Surface(RenderTarget):
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
         if look is not None and look != self.look:
             if self.shaded_by is None:
-                raise RuntimeError("this surface has no colours yet: shade it first")
+                raise RuntimeError("this surface has no colours yet: call shade before you read them")
             self.gpu.activate()
             self.shaded_by(self, look)
         words = self.enlarged(self._read(self.picture, np.uint32))

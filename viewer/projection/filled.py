@@ -83,7 +83,7 @@ def draw_filled(
             surface, source, channels, _spread(surface, source, visits, params) if spreads else {"SUMS": 0}
         )
     else:
-        surface.stats.skipped["fill"] = "the picture shows only level 0"
+        surface.stats.skipped["fill"] = "the picture shows only measured samples (level 0)"
     if merge is not None and isinstance(source, ViewSource):
         merge(source, channels)
     if source.is_closed:

@@ -92,7 +92,8 @@ class ProjectionParams:
     )
     widest: float = param(
         1.0,
-        "Widest hole that a level fills beyond the gaps between samples, in cell widths at that level",
+        "Widest hole that Scan4D fills from a level, in cell widths of that level. Gaps between "
+        "samples are always filled",
         low=0,
         high=3,
         group=_LEVELS,
@@ -109,7 +110,8 @@ class ProjectionParams:
     )
     tolerance: float = param(
         2.0,
-        "How far behind a nearer surface a sample must lie to be hidden, in cell widths at its level",
+        "Least distance behind a nearer surface at which Scan4D hides a sample, in cell widths of "
+        "the sample's level",
         low=0,
         high=100,
         group=_HIDDEN,

@@ -91,7 +91,7 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         if size_of(stream) < held:
             raise InputError(
                 "another program shortened this file while Scan4D read it",
-                hint="Open it again when it is complete",
+                hint="Open the file again when it is complete",
             )
 
 

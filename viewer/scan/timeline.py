@@ -278,7 +278,9 @@ class Timeline:
     def _checked_index(self, index: int) -> int:
         index = operator.index(index)
         if not 0 <= index < len(self):
-            raise InputError(f"there is no pose {index}", self.name, f"It has the poses 0 to {len(self) - 1}")
+            raise InputError(
+                f"there is no pose {index}", self.name, f"The scan has the poses 0 to {len(self) - 1}"
+            )
         return index
 
     def _check_open(self) -> None:

@@ -195,6 +195,6 @@ def most_listed(gpu: Gpu) -> int:
 def _unfit(points: Points, surface: Surface) -> str:
     """Why such a pose or picture has no lists; empty where it has."""
     if max(surface.size) > _MOST_PIXELS:
-        return f"more than {_MOST_PIXELS} pixels along an edge"
+        return f"the picture has more than {_MOST_PIXELS} pixels along an edge"
     most = min(surface.gpu.max_storage_bytes // DISC_BYTES, 1 << DISC_BITS)
     return f"more than {most:,} points" if points.count > most else ""

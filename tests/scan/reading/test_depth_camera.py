@@ -63,7 +63,7 @@ def test_a_camera_for_another_size_is_scaled(factor: float) -> None:
     assert camera.cx / camera.fx == pytest.approx(150.5 / 290)
     assert (size[0] - camera.cx) / camera.fx == pytest.approx((320 - 150.5) / 290)
     assert decision.source == "neighbour"
-    assert f"scales it to {size[0]} x {size[1]}" in decision.why
+    assert f"scales the camera to {size[0]} x {size[1]}" in decision.why
 
 
 def test_a_camera_for_another_aspect_ratio_is_refused() -> None:

@@ -144,7 +144,7 @@ def _problem_of_name(name: str) -> str:
     if not name.strip() or set(name) & set('/\\%:*?"<>|\0'):
         return 'Use a name without / \\ % : * ? " < > |'
     if name[-1] in " .":
-        return "A name cannot end with a space or a dot"
+        return "The name of a file cannot end with a space or a dot"
     if name.partition(".")[0].rstrip().upper() in _DEVICES:
         return "Windows reserves this name for a device"
     if len(os.fsencode(name)) > _LONGEST_NAME:

@@ -15,7 +15,7 @@ from ..session import Session
 from ..ui import Ui
 
 MARK = "\u2022"  # before an assumption that can change a number
-_MARKED = "Scan4D assumes this, and it can change what you measure."
+_MARKED = "Scan4D assumes this value. If the value is wrong, what you measure may be wrong too."
 
 
 @dataclass(eq=False)
@@ -75,6 +75,6 @@ def _others(record: Reading) -> Iterator[tuple[str, str, str]]:
     for aside in record.aside:
         yield "Left aside", aside.file, aside.why
     for text in record.unused:
-        yield "Not used", text, "The file holds this, but Scan4D does not use it"
+        yield "Not used", text, "The file contains these data, but Scan4D does not use them"
     for one in record.contradictions:
         yield "Contradiction", one.what, "This frame does not fit the decisions for the whole scan"

@@ -55,7 +55,9 @@ class Params:
         "Use a point as a neighbour even if a nearer point of the same surface covers its pixel",
         group=_NEIGHBORS,
     )
-    outliers: bool = param(False, "Show points without close neighbours", key="Shift+O", group=_NEIGHBORS)
+    outliers: bool = param(
+        False, "Show outliers: points without close neighbours", key="Shift+O", group=_NEIGHBORS
+    )
     expansions: int = param(
         3,
         "How often the search for neighbours doubles its radius. A point that still has no "

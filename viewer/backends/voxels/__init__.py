@@ -59,7 +59,7 @@ class Params:
     )
     delta: float = param(
         0.05,
-        "Share of the positions that may share their octant with others",
+        "Share of the positions that may lie in one octant with other positions",
         low=0,
         high=1,
         affects="derive",
@@ -191,8 +191,8 @@ class Voxels(Backend):
     default_reasons = {
         "cull_back": "the camera can see the inside of an open scan: without octants that face "
         "away, 1.5 % of the pixels of the bunny, which has no base, would show the background",
-        "radius_scale": "with a radius_scale of 0.8, holes stay open: 0.1 % of the pixels of the armadillo, "
-        "and 1 % of a dancing body",
+        "radius_scale": "with a radius_scale of 0.8, gaps between discs stay open: 0.1 % of "
+        "the pixels of the armadillo, and 1 % of a dancing body",
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:

@@ -372,7 +372,7 @@ def subject(
         needs = [Path(data or "") / need for need in scene.needs]
     if count is not None and not (scene.counts and 1 <= count <= _MOST_POINTS):
         known = f"1 to {_MOST_POINTS:,}" if scene.counts else "only the number of points that was scanned"
-        raise InputError(f"is not available with {count:,} points", name_or_file, f"It has {known}")
+        raise InputError(f"is not available with {count:,} points", name_or_file, f"The scene has {known}")
     if noise and scene.noise is None:
         raise InputError("has no noise", name_or_file, "Only simulated scans have noise: use NAME-simulated")
     if noise is not None and not (0 <= noise < np.inf):

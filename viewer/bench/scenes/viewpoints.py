@@ -38,7 +38,7 @@ def viewpoints(
     Raises InputError where there is no such view.
     """
     if count < 1:
-        raise InputError(f"a scene needs 1 or more viewpoints, not {count}")
+        raise InputError(f"a scene of the benchmark needs 1 or more viewpoints, not {count}")
     rng = np.random.default_rng(seed)
     low, high = COVERAGE[0] + 2 * _CLOSE, COVERAGE[1] - 2 * _CLOSE
     wanted = low + (high - low) * (rng.permutation(count) + 0.5) / count

@@ -333,7 +333,7 @@ def _readable(path: Path) -> ModuleType:
 
 @contextmanager
 def one_message(
-    where: object, failed: str, hint: str = "Check that it is complete, or export it again"
+    where: object, failed: str, hint: str = "Check that the file is complete, or export it again"
 ) -> Iterator[None]:
     """Turn whatever goes wrong inside into an InputError that says where.
 

@@ -216,7 +216,9 @@ def _fitting(
         reasons.append((camera, stated))
     reason, stated = reasons[0]
     hint = (
-        _STATE_IT if stated.width is not None else f"If it is right, state its width and height. {_STATE_IT}"
+        _STATE_IT
+        if stated.width is not None
+        else (f"If this camera is right, state its width and height. {_STATE_IT}")
     )
     raise InputError(f"{reason}{f' ({stated.where})' if stated.where else ''}", hint=hint)
 
@@ -232,7 +234,10 @@ def _decision(
     value: dict[str, Any] = {name: getattr(camera, name) for name in ("fx", "fy", "cx", "cy")}
     value |= {"distortion": list(camera.distortion), "kind": camera.kind or "z"}
     if not why and (camera.fx, camera.cx) != (stated.fx, stated.cx):
-        why = f"It states the camera for other pictures: Scan4D scales it to {camera.width} x {camera.height}"
+        why = (
+            "The camera file is for pictures of another size: Scan4D scales the camera to "
+            f"{camera.width} x {camera.height}"
+        )
     return Decision("camera", value, source, where, why, alternatives, changes_numbers=True)
 
 
@@ -248,10 +253,15 @@ def _depth_scale(sources: CameraSources, is_whole: bool) -> tuple[float, Decisio
         where = next((one.where for one in sources.stated if one.depth_scale is not None), sources.kind)
         return decided(stated, "folder" if is_default else sources.source, where)
     if not is_whole:
-        return decided(1.0, "assumed", "", "The picture stores floats, which are lengths as a rule")
+        return decided(1.0, "assumed", "", "The picture stores floats, which are usually lengths")
     if sources.is_known_scale:
         return decided(MILLIMETRES, "folder", sources.kind)
-    return decided(MILLIMETRES, "assumed", "", "No file states it, and most recorders store millimetres")
+    return decided(
+        MILLIMETRES,
+        "assumed",
+        "",
+        "No file states the unit of the depths, and most recorders store millimetres",
+    )
 
 
 def _first(sources: CameraSources, name: str) -> Any:

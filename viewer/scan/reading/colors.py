@@ -114,7 +114,9 @@ def decide(evidence: Sequence[ColorEvidence], corrections: Corrections = NOTHING
     """
     if (stated := corrections.get(KEY)) is not None:
         if stated != NONE and not evidence:
-            raise InputError("holds no colours, so that they have no scale", hint="Leave out --read colors")
+            raise InputError(
+                "holds no colours, so a scale of colours has no effect", hint="Leave out --read colors"
+            )
         return Decision(KEY, stated if stated == NONE else int(stated), "user", "--read")
     if not evidence:
         return Decision(KEY, None, "file")

@@ -60,7 +60,7 @@ def encoding_decision(head: bytes, corrected: str | None = None) -> Decision:
         return Decision("encoding", corrected, "user", "--read")
     name = encoding_of(head)
     if name == "cp1252":
-        why = "Some bytes are not UTF-8."
+        why = "Some bytes of the file are not UTF-8 text."
         return Decision("encoding", "latin-1", "assumed", why=why, alternatives=("utf-8", "utf-16"))
     return Decision("encoding", name.removesuffix("-sig")[:6].rstrip("-"))
 
@@ -300,8 +300,10 @@ def check_commas(rows: Iterable[Sequence[str]]) -> None:
     if same and any(len(word) > 1 and word.startswith("0") for word in behind):
         raise InputError(
             "uses commas as separators and, it seems, as decimal marks too",
-            hint="Export it with semicolons or blanks between the values, or state what separates them, "
-            "such as --read decimal=. --read separator=comma",
+            hint=(
+                "Export the file with semicolons or blanks between the values, or state what separates "
+                "them, such as --read decimal=. --read separator=comma"
+            ),
         )
 
 

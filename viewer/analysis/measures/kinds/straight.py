@@ -11,8 +11,8 @@ from . import MeasureKind, Options
 
 _BETWEEN = 32  # places on a curve from one landmark to the next
 _PLANE = (
-    "the other landmarks define the plane: it fits three or more landmarks, or lies halfway between the "
-    "two landmarks of each pair"
+    "the other landmarks define the plane: the plane fits three or more landmarks, or lies halfway "
+    "between the two landmarks of each pair"
 )
 
 Positions = NDArray[np.float64]  # (T, K, 3)
