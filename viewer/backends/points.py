@@ -1,7 +1,7 @@
 """Draws each point as a square of pixels, and shows the nearest square at each pixel.
 
-`points` is the fastest renderer, and its positions are exact. A surface can have gaps between its points,
-through which farther points are visible. `hide_hidden` leaves out these points.
+`points` is the fastest renderer, and draws each point exactly at its position. A surface can have gaps
+between its points, through which farther points are visible. `hide_hidden` leaves out these farther points.
 """
 
 from __future__ import annotations

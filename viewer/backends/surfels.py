@@ -1,8 +1,8 @@
 """Draws each point as a disc along the surface, so that discs close the gaps between points.
 
-The method is that of Slomp 2014, sections IV and V. A disc is a square, perpendicular to the normal, with a
-Gaussian mask that ends at the radius. The renderer draws discs in one pass, or in two passes that blend
-overlapping discs. Discs are ellipses if the scan stores half-axes.
+The renderer implements the method of Slomp 2014, sections IV and V. A disc is a square, perpendicular to the
+normal, with a Gaussian mask that ends at the radius. The renderer draws discs in one pass, or in two passes
+that blend overlapping discs. Discs are ellipses if the scan stores half-axes.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Draws a smooth surface from points without normals, by fitting splats to the visible points.
 
-The method is that of Preiner 2012. For each picture, the renderer finds the visible points. Each visible
-point finds its nearest neighbours in space, fits a plane to them, and gets a splat as large as the distance
-between them. The search is exact (`neighborhoods.py`), so neighbourhoods do not change with the view. Hidden
-points of the same surface also count as neighbours, so that neighbourhoods at outlines are complete.
+The renderer implements the method of Preiner 2012. For each picture, it finds the visible points. For each
+visible point, it finds the nearest neighbours in three dimensions, fits a plane to them, and draws a splat
+that reaches to them. The search is exact (`neighborhoods.py`), so neighbourhoods do not change with the view.
+Neighbours can also be hidden points of the same surface, so that neighbourhoods at outlines are complete.
 """
 
 from __future__ import annotations

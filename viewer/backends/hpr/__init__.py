@@ -1,14 +1,14 @@
-"""Draws only the points that the viewer can see, without normals or faces.
+"""Draws only the points that the viewer can see; the scan needs neither normals nor faces.
 
 Machado e Silva 2014 approximates the operator of Katz 2007. The operator flips the points about a sphere
 around the eye; a point is visible if its flipped position lies on the convex hull. The renderer divides
 directions into sectors, and each sector stores the point whose flipped position reaches farthest along its
 direction (sections 3 to 5). The radius, the number of sectors and the number of steps follow section 6.
 
-Scan4D differs from the paper in two ways. Scan4D divides angles evenly, so that sectors have about the same
-size up to 45 degrees from the middle; around an eye near the scan it uses six such grids, like the faces of a
-cube. Scan4D also compares each point with the candidates in the sectors around it. Points that share a sector
-can then all be visible, and fewer sectors are enough.
+The renderer differs from the paper (Machado e Silva 2014) in two ways. Scan4D divides angles evenly, so that
+sectors have about the same size up to 45 degrees from the middle; around an eye near the scan it uses six
+such grids, like the faces of a cube. Scan4D also compares each point with the candidates in the sectors
+around it. Several points of one sector can therefore be visible, and the renderer needs fewer sectors.
 """
 
 from __future__ import annotations
