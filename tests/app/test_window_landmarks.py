@@ -121,7 +121,7 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
         state = click(app, points[0][128])
         assert list(state.landmarks) == ["Landmark 1", "Landmark 2", "Landmark 3"]
 
-        assert "Arrow keys move Landmark 3." in state.prompt
+        assert "The arrow keys move Landmark 3." in state.prompt
         before = keys_of(state, "Landmark 3")[0]
         after = keys_of(app.press("Right", "Right", "Up"), "Landmark 3")[0]
         pixel = (after[0] - before[0]) / 2
@@ -138,9 +138,9 @@ def test_landmarks_are_corrected_skipped_and_taken_back(screen: Screen, tmp_path
 
         app.press("period")
         state = app.see(lambda state: state.landmarks["Landmark 1"][0] == "tracked")
-        assert "Arrow keys" not in state.prompt
+        assert "The arrow keys" not in state.prompt
         state = app.press("Left", "Right", "Right", "Left")
-        assert (state.frame, state.prompt.count("Arrow keys")) == (1, 0), "arrows go from frame to frame"
+        assert (state.frame, state.prompt.count("The arrow keys")) == (1, 0), "arrows go from frame to frame"
         assert keys_of(state, "Landmark 3") == {0: before}
         start, stop = on_screen(app, points[1][34]), on_screen(app, points[1][50])
         dragged = app.drag(start, stop)

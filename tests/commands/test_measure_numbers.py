@@ -248,7 +248,7 @@ def test_the_only_measure_goes_against_nothing(run: Run) -> None:
         (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is already the file of another table"),
         (("--repeats", "a.csv", "--aligned", "weg"), "unknown measure 'weg'. Known: still, way"),
         (("--repeats", "a.csv", "--least", "1.5"), "'1.5' is not a share above 0, up to 1"),
-        (("--aligned", "way"), "--aligned: needs repeats, but there are none. Add --repeats FILE"),
+        (("--aligned", "way"), "--aligned: needs repeats, but the curve has none. Add --repeats FILE"),
         (("--numbers", "measures.json"), "is an input of this command: Scan4D does not replace it"),
         (("--order", "jerk"), "jerk"),
         (("--smoothing", "0", "--order", "speed"), "'0' is not a time above 0, in seconds"),
@@ -270,7 +270,7 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
     assert done.code == 2
-    assert f"{words[0]}: needs measures, but there are none. Name them with --measures" in done.err
+    assert f"{words[0]}: needs measures, but the command has none. Name them with --measures" in done.err
     assert not Path("out.csv").exists()
 
 

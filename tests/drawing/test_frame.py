@@ -83,7 +83,7 @@ def test_the_window_gets_points_until_what_it_asked_for_is_ready(renderer: Rende
     assert render_frame(own, request, surface, wait=False), "more is to come"
     assert surface.stats.backend == "points"
     assert surface.stats.skipped == {
-        "surfels": "Scan4D is still preparing what it needs",
+        "surfels": "Scan4D is still preparing data that this picture needs",
         **_points_skips(surface),
     }
     while render_frame(own, request, surface, wait=False):

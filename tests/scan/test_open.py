@@ -221,7 +221,7 @@ def test_an_npz_with_times(tmp_path: Path) -> None:
     assert open_scan(path).times.tolist() == [1, 1.5, 4]
     assert open_scan(path, fps=10).times == pytest.approx([0, 0.1, 0.2])
     np.savez(path, positions=np.ones((3, 5, 3), np.float32), times=[1.0, 1.0, 4.0])
-    assert "walk.npz: times do not increase with the frames" in message(path)
+    assert "walk.npz: the times of the frames do not increase" in message(path)
 
 
 def test_a_sequence_of_files_of_many_frames_is_refused_not_cut(tmp_path: Path) -> None:

@@ -43,7 +43,7 @@ def present_file(text: str, *_: str) -> Path:
     exist."""
     path = Path(absolute(os.path.expanduser(text.strip())))
     if not path.is_file():
-        raise InputError("this file does not exist", path, "Choose one from the list")
+        raise InputError("this file does not exist", path, "Choose a file or folder from the list")
     return path
 
 
@@ -52,7 +52,7 @@ def present_folder(text: str, *_: str) -> Path:
     exist."""
     path = Path(absolute(os.path.expanduser(text.strip())))
     if not path.is_dir():
-        raise InputError("this folder does not exist", path, "Choose one from the list")
+        raise InputError("this folder does not exist", path, "Choose a file or folder from the list")
     return path
 
 

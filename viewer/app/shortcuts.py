@@ -98,7 +98,7 @@ class Shortcuts(WindowPart):
         try:
             if not os.path.exists(path):
                 key_file.write_template(path, self.commands)
-            self.note(f"The keys are in {path}. Edit this file and start Scan4D again.")
+            self.note(f"Your keyboard shortcuts are in {path}. Edit this file and start Scan4D again.")
         except InputError as error:
             self.note(Problem(str(error)))
 

@@ -149,7 +149,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     how.add_argument(
         "--placed-in", type=int, metavar="I",
-        help="frame of the landmarks if FILE does not name one; default: the first measured frame",
+        help=(
+            "frame in which the landmarks were placed, if FILE does not name one; default: the first "
+            "measured frame"
+        ),
     )  # fmt: skip
     how.add_argument("--no-snap", action="store_true", help="do not move landmarks onto the surface")
     how.add_argument(
@@ -275,11 +278,11 @@ def _outputs(args: Namespace) -> list[Path]:
     is_of_speeds = args.order != ORDERS[0]
     lacking = [flag for flag in asked if flag != "--plot" or not is_of_speeds]
     if lacking and args.measures is None:
-        raise InputError("needs measures, but there are none", lacking[0], "Name them with --measures")
+        raise InputError("needs measures, but the command has none", lacking[0], "Name them with --measures")
     if args.traced is not None and not is_of_speeds:
-        raise InputError("needs speeds, but there are none", "--traced", "Add --order speed")
+        raise InputError("needs speeds, but the command computes none", "--traced", "Add --order speed")
     if args.against is not None and args.measures is None:
-        raise InputError("needs measures, but there are none", "--against", "Name them with --measures")
+        raise InputError("needs measures, but the command has none", "--against", "Name them with --measures")
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
         hint = "Name landmarks that move as one rigid body, separated by commas"
         raise InputError("removing head motion needs three landmarks", "--anchors", hint)
@@ -288,7 +291,7 @@ def _outputs(args: Namespace) -> list[Path]:
         raise InputError("has nothing to smooth", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
         flag = "--least" if args.aligned is None else "--aligned"
-        raise InputError("needs repeats, but there are none", flag, "Add --repeats FILE")
+        raise InputError("needs repeats, but the curve has none", flag, "Add --repeats FILE")
     return outputs
 
 

@@ -83,7 +83,7 @@ def draw_plan(
     stats = surface.stats
     stats.backend, stats.asked = backend.name, asked
     if planned is not ready:
-        stats.skipped[planned.request.backend.name] = "Scan4D is still preparing what it needs"
+        stats.skipped[planned.request.backend.name] = "Scan4D is still preparing data that this picture needs"
     drawn = {**_drawn(ready), "camera": view.key, "size": surface.size, "values": surface.values_key}
     changed = surface.take_changes(drawn)
     frame = FrameView(view, params, ready.derived, share * asked, budget_ms, changed, moving, goes_on)

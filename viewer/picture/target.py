@@ -245,5 +245,5 @@ class RenderTarget(PictureBuffers, Coloring):
 
     def _drawn(self) -> tuple[PointRows, View]:
         if self._shown is None:
-            raise RuntimeError("nothing was drawn to this surface")
+            raise RuntimeError("no backend has drawn to this surface yet")
         return self._shown

@@ -464,7 +464,7 @@ def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]
     if checked.shape != (len(source),):
         raise InputError(f"times have shape {checked.shape} for {len(source)} frames", source.name)
     if not (np.isfinite(checked).all() and (np.diff(checked) > 0).all()):
-        raise InputError("times do not increase with the frames", source.name, "Give a frame rate instead")
+        raise InputError("the times of the frames do not increase", source.name, "Give a frame rate instead")
     checked.setflags(write=False)
     return checked
 

@@ -122,7 +122,8 @@ def capture(
     """
     if size[0] * size[1] > _MOST_PIXELS:
         raise InputError(
-            f"a range image of {size[0]}x{size[1]} is too large", hint=f"Up to {_MOST_PIXELS:,} pixels"
+            f"a range image of {size[0]}x{size[1]} is too large",
+            hint=f"Choose at most {_MOST_PIXELS:,} pixels",
         )
     pictures = [trace(scene, pod, size) for pod in pods]
     return measured(pictures, pods, faults, seed=seed, frame=frame, unit=unit)

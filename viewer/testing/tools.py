@@ -84,7 +84,7 @@ def _its_settings_have_defaults(module: str) -> None:
     if settings is not None:
         fields = dataclasses.fields(settings)
         assert all(field.default is not dataclasses.MISSING for field in fields), (
-            "every field must have a default"
+            "every field of a document part must have a default"
         )
 
 

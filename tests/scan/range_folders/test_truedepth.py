@@ -77,7 +77,7 @@ def test_motion_that_tells_no_gravity_is_told(tmp_path: Path, text: str) -> None
 
 def test_times_that_do_not_increase_need_a_frame_rate(tmp_path: Path) -> None:
     put(tmp_path, 42.0, 41.0)
-    with pytest.raises(InputError, match="times do not increase"):
+    with pytest.raises(InputError, match="times of the frames do not increase"):
         open_scan(tmp_path)
     with open_scan(tmp_path, fps=10) as scan:
         np.testing.assert_allclose(scan.times, [0, 0.3])

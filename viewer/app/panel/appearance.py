@@ -132,7 +132,7 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
         idle["plain"] = "The scan has its own colours; choose Single colour above"
     elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
         shown = COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()
-        idle["plain"] = f"This has no effect while the colours show {shown}"
+        idle["plain"] = f"This setting has no effect while the colours show {shown}"
     if not is_here:
         idle |= dict.fromkeys(_OF_NUMBERS, "This frame has no values of the quantity that the colours show")
     if look.light == "auto" and why_unlit:

@@ -125,7 +125,10 @@ class ScanSection(WindowPart):
         widgets.label("Show lengths in", "Unit of all lengths in the window and in saved tables")
         wanted = widgets.combo("shown_unit", now, list(shown), shown)
         if wanted != now:
-            self.session.change("Show lengths in another unit", shown_unit=None if wanted == _OWN else wanted)
+            self.session.change(
+                "Show lengths in another unit",
+                shown_unit=None if wanted == _OWN else wanted,
+            )
 
     def _draw_rate(self) -> None:
         """Declare how fast frames follow each other, and what changes that where nothing measured does."""

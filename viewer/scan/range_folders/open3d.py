@@ -69,7 +69,7 @@ def read_log(path: Path) -> NDArray[np.float64]:
     try:
         return np.array(words, np.float64).reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
     except ValueError as error:
-        hint = "A record is three whole numbers and a 4 x 4 matrix"
+        hint = "A record of the log is three whole numbers and a 4 x 4 matrix"
         raise InputError("is damaged, or is not a log of poses", path, hint) from error
 
 

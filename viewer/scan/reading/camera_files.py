@@ -31,7 +31,7 @@ from ...files import parsed_json
 from ..contents import StatedCamera
 from ..range_view import DepthKind
 
-FORM = "It should have fx, fy, cx and cy in pixels, and for depth pictures depth_scale and unit"
+FORM = "A camera file has fx, fy, cx and cy in pixels, and for depth pictures depth_scale and unit"
 PINHOLE = ("fx", "fy", "cx", "cy")
 
 # Patterns of names, the better file first. Only the first group must hold a camera: the other names are

@@ -191,7 +191,7 @@ def _value(key: str, text: str) -> Any:
             raise ValueError
         return CORRECTED[key].parse(text)
     except (ValueError, OverflowError) as error:
-        what = f"'{shortened(text)}' is no value of {key}"
+        what = f"'{shortened(text)}' is not a value of {key}"
         raise InputError(what, hint=f"Give {CORRECTED[key].form}") from error
 
 

@@ -86,7 +86,7 @@ def read(path: Path) -> LandmarkSet:
     left_out = dict.fromkeys(_LEFT_OUT[name] for name in sections if name in _LEFT_OUT)
     remarks = [f"Scan4D leaves out these parts of the file: {' and '.join(left_out)}"] if left_out else []
     if flat:
-        remarks.append("Its landmarks have two coordinates: Scan4D sets z to 0")
+        remarks.append("The landmarks of the file have two coordinates: Scan4D sets z to 0")
     frames = _listed(own.get("frames"), individuals)
     names = own_names(own, count)
     if names is None:

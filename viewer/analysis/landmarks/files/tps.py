@@ -115,7 +115,7 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
     if curves:
         remarks.append(f"Scan4D leaves out {curves} curves")
     if any(specimen.is_flat for specimen in specimens):
-        remarks.append("Its landmarks have two coordinates: Scan4D sets z to 0")
+        remarks.append("The landmarks of the file have two coordinates: Scan4D sets z to 0")
     names = own_names(own, count)
     if names is None:
         names = [str(number) for number in range(1, count + 1)]

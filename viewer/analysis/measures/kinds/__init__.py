@@ -84,7 +84,9 @@ def kind_of(measure: Measure) -> MeasureKind:
         if kind.most not in (None, kind.least):
             wanted = f"{kind.least} to {kind.most}"
         raise InputError(
-            f"takes {wanted} landmarks, not {count}", f"{kind.title} '{measure.name}'", kind.about
+            f"this measure takes {wanted} landmarks, not {count}",
+            f"{kind.title} '{measure.name}'",
+            kind.about,
         )
     for name, value in measure.options.items():
         if name not in kind.choices:

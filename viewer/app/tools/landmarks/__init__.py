@@ -196,7 +196,7 @@ class Tool:
         """The words that say what a click does, and what arrow keys move."""
         if self.notebook.is_pinning:
             return "Note: click the position of the note. Esc to stop."
-        arrows = f" Arrow keys move {self.selected}." if self.takes_arrows else ""
+        arrows = f" The arrow keys move {self.selected}." if self.takes_arrows else ""
         return f"{self._prompt_of_click()}{arrows} Esc to stop."
 
     def _prompt_of_click(self) -> str:
