@@ -75,7 +75,7 @@ def test_any_real_type_and_order(order: str, dtype: str, tmp_path: Path) -> None
 def test_missing_frames_are_named(path: Path) -> None:
     np.savez(path, positions=SEQUENCE)
     assert read_times(path) is None
-    with pytest.raises(InputError, match=r"has no pose 4\. It holds 4, counted from 0"):
+    with pytest.raises(InputError, match=r"has no pose 4\. The file holds 4 poses, counted from 0"):
         read(path, 4)
 
 

@@ -137,7 +137,7 @@ def read(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Sc
     decided = decided or Decided()
     frames = frame_count(path, decided)
     if not 0 <= frame < frames:
-        raise InputError(f"has no pose {frame}", path, f"The file holds {frames}, counted from 0")
+        raise InputError(f"has no pose {frame}", path, f"The file holds {frames} poses, counted from 0")
     where = path if frames == 1 else f"{path}, {frame_in_words(frame)}"
     with one_message(where, f"cannot be read as {module.TITLE}"):
         return _scanned(module, path, frame, decided)
