@@ -242,3 +242,45 @@ def test_the_user_states_the_scale_of_colors(name: str, opened: Callable[..., Ti
     cloud = first(opened(name, frame, colors="65535"))
     np.testing.assert_allclose(cloud.colors[:, :3], COLORS / 257, atol=0.51)
     assert first(opened(name, frame, colors="none")).colors is None
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_user_states_the_axes(name: str, opened: Callable[..., Timeline]) -> None:
+    arrays = {"points": POINTS, "normals": np.tile(np.float32([0, 0.6, 0.8]), (COUNT, 1))}
+    with opened(name, arrays, axes="+x -z +y") as timeline:
+        cloud = timeline.pose(0).cloud
+        np.testing.assert_allclose(cloud.world(), POINTS[:, [0, 2, 1]] * (1, -1, 1), atol=1e-4)
+        if name != "LAS":
+            np.testing.assert_allclose(cloud.normals[0], (0, -0.8, 0.6), atol=1e-6)
+        assert timeline.reading["axes"].source == "user"
+        assert not timeline.messages
+
+
+@pytest.mark.parametrize("alpha", [0, 255, 7])
+def test_an_alpha_of_zero_everywhere_is_no_alpha(alpha: int, tmp_path: Path) -> None:
+    records = np.zeros(
+        5, [*((axis, "f4") for axis in "xyz"), *((c, "u1") for c in ("red", "green", "blue", "alpha"))]
+    )
+    records["x"], records["red"], records["alpha"] = np.arange(5), 9, alpha
+    kinds = "".join(f"property {PLY_TYPES[records.dtype[n].str[1:]]} {n}\n" for n in records.dtype.names)
+    head = f"ply\nformat binary_little_endian 1.0\nelement vertex 5\n{kinds}end_header\n"
+    (tmp_path / "a.ply").write_bytes(head.encode() + records.tobytes())
+    cloud = first(open_scan(tmp_path / "a.ply"))
+    np.testing.assert_array_equal(cloud.colors, [[9, 0, 0, alpha or 255]] * 5)
+
+
+def test_the_unit_that_a_comment_states(tmp_path: Path) -> None:
+    for number, remark in enumerate(("units: mm", "units: mm", "units: m")):
+        head = f"ply\nformat ascii 1.0\ncomment {remark}\nelement vertex 1\nproperty float x\n"
+        text = f"{head}property float y\nproperty float z\nend_header\n1 2 3\n"
+        (tmp_path / f"f{number}.ply").write_text(text)
+    with open_scan(tmp_path) as timeline:
+        assert timeline.pose(0).cloud is not None
+        assert timeline.unit == "mm"
+        assert not timeline.reading.contradictions
+        assert timeline.pose(2).cloud is not None
+        (found,) = timeline.reading.contradictions
+        assert (found.frame, found.key) == (2, "unit")
+    with open_scan(tmp_path, unit="ft") as timeline:
+        assert timeline.pose(0).cloud is not None
+        assert timeline.unit == "ft"

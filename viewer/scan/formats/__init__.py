@@ -42,6 +42,7 @@ from ..faces import Faces
 from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
+from ..reading.axes import note_turned
 from ..reading.cloud import assemble
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
@@ -167,6 +168,8 @@ def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, de
         scanned: Scanned = assemble(found, decided)
     else:
         scanned = found
+    if isinstance(scanned, PointCloud):
+        scanned = note_turned(scanned, decided)
     decided.note(Decision("format", module.TITLE, "file", path.suffix.lower()))
     return _with_points(scanned)
 

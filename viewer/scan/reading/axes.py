@@ -7,9 +7,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..points import PointCloud
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
+from .sequence import Decided
 
 KEY = "axes"
 LPS, RAS, UNKNOWN = "LPS", "RAS", "unknown"
@@ -43,6 +50,35 @@ def decide(remarks: Iterable[str], corrections: Corrections = NOTHING_CORRECTED)
         return Decision(KEY, space, "file", f"comment {remark}")
     why = f"The file does not state its axes. Scan4D assumes {LPS} where landmark files need them"
     return Decision(KEY, UNKNOWN, "assumed", why=why, alternatives=(LPS, RAS))
+
+
+def note_turned(cloud: PointCloud, decided: Decided) -> PointCloud:
+    """The cloud on the axes that the user states, such as "+x -z +y"; else as it is.
+
+    The record has the axes then, unless it has them already.
+    """
+    decided.note(decide((), decided.corrections))
+    rows = str(decided.corrections.get(KEY, "")).split()
+    if len(rows) != 3:
+        return cloud
+    turn = np.zeros((3, 3))
+    for row, word in enumerate(rows):
+        turn[row, "xyz".index(word[1])] = 1 if word[0] == "+" else -1
+    return turned(cloud, turn)
+
+
+def turned(cloud: PointCloud, turn: NDArray[np.float64]) -> PointCloud:
+    """The cloud with its coordinates exchanged and negated: turn (3, 3) is a signed permutation."""
+
+    def of(vectors: NDArray) -> NDArray:
+        return np.ascontiguousarray(vectors @ turn.T.astype(vectors.dtype))
+
+    others = {name: getattr(cloud, name) for name in ("normals", "remainders", "viewpoint", "axes")}
+    arrays = {name: values for name, values in others.items() if values is not None}
+    if (half_axes := arrays.pop("axes", None)) is not None:
+        half_axes = np.column_stack([of(half_axes[:, :3]), half_axes[:, 3]])
+    given: dict[str, Any] = {name: of(values) for name, values in arrays.items()}
+    return replace(cloud, positions=of(cloud.positions), origin=of(cloud.origin), axes=half_axes, **given)
 
 
 def landmark_space(decision: Decision) -> str:

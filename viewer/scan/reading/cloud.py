@@ -19,7 +19,7 @@ from ..admission import admit
 from ..colors import rgba8
 from ..contents import Deferred, PointContents
 from ..points import PointCloud, choose_origin, retained_rows
-from . import axes, colors, missing, splats
+from . import axes, colors, missing, splats, unit
 from .normals import with_usable_normals
 from .record import Decision, Source
 from .sequence import Decided
@@ -55,6 +55,7 @@ def assemble(contents: PointContents, decided: Decided) -> PointCloud:
     """
     columns = _by_role(contents, decided)
     decided.note(axes.decide(contents.remarks, decided.corrections))
+    unit.note_in_frame(contents, decided)
 
     def native(name: str) -> NDArray:
         column = np.asarray(columns.pop(name))
@@ -203,7 +204,8 @@ def _in_bytes(stored: Deferred, decided: Decided) -> Deferred:
 
     def make() -> NDArray[np.uint8]:
         values = np.asarray(stored)
-        return rgba8(values, colors.settled_scale(values, decided, lambda: _colors_of(decided.samples())))
+        full = colors.settled_scale(values, decided, lambda: _colors_of(decided.samples()))
+        return colors.visible(rgba8(values, full))
 
     return Deferred(make, stored.dtype, stored.size // stored.dtype.itemsize)
 
@@ -283,7 +285,7 @@ def _half_axes(ellipses: NDArray) -> tuple[NDArray, NDArray]:
         lengths = np.where(numbers[:, :2] > 0, numbers[:, :2], 0)
         with np.errstate(over="ignore", invalid="ignore"):
             tangent_length = np.linalg.norm(numbers[:, 2:], axis=1, keepdims=True)
-            unit = numbers[:, 2:] / np.where(tangent_length > 0, tangent_length, 1)
-            axes[rows] = np.hstack([lengths[:, :1] * unit, lengths[:, 1:]])
+            tangents = numbers[:, 2:] / np.where(tangent_length > 0, tangent_length, 1)
+            axes[rows] = np.hstack([lengths[:, :1] * tangents, lengths[:, 1:]])
             mean[rows] = np.sqrt(lengths.prod(axis=1))
     return axes, mean

@@ -107,6 +107,15 @@ def settled_scale(colors: NDArray, decided: Decided, others: Callable[[], Iterab
     return full
 
 
+def visible(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Colours (N, 4); opaque where the alpha of all is 0, as programs write that know no alpha."""
+    if not len(rgba) or rgba[:, 3].any():
+        return rgba
+    opaque = rgba.copy()
+    opaque[:, 3] = 255
+    return opaque
+
+
 def decide(evidence: Sequence[ColorEvidence], corrections: Corrections = NOTHING_CORRECTED) -> Decision:
     """The scale of the colours of a scan, from one frame or several; null where it has none.
 

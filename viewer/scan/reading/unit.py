@@ -9,11 +9,13 @@ import re
 from collections.abc import Iterable
 
 from ...bounds import Bounds
+from ..contents import PointContents
 from ..points import UNKNOWN_UNIT
 from ..units import conversion, is_length, usable_unit
 from ..upright import first_elevation
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
+from .sequence import Decided
 
 KEY = "unit"
 _USUAL = ("mm", "m", "cm")
@@ -62,6 +64,20 @@ def decide(
         return Decision(KEY, unit, "file", f"comment {remark}")
     why = "The file does not state its unit of length"
     return Decision(KEY, UNKNOWN_UNIT, "assumed", why=why, alternatives=_USUAL, changes_numbers=True)
+
+
+def note_in_frame(contents: PointContents, decided: Decided) -> None:
+    """Put the unit that a frame states into the record, where neither the user nor an earlier one states it.
+
+    A frame in another unit than that of an earlier one contradicts the record.
+    """
+    found, known = decide(contents.stated.unit, contents.remarks, decided.corrections), decided.reading[KEY]
+    if found.source != "file":
+        return
+    if known.value is None or known.source == "assumed":
+        decided.replace(found)
+    elif known.source == "file" and known.value != found.value:
+        decided.contradict(KEY, f"its unit is {found.value}, but that of the scan is {known.value}")
 
 
 def guess_unit(bounds: Bounds, up: str) -> tuple[str, str] | None:
