@@ -205,7 +205,7 @@ def _in_bytes(stored: Deferred, decided: Decided) -> Deferred:
     def make() -> NDArray[np.uint8]:
         values = np.asarray(stored)
         full = colors.settled_scale(values, decided, lambda: _colors_of(decided.samples()))
-        return colors.visible(rgba8(values, full))
+        return colors.opaque_if_unseen(rgba8(values, full))
 
     return Deferred(make, stored.dtype, stored.size // stored.dtype.itemsize)
 

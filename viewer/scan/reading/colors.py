@@ -107,7 +107,7 @@ def settled_scale(colors: NDArray, decided: Decided, others: Callable[[], Iterab
     return full
 
 
-def visible(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def opaque_if_unseen(rgba: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Colours (N, 4); opaque where the alpha of all is 0, as programs write that know no alpha."""
     if not len(rgba) or rgba[:, 3].any():
         return rgba
