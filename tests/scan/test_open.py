@@ -115,7 +115,7 @@ def test_nothing_to_open(tmp_path: Path) -> None:
     assert "holds no scan files. Known files: .asc, .csv, .exr, .las, .laz, .npy" in message(tmp_path)
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
     assert message(tmp_path).endswith("holds no scan files. Its folders: a9, a10, b")
-    assert "a.jpg: unknown file suffix '.jpg'. Known: .csv, .exr, .las, .laz" in message(
+    assert "a.jpg: unknown file suffix '.jpg'. Known: .asc, .csv, .exr, .las, .laz" in message(
         put(tmp_path, "a.jpg") / "a.jpg"
     )
     assert "is empty" in message_of_pose(put_empty(tmp_path / "empty.ply"))
@@ -361,8 +361,11 @@ def test_a_correction_that_changes_nothing_is_reported_once(tmp_path: Path) -> N
 
 def test_columns_that_do_not_fit_the_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "points.xyz").write_text("1 2 3 4\n")
-    with pytest.raises(InputError, match=r"has 4 columns, but --read columns= names 3"):
-        open_scan(tmp_path / "points.xyz", read={"columns": "x y z"})
+    with (
+        open_scan(tmp_path / "points.xyz", read={"columns": "x y z"}) as timeline,
+        pytest.raises(InputError, match=r"has 4 columns, but --read columns= names 3"),
+    ):
+        timeline.pose(0)
 
 
 def test_colors_and_normals_can_be_left_out(tmp_path: Path) -> None:

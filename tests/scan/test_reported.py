@@ -21,7 +21,6 @@ from viewer.analysis.landmarks.files import read_landmarks
 from viewer.errors import InputError
 
 # What Scan4D does not read rightly yet, by area. A mark goes with the work that makes its test pass.
-TABLES = pytest.mark.xfail(strict=True, reason="tables of landmarks")
 ARRAYS = pytest.mark.xfail(strict=True, reason="arrays and pictures")
 FRAMES = pytest.mark.xfail(strict=True, reason="frames and times")
 
@@ -280,7 +279,6 @@ def test_20_landmarks_in_the_axes_that_the_file_states(
     )
 
 
-@TABLES
 def test_21_landmarks_of_slicers_table(reported: Path) -> None:
     found = read_landmarks(reported / "21_slicer_table.csv")
     assert found.names == ("nose", "eyeL")
@@ -288,7 +286,6 @@ def test_21_landmarks_of_slicers_table(reported: Path) -> None:
     near(found.positions[0], [(1, 2, 3), (4, 5, 6)])
 
 
-@TABLES
 def test_21_slicers_table_in_ras_with_a_gap(tmp_path: Path) -> None:
     table = tmp_path / "points.csv"
     table.write_text(

@@ -61,7 +61,7 @@ BAD = {
     ("m.csv", 'name,x,y,z\n"a,1,2,3\n'): "is not a row of the table",
     ("m.csv", "name,x,y,z\na,1,2,3\na,1,2,3\n"): "line 3: 'a' appears twice",
     ("m.csv", "name,x,y,z\na,1,2,0x10\n"): "'0x10' is not a number",
-    ("m.csv", "name;x;y;z\na;1,5;2;3\n"): "Use a decimal point",
+    ("m.csv", "name;x;y;z\na;1,5;2.5;3\n"): "Use a decimal point",
     ("m.csv", f"{LONG}landmark,0,0,a,1,2,3,placed\n"): "frames are counted from 1",
     ("m.csv", f"{LONG}landmark,1.5,0,a,1,2,3,placed\n"): "the frame is '1.5'",
     ("m.csv", f"{LONG}landmark,1,0,a,1,2,3,lost\n"): "unknown state 'lost'",

@@ -60,7 +60,7 @@ def _whole(path: Path, decided: Decided) -> PointContents:
     if promised not in (None, len(table)):
         what = f"the count above its rows is {promised:,}, but there are {len(table):,} rows"
         decided.report("contradiction", f"{path.name}: {what}. Scan4D reads all rows")
-    names = _names(head, table, path.suffix.lower(), decided)
+    names = _names(head, table, path, decided)
     return PointContents(
         columns=named(zip(names, table.T, strict=True)),
         is_named=head.names is not None,
@@ -72,8 +72,11 @@ def _whole(path: Path, decided: Decided) -> PointContents:
 
 
 def frame_count(path: Path, decided: Decided) -> int:
-    """How many moments a table holds; it reads the columns of frames, times and ids where they have names."""
-    moments = _moments(path, decided)
+    """How many moments a table holds, by its columns of frames, times and ids; 1 where it cannot be read."""
+    try:
+        moments = _moments(path, decided)
+    except InputError:  # reading the points says why
+        return 1
     return 1 if moments is None else len(moments.numbers)
 
 
@@ -154,7 +157,7 @@ def _note_writing(head: TableHead, encoding: Decision, decided: Decided) -> None
     decided.note(encoding, separator, decimal, skip)
 
 
-def _names(head: TableHead, table: NDArray[np.float64], suffix: str, decided: Decided) -> list[str]:
+def _names(head: TableHead, table: NDArray[np.float64], path: Path, decided: Decided) -> list[str]:
     """The names of the columns that are read, and a decision about them."""
     if (stated := decided.corrections.decision(columns.KEY)) is not None:
         decided.note(stated)
@@ -162,10 +165,11 @@ def _names(head: TableHead, table: NDArray[np.float64], suffix: str, decided: De
     if head.names is not None:
         decided.note(columns.decide_named(head.names))
         return columns.canonical_names(head.names)
+    suffix = path.suffix.lower()
     decision = decided.settle(columns.KEY, lambda: columns.decide(table, suffix))
     if len(decision.value) != table.shape[1]:
         had, has = len(decision.value), table.shape[1]
-        decided.contradict(columns.KEY, f"it has {has} columns, but the frames before it have {had}")
+        decided.contradict(columns.KEY, f"{path.name} has {has} columns, but the frames before it have {had}")
         decision = columns.decide(table, suffix)
     return columns.names_of(decision.value)
 

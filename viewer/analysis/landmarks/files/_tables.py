@@ -14,6 +14,7 @@ import numpy as np
 
 from ....csv_text import text_of_cell
 from ....errors import InputError, shortened
+from ....scan.reading.numbers import dialect_of, point_form
 from ....scan.units import conversion, usable_unit
 from ...track import STATES, Known
 from ..landmark_set import LandmarkNotes, LandmarkSet, check_cells
@@ -22,8 +23,15 @@ from ._text import at_line, count_of, number_of, read_all
 LONG_COLUMNS = ("kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit")
 _KNOWN = {word: known for known, word in STATES.items()}
 _NAMES = ("name", "label", "landmark", "id")
+_SPACES = (
+    ("xyz", None),
+    ("lps", "LPS"),
+    ("ras", "RAS"),
+)  # columns of coordinates, and the axes that they state
+_SLICER = {"selected", "visible", "locked"}  # columns of 3D Slicer, whose lengths are millimetres
 _AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE | re.DOTALL)
 _FRAMES, _TIMES = ("frame", "frames"), ("time", "seconds", "t")
+_UNDEFINED = {"0", "false"}
 _HINT = "Give each row one value for each column that the first line names"
 
 
@@ -31,7 +39,7 @@ def has_columns(head: str) -> bool:
     """Whether the first line of a text names the columns of landmarks."""
     names = [name.strip().lower() for name in _cells(head.split("\n", 1)[0])]
     named = set(names) & {*_NAMES, "kind"}
-    return bool({"x", "y", "z"} <= set(names) and named) or len(_wide_columns(names)) > 0
+    return bool(_space_of(names) and named) or len(_wide_columns(names)) > 0
 
 
 def _cells(line: str) -> list[str]:
@@ -45,20 +53,27 @@ def _separator(line: str) -> str:
     return max(",;\t", key=line.count)
 
 
+def _space_of(names: Sequence[str]) -> tuple[str, str | None] | None:
+    """The columns of coordinates, "xyz", "lps" or "ras", and the axes that they state; None without any."""
+    return next((space for space in _SPACES if {*space[0]} <= {*names}), None)
+
+
 def read_table(path: Path) -> LandmarkSet:
-    """The landmarks of either table. Raises InputError."""
+    """The landmarks of either table, also of one with decimal commas. Raises InputError."""
     text = read_all(path)
     rows = _rows(text, _separator(text.split("\n", 1)[0]))
     _, head = next(rows, (0, []))
+    if dialect_of(text.splitlines(keepends=True)).decimal == ",":
+        rows = ((line, [point_form(cell.strip(), ",") or cell for cell in row]) for line, row in rows)
     names = [name.strip().lower() for name in head]
-    if {"x", "y", "z"} <= set(names):
-        return _long(rows, names)
+    if space := _space_of(names):
+        return _long(rows, names, *space)
     if columns := _wide_columns(head):
         return _wide(rows, names, columns)
     raise at_line(
         "has neither the columns x, y and z nor NAME_x, NAME_y and NAME_z",
         1,
-        "The first line must name the columns",
+        "The first line must name the columns; l, p and s or r, a and s are coordinates too",
     )
 
 
@@ -80,8 +95,8 @@ def _first(names: Sequence[str], wanted: Sequence[str]) -> int | None:
 class _Units:
     """The one unit of a table, to which the lengths of all rows are brought."""
 
-    def __init__(self) -> None:
-        self.unit: str | None = None
+    def __init__(self, unit: str | None = None) -> None:
+        self.unit = unit
 
     def factor(self, word: str, line: int) -> float:
         """Factor of the lengths of a row. Raises InputError for units that do not go together."""
@@ -107,12 +122,17 @@ def _frame(word: str, line: int) -> int:
     return frame - 1
 
 
-def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> LandmarkSet:
+def _long(
+    rows: Iterator[tuple[int, list[str]]], columns: Sequence[str], coordinates: str, space: str | None
+) -> LandmarkSet:
+    """The landmarks of a table with a row each. coordinates: names of their columns. space: their axes."""
     name_at, kind_at = _first(columns, _NAMES), _first(columns, ("kind",))
     frame_at, time_at = _first(columns, _FRAMES), _first(columns, _TIMES)
     state_at, sigma_at, unit_at = (_first(columns, (name,)) for name in ("state", "sigma", "unit"))
-    axes = [columns.index(axis) for axis in "xyz"]
-    units = _Units()
+    defined_at, about_at = _first(columns, ("defined",)), _first(columns, ("description",))
+    axes = [columns.index(axis) for axis in coordinates]
+    units = _Units("mm" if space and {*columns} >= _SLICER else None)
+    abouts: dict[str, str] = {}
     times: dict[int, float] = {}
     numbers: dict[str, int] = {}
     cells, numerals = array("q"), array("d")  # frame, number, line and state; x, y, z and sigma of each row
@@ -125,6 +145,10 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
         name = str(len(numbers) + 1) if name_at is None else text_of_cell(row[name_at].strip())
         factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
         place = [number_of(row[axis], line) * factor for axis in axes]
+        if defined_at is not None and row[defined_at].strip().lower() in _UNDEFINED:
+            place = [math.nan] * 3
+        if about_at is not None:
+            abouts.setdefault(name, text_of_cell(row[about_at].strip()))
         state = _state(None if state_at is None else row[state_at], place, line)
         sigma = math.nan if sigma_at is None else number_of(row[sigma_at], line) * factor
         cells.extend((frame, numbers.setdefault(name, len(numbers)), line, state))
@@ -153,7 +177,7 @@ def _long(rows: Iterator[tuple[int, list[str]]], columns: Sequence[str]) -> Land
         sigmas=values[:, 3].reshape(shape),
         times=np.array([times.get(frame, math.nan) for frame in frames.tolist()]),
         frames=None if frame_at is None else frames,
-        notes=LandmarkNotes(units.unit),
+        notes=LandmarkNotes(units.unit, [abouts.get(name, "") for name in numbers] if abouts else (), space),
     )
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ....errors import InputError, shortened
 from ....files import open_plain, parsed_json
+from ....scan.reading.numbers import HEAD, decoded, encoding_of
 from ...track import Known
 from ..landmark_set import LandmarkSet
 
@@ -37,10 +38,12 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
 
 
 def read_all(path: Path) -> str:
-    """The text of a file in UTF-8, or where it is none in Latin-1. Raises InputError for what is no text."""
+    """The text of a file in UTF-8 or UTF-16, or else in Latin-1. Raises InputError for what is no text."""
     data = read_bytes(path)
     if b"\0" in data:
-        raise InputError("is not text")
+        if not encoding_of(data[:HEAD]).startswith(("utf-16", "utf-32")):
+            raise InputError("is not text")
+        return decoded(data)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError:

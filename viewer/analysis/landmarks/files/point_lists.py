@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from ....errors import shortened
+from ....scan.reading.numbers import PLAIN, Dialect, dialect_of, point_form, split_line
 from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import at_line, count_of, is_number, number_of, numbered_lines
 
@@ -36,7 +37,10 @@ def owns(head: str) -> bool:
     return any(not is_number(word) for line in lines[:2] for word in _words(line)[:1])
 
 
-def _words(text: str) -> list[str]:
+def _words(text: str, dialect: Dialect = PLAIN) -> list[str]:
+    """The words of a line; numbers have a decimal point."""
+    if dialect.decimal == ",":
+        return [point_form(word, ",") or word for word in split_line(text, dialect) if word]
     return [word for word in re.split(r"[\s,;]+", text) if word]
 
 
@@ -47,7 +51,9 @@ def read(path: Path) -> LandmarkSet:
     names: list[str] = []
     rows: list[list[float]] = []
     waiting: tuple[int, str] | None = None  # a name whose coordinates come in the next line
-    for line, text in numbered_lines(path):
+    lines = numbered_lines(path)
+    dialect = dialect_of(text for _, text in lines)
+    for line, text in lines:
         if text.startswith(("#", "//", "{", "}")):
             continue
         if not rows and _VERSION.fullmatch(text):
@@ -57,7 +63,7 @@ def read(path: Path) -> LandmarkSet:
         if count and not rows and promised is None and waiting is None:
             promised = count_of(count[1], line, "the count"), line
             continue
-        words = _words(text)
+        words = _words(text, dialect)
         first = _place_in(words)
         if waiting is not None and first != 0:
             raise at_line(f"'{shortened(waiting[1])}' has no coordinates", waiting[0])
