@@ -73,7 +73,7 @@ BETWEEN = {
     *(f"a sphere of 10^{n} times the size, {place}" for n in (4, 6) for place in ("inside", "around")),
     "rotated by a quarter turn", "fitted, scaled by 10^-6", "float32 input", "telephoto x10^3",
     "zoomed in to 1/1000 of the scan's width", "zoomed in to 1/1000 of a splat's width", "zoomed out x10^6",
-    "normals within 10^-4 of y", "the list of points 1000 times",
+    "normals that deviate from the y axis by 10^-4 rad", "the list of points 1000 times",
 }  # fmt: skip
 LONG = {
     ("8192x1 pixels", "hpr"),

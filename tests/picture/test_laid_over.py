@@ -146,7 +146,7 @@ def test_what_is_no_layer_is_told(renderer: Renderer) -> None:
         with pytest.raises(InputError, match=f"the layer 'd' is .*{found}.*, expected 6,000 numbers"):
             drawn(renderer, POSE, camera_of(CLOUD), Layers({"d": values}))
     for matrix in (np.eye(3), 2 * np.eye(4), np.diag([1.0, 1, -1, 1]), np.full((4, 4), np.nan)):
-        with pytest.raises(InputError, match="not a rotation and a translation"):
+        with pytest.raises(InputError, match="must be a rotation and a translation"):
             Rigid(matrix)
 
 

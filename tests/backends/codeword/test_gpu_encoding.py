@@ -65,7 +65,7 @@ def encoded(renderer: Renderer, request: Request, size: tuple[int, int]) -> Enco
     words, ranks = read("words", np.uint64, starts[-1]), read("ranks", np.uint32, starts[-1])
     order = in_order(starts, words, ranks)
     packed, heads = read("elements", np.uint32, 4 * count).reshape(-1, 4), read("heads", np.uint32, count)
-    spread = encoder.ElementSpread.read(buffers.reserve("spread", 0).buffer)
+    spread = encoder.ElementSpread.read(renderer.gpu, buffers.reserve("spread", 0).buffer)
     rows = np.flatnonzero(packed[:, 2]).astype(np.uint32)
     packed, heads = packed[rows], heads[rows]
     shapes = np.empty((len(rows), SHAPE_COLUMNS), np.int32)
