@@ -44,6 +44,7 @@ from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
 from ..reading.axes import note_turned
 from ..reading.cloud import assemble
+from ..reading.hints import hint_for
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
 from ..reading.textures import paint
@@ -51,14 +52,6 @@ from ..times import frame_in_words
 from ._pictures import picture_colors
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
-_CONVERT = {  # what is not read, and what turns it into what is
-    ".e57": "Scan4D does not read E57. Convert it with 'pdal translate FILE.e57 FILE.ply' or CloudCompare",
-    ".bpf": "Scan4D does not read BPF. Convert it with 'pdal translate FILE.bpf FILE.ply'",
-    ".ptx": "Scan4D does not read PTX. Convert it with 'pdal translate FILE.ptx FILE.ply' or CloudCompare",
-    ".off": "Scan4D does not read OFF. Convert it into PLY with MeshLab or CloudCompare",
-    ".vtk": "Scan4D does not read VTK. Convert it into PLY with ParaView or CloudCompare",
-    ".stl": "Scan4D does not read STL. Convert it into PLY with MeshLab or CloudCompare",
-}
 _LONGEST_MESSAGE = 400  # characters
 
 
@@ -327,7 +320,7 @@ def _readable(path: Path) -> ModuleType:
         )
     suffix = path.suffix.lower()
     if suffix not in _formats():
-        hint = _CONVERT.get(suffix, f"Known: {', '.join(known_suffixes())}")  # one that is close is another
+        hint = hint_for(suffix, known_suffixes())  # a suffix that is close is another format
         raise InputError(f"unknown file suffix '{shortened(suffix)}'", path, hint)
     if status.st_size == 0:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")

@@ -1,0 +1,64 @@
+"""Hints for files that Scan4D does not read: what they are, and what turns them into what it reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+_CLOUDCOMPARE = "Convert it into PLY with CloudCompare"
+_MESHLAB = "Convert it into PLY or OBJ with MeshLab or Blender"
+_PARAVIEW = "Convert it into PLY with ParaView"
+_VOLUMES = "It holds a volume, no points. Make a surface of it in 3D Slicer, and save that as PLY"
+_RECORDING = "It holds a recording. Export depth pictures and the camera of it into a folder with"
+_ARCHIVE = "It is an archive. Unpack it, and open the folder"
+_SPLATS = "It holds packed Gaussian splats. Convert it into PLY with SuperSplat"
+
+_HINTS = {
+    ".e57": ("E57", "Convert it with 'pdal translate FILE.e57 FILE.ply', or with CloudCompare"),
+    ".bpf": ("BPF", "Convert it with 'pdal translate FILE.bpf FILE.ply'"),
+    ".ptx": ("PTX", "Convert it with 'pdal translate FILE.ptx FILE.ply', or with CloudCompare"),
+    **dict.fromkeys((".fls", ".lsproj", ".fws"), ("FARO scans", _CLOUDCOMPARE)),
+    **dict.fromkeys((".rcp", ".rcs"), ("ReCap projects", "Export E57 or PTS in ReCap, then convert it")),
+    **dict.fromkeys((".zfs", ".zfprj", ".ptg"), ("this scanner's format", _CLOUDCOMPARE)),
+    ".bin": ("BIN", "A .bin of CloudCompare: save it as PLY. Of COLMAP: 'colmap model_converter' writes TXT"),
+    **dict.fromkeys(
+        (".stl", ".off", ".3mf", ".3ds", ".dae", ".fbx", ".wrl", ".x3d"), ("this mesh format", _MESHLAB)
+    ),
+    **dict.fromkeys((".glb", ".gltf"), ("glTF", _MESHLAB)),
+    **dict.fromkeys((".usd", ".usda", ".usdc", ".usdz"), ("USD", "Export PLY or OBJ with Blender")),
+    ".abc": ("Alembic", "Export each frame as PLY or OBJ with Blender"),
+    ".blend": ("Blender's files", "Export PLY or OBJ with Blender"),
+    ".drc": ("Draco", "Convert it with 'draco_decoder -i FILE.drc -o FILE.ply'"),
+    **dict.fromkeys((".vtk", ".vtp", ".vtu", ".vti", ".pvd", ".vtm"), ("VTK", _PARAVIEW)),
+    **dict.fromkeys((".bag",), ("bags", f"{_RECORDING} 'rs-convert' (RealSense) or ROS")),
+    **dict.fromkeys((".db3", ".mcap"), ("bags", f"{_RECORDING} ROS")),
+    ".mkv": ("MKV", f"{_RECORDING} Open3D's 'azure_kinect_mkv_reader.py'"),
+    ".r3d": ("R3D", "It is a zip archive of Record3D. Export PLY or EXR with RGB-D in Record3D"),
+    ".oni": ("ONI", f"{_RECORDING} OpenNI"),
+    ".svo2": ("recordings of ZED", f"{_RECORDING} the ZED SDK"),
+    **dict.fromkeys((".dcm", ".dicom", ".ima"), ("DICOM", _VOLUMES)),
+    **dict.fromkeys((".nii", ".nrrd", ".nhdr", ".mha", ".mhd"), ("this image format", _VOLUMES)),
+    **dict.fromkeys((".splat", ".ksplat", ".spz", ".sog"), ("this format of splats", _SPLATS)),
+    **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz"), ("archives", _ARCHIVE)),
+    **dict.fromkeys((".xlsx", ".xls", ".ods"), ("spreadsheets", "Save the sheet as CSV")),
+    **dict.fromkeys((".mat", ".h5", ".hdf5", ".pkl", ".pt"), ("this array format", "Save the arrays as NPZ")),
+    **dict.fromkeys((".mp4", ".mov", ".avi"), ("films", "A film holds no depth. Open the scan's own files")),
+    **dict.fromkeys(
+        (".png", ".jpg", ".jpeg", ".bmp"),
+        ("a picture alone", "Open its folder: depth pictures need the camera beside them"),
+    ),
+    **dict.fromkeys((".c3d", ".trc"), ("marker recordings", "It holds landmarks. Import it in the window")),
+}  # fmt: skip
+
+
+def hint_for(suffix: str, known: Iterable[str]) -> str:
+    """What to do with a file whose suffix, in lower case, Scan4D does not read. known: the suffixes that it
+    reads."""
+    if suffix in _HINTS:
+        what, advice = _HINTS[suffix]
+        return f"Scan4D does not read {what}. {advice}"
+    return f"Known: {', '.join(known)}"
+
+
+def hinted_suffixes() -> list[str]:
+    """The suffixes that have a hint of their own, sorted."""
+    return sorted(_HINTS)
