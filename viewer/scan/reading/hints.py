@@ -51,7 +51,7 @@ _HINTS = {
 
 
 def hint_for(suffix: str, known: Iterable[str]) -> str:
-    """What to do with a file whose suffix, in lower case, Scan4D does not read. known: the suffixes that it
+    """Say what to do with a file whose suffix, in lower case, Scan4D does not read. known: those that it
     reads."""
     if suffix in _HINTS:
         what, advice = _HINTS[suffix]
