@@ -161,3 +161,40 @@ def test_a_preview_of_what_cannot_be_read(tmp_path: Path) -> None:
 def test_the_head_is_found_below_many_remarks() -> None:
     head = head_of([*(f"remark {number}\n" for number in range(60)), "1 2 3\n", "4 5 6\n"] + ["7 8 9\n"] * 60)
     assert (head.skip, head.columns) == (60, (0, 1, 2))
+
+
+# --- point files in text ------------------------------------------------------------------------
+
+PLY = "ply\nformat ascii 1.0\nelement vertex 2\n{}end_header\n"
+PCD = (
+    "VERSION .7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n"
+)
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.ply", PLY.format(XYZ) + "1,25 2,5 3,75\n4 5,5 6\n"),
+        ("a.ply", PLY.format(XYZ + "property list uchar int q\n") + "1,25 2,5 3,75 1 7\n4 5,5 6 2 8 9\n"),
+        ("a.ply", PLY.format(XYZ.replace(" x", " x_mm").replace(" y", " y_mm").replace(" z", " z_mm"))
+         + "1.25 2.5 3.75\n4 5.5 6\n"),
+        ("a.ply", PLY.format(XYZ.replace("x", "Points_0").replace("float y", "float Points_1")
+         .replace("float z", "float Points_2")) + "1.25 2.5 3.75\n4 5.5 6\n"),
+        ("a.pcd", PCD + "1,25 2,5 3,75\n4 5,5 6\n"),
+        ("a.pcd", PCD + "1,25;2,5;3,75\n4;5,5;6\n"),
+        ("a.pcd", PCD + "1.25,2.5,3.75\n4,5.5,6\n"),
+        ("a.obj", "v 1,25 2,5 3,75\nv 4 5,5 6\n"),
+    ],
+)  # fmt: skip
+def test_numbers_and_names_of_point_files(name: str, text: str, tmp_path: Path) -> None:
+    with open_scan(save(tmp_path / name, text)) as timeline:
+        np.testing.assert_array_equal(timeline.pose(0).cloud.world(), [[1.25, 2.5, 3.75], [4, 5.5, 6]])
+        assert timeline.unit == ("mm" if "x_mm" in text else "units")
+
+
+def test_signs_in_numbers_of_point_files(tmp_path: Path) -> None:
+    text = PLY.format(XYZ + "property float q\n") + "1 2 3 1.#QNAN\n4 5 -1.#IND 7\n"
+    cloud = formats.read(save(tmp_path / "a.ply", text))
+    np.testing.assert_array_equal(cloud.world(), [[1, 2, 3]])
+    assert np.isnan(cloud.scalars["q"]).all()

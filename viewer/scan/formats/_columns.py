@@ -14,6 +14,7 @@ from ..admission import LONGEST_LINE
 from ..points import PointCloud
 from ..reading import numbers
 from ..reading.cloud import ELLIPSES, GEOMETRY
+from ..reading.columns import canonical_names
 from ._precision import is_enough
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
@@ -24,13 +25,18 @@ T = TypeVar("T")
 def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
     """Columns by name; the fourth is called `column_4` where it has none.
 
-    Of several scalars of one name the second is called `name_2`, and so on.
+    Columns that other programs call `Points:0` or `x [mm]` are called x here, see `canonical_names`. Of
+    several scalars of one name the second is called `name_2`, and so on.
 
     Raises InputError where two columns have a name of geometry, in any case: nobody knows which counts.
     """
     columns: dict[str, NDArray] = {}
     seen: dict[str, int] = {}
-    for index, (name, column) in enumerate(pairs, 1):
+    names, values = [], []
+    for name, column in pairs:
+        names.append(name)
+        values.append(column)
+    for index, (name, column) in enumerate(zip(canonical_names(names), values, strict=True), 1):
         name = name or f"column_{index}"
         key = name.lower() if name.lower() in GEOMETRY else name
         seen[key] = seen.get(key, 0) + 1

@@ -216,10 +216,8 @@ def _grid(words: dict[str, list[str]], points: int) -> tuple[int, int] | None:
 
 
 def _read_ascii(stream: BinaryIO, header: _Header) -> Columns:
-    start = stream.read(_HEADER_LIMIT)
     stream.seek(header.size)
-    delimiter = "," if b"," in start else None
-    table = parse_table(text_lines(stream), delimiter=delimiter, rows=header.points)
+    table = parse_table(text_lines(stream), rows=header.points)
     if len(table) < header.points:
         raise too_few(len(table), header.points, "points")
     ends = np.cumsum([f.count for f in header.fields])

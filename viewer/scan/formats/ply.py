@@ -23,10 +23,12 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...task import checkpoint
 from ..admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
-from ..contents import PointContents
+from ..contents import PointContents, Stated
 from ..faces import Faces
 from ..points import PointCloud
 from ..reading.cloud import assemble, listed
+from ..reading.columns import has_positions, unit_in_names
+from ..reading.numbers import value
 from ..reading.sequence import Decided
 from ._columns import (
     Columns,
@@ -69,8 +71,9 @@ def contents(path: Path, frame: int = 0) -> PointContents:
         before, vertex = header.elements[: names.index("vertex")], header.elements[names.index("vertex")]
         if not vertex.count:
             raise InputError("holds no vertices")
-        if not {"x", "y", "z"} <= {p.name.lower() for p in vertex.numbers}:
-            odd, found = header.odd_lines, listed(p.name for p in vertex.numbers)
+        properties = [p.name for p in vertex.numbers]
+        if not has_positions(properties):
+            odd, found = header.odd_lines, listed(properties)
             reason = f": PLY has no header line '{odd[0]}'" if odd else f" among the columns: {found}"
             raise InputError(f"no x, y and z{reason}")
         if len(names) == 1 and header.encoding != "ascii":
@@ -82,7 +85,10 @@ def contents(path: Path, frame: int = 0) -> PointContents:
         columns = read_rows(stream, vertex, header.encoding)
         faces = _faces(stream, header, len(before) + 1)
         return PointContents(
-            columns=columns, remarks=header.remarks, topology=topology_of(vertex.count, faces)
+            columns=columns,
+            stated=Stated(unit=unit_in_names(properties)),
+            remarks=header.remarks,
+            topology=topology_of(vertex.count, faces),
         )
 
 
@@ -219,7 +225,7 @@ def _walk_lines(lines: Iterable[str], element: Element) -> NDArray[np.float64]:
                     raise negative_list(f"row {row} of {element.name}")
                 at += 1 + length
             else:
-                values.append(float(words[at]))
+                values.append(value(words[at], "," if "," in words[at] else "."))
                 at += 1
         if at > len(words):
             raise InputError(f"row {row} of {element.name} ends within a list")
