@@ -37,6 +37,10 @@ class InputError(Scan4DError):
     exit_code = 2
 
 
+class EmptyFrame(InputError):
+    """A frame that is complete and holds no points."""
+
+
 class MissingPackageError(InputError, ModuleNotFoundError):
     """A library that is not installed (viewer/imports.py)."""
 

@@ -22,7 +22,6 @@ from viewer.errors import InputError
 
 # What Scan4D does not read rightly yet, by area. A mark goes with the work that makes its test pass.
 ARRAYS = pytest.mark.xfail(strict=True, reason="arrays and pictures")
-FRAMES = pytest.mark.xfail(strict=True, reason="frames and times")
 
 RED, GREEN, BLUE, YELLOW = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]
 
@@ -403,7 +402,6 @@ def test_35_a_byte_order_mark(reported: Path) -> None:
     assert len(only(reported / "35_bom.ply")) == 3
 
 
-@FRAMES
 def test_36_an_empty_frame_is_an_empty_picture(
     reported: Path, command: Callable[..., Done], tmp_path: Path
 ) -> None:

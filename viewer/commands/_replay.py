@@ -130,7 +130,7 @@ def _opened(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int, E
 
 def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     """The picture of an entry, anonymous where it or the arguments are. Raises InputError."""
-    pose, start = timeline.pose(entry.pose), float(timeline.times[0])
+    pose, start = timeline.drawn(entry.pose), float(timeline.times[0])
     entry = replace(entry, look=replace(entry.look, quality=args.quality or entry.look.quality))
     if entry.anonymous:
         return entry.request(anonymous_pose(pose, start))
@@ -152,7 +152,7 @@ def _completed(entry: Entry, request: Request, args: Namespace, opened: _Opened)
         return shown
     time = float(request.pose.time)
     world_from_pose = matrix_of(request.layers.world_from_pose)
-    if not entry.anonymous:
+    if not entry.anonymous and request.pose.count:
         shown = shown.drawn_from(middle_of(opened.timeline.pose(entry.pose)))
     return replace(
         shown, time=time, camera=request.camera, look=request.look, place=world_from_pose

@@ -85,22 +85,23 @@ def _poses_between(text: str, timeline: Timeline) -> list[int]:
     return indices
 
 
-def read_poses(timeline: Timeline, indices: Sequence[int]) -> Iterator[Pose]:
+def read_poses(timeline: Timeline, indices: Sequence[int], with_empty: bool = False) -> Iterator[Pose]:
     """The poses of these indices, the next one being read while one is in use.
 
-    Where several are asked for, broken ones are reported and left out. Raises InputError
-    where none is left.
+    Where several are asked for, broken ones are reported and left out, and empty ones too. with_empty: empty
+    ones come as poses without points. Raises InputError where no pose with points is left.
     """
+    read = timeline.drawn if with_empty and len(indices) > 1 else timeline.pose
     said, found = 0, False
     for number, index in enumerate(indices):
         try:
-            pose = timeline.pose(index)
+            pose = read(index)
         except InputError:
             if len(indices) == 1:
                 raise
             said = report(timeline, said)
             continue
-        said, found = report(timeline, said), True
+        said, found = report(timeline, said), found or pose.count > 0
         if number + 1 < len(indices):
             timeline.request(indices[number + 1])
         yield pose

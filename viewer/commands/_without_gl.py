@@ -32,7 +32,7 @@ from . import _arguments as arguments
 from . import _drawing as drawing
 from ._console import progress, say, tell, warn
 from ._outputs import claim
-from ._scans import chosen_poses, frame_title, open_timeline, read_poses, stated_upright
+from ._scans import chosen_poses, first_readable, frame_title, open_timeline, read_poses, stated_upright
 
 BACKEND = "codeword"
 _SUFFIXES = (".png", ".npz", FILM_SUFFIX, SUFFIX)
@@ -105,10 +105,12 @@ def _draw(args: Namespace) -> None:
         claim(drawing.outputs(args.out, [shot.number for shot in shots]), inputs, args.force)
         look = drawing.ranged(look, timeline, indices)
         camera_of = None if camera is None else lambda shot: camera
+        poses = list(dict.fromkeys(shot.pose for shot in shots))
         draw = partial(draw_words, window=params.window, background=_background(args.behind, size))
         with _written(args.out, size, times, draw) as put, progress(len(shots), args.progress) as tick:
-            for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
-                camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
+            for pose in read_poses(timeline, poses, with_empty=True):
+                first = pose if pose.count or camera_of else first_readable(timeline, poses)
+                camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, first)
                 known = _with_estimates(pose, params)
                 own = _own_look(look, known, frame_title(timeline, pose.index), several=len(indices) > 1)
                 for shot in shots:

@@ -75,7 +75,7 @@ def scan_facts(timeline: Timeline, pose: Pose) -> dict[str, Any]:
         },
         "pose": pose.index,
         "label": pose.label,
-        "unreadable": len(timeline.broken),
+        "unreadable": len(timeline.broken.keys() - timeline.empty),
         "points": found.count,
         "dropped": pose.dropped + found.dropped,
         "bytes": pose.nbytes,

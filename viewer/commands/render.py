@@ -47,6 +47,7 @@ from ._scans import (
     SCAN_HELP,
     add_pose_arguments,
     chosen_poses,
+    first_readable,
     frame_title,
     open_timeline,
     read_poses,
@@ -235,15 +236,17 @@ def _requests(
     size, look, values, camera, upright, backend, goal = wanted
     chosen, choice = None, None
     camera_of = None if camera is None else lambda shot: camera
-    for pose in read_poses(timeline, list(dict.fromkeys(shot.pose for shot in shots))):
-        camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, pose)
+    indices = list(dict.fromkeys(shot.pose for shot in shots))
+    for pose in read_poses(timeline, indices, with_empty=True):
+        first = pose if pose.count or chosen else first_readable(timeline, indices)
+        camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, first)
         if chosen is None and goal is not None:
-            first = next(shot for shot in shots if shot.pose == pose.index)
-            choice = choice_of(pose, camera_of(first), size, goal, timeline.unit, args.device)
+            shown = next(shot for shot in shots if shot.pose == first.index)
+            choice = choice_of(first, camera_of(shown), size, goal, timeline.unit, args.device)
             chosen = choice.configuration.backend, choice.configuration.params
-        chosen = chosen or backend_for(pose, backend, values)
+        chosen = chosen or backend_for(first, backend, values)
         own = drawable(look, pose.overview.scalars, find_backend(chosen[0]).values)
-        if own is not look:
+        if own is not look and pose.count:
             title = frame_title(timeline, pose.index)
             warn(f"{timeline.name}: {title} has no '{look.color_by}', so Scan4D uses other colours")
         for shot in shots:

@@ -30,7 +30,15 @@ from ..scan.timeline import Timeline
 from . import _drawing as drawing
 from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
-from ._scans import SCAN_HELP, framing, open_timeline, read_poses, stated_corrections, stated_upright
+from ._scans import (
+    SCAN_HELP,
+    first_readable,
+    framing,
+    open_timeline,
+    read_poses,
+    stated_corrections,
+    stated_upright,
+)
 from .doctor import display
 
 _SIZE = (1200, 800)
@@ -178,8 +186,9 @@ def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     ):
         bounds = framing(timeline, indices)
         camera = None
-        for pose in read_poses(timeline, indices):
-            camera = camera or first_camera(pose.views, bounds, _SIZE[0] / _SIZE[1], upright)
+        for pose in read_poses(timeline, indices, with_empty=True):
+            first = pose if pose.count or camera else first_readable(timeline, indices)
+            camera = camera or first_camera(first.views, bounds, _SIZE[0] / _SIZE[1], upright)
             draw(renderer, Request(pose, camera, look=Look(up=upright.up)), surface)
             image = surface.image()
             write_png(image, f"{name}_{pose.index:04d}.png")

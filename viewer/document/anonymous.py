@@ -34,7 +34,7 @@ def anonymous_request(request: Request, start: float) -> Request:
     pose, and a scalar has its number for a name.
     """
     pose = request.pose
-    middle = middle_of(pose)
+    middle = middle_of(pose) if pose.count else np.array(request.camera.target)
     look = raised(unnamed(request.look, request.layers.names(pose.overview.scalars)), -middle)
     layers = replace(request.layers, world_from_pose=request.layers.world_from_pose.in_frame(middle))
     anonymous, camera = anonymous_pose(pose, start), request.camera.moved(-middle)
@@ -44,7 +44,7 @@ def anonymous_request(request: Request, start: float) -> Request:
 @lru_cache(maxsize=1)  # several pictures of one pose share what is uploaded of it
 def anonymous_pose(pose: Pose, start: float) -> Pose:
     """The pose with its middle at zero, seconds counted from `start`, and without names."""
-    middle = middle_of(pose)
+    middle = middle_of(pose) if pose.count else pose.origin
     views = tuple(_anonymous_view(view, middle, number) for number, view in enumerate(pose.views))
     if isinstance(pose.points, PointCloud):
         points: PointCloud | RangePoints = pose.points.moved(-middle)

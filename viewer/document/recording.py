@@ -203,7 +203,7 @@ class Entry:
 
     def _overlay(self, pose: Pose, notes: Iterable[Note]) -> Overlay | None:
         """Landmarks, lines and pinned notes, where the scan is moved to; None where the marks show none."""
-        marks, radius, motion = self.marks, pose.bounds.radius, self.motion
+        marks, radius, motion = self.marks, pose.drawn_bounds().radius, self.motion
         slack = float(slack_before(0.0, 0.0, radius))
         landmarks = [
             (

@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import EmptyFrame, InputError, unknown_name
 from ..geometry import AXES, nearest_axis, vector
 from ..rigid import is_rigid
 from .colors import srgb8
@@ -340,7 +340,7 @@ def _cloud(
     )
     if not len(cloud):
         what = "holds no points: no pixel inside the masks has a depth"
-        raise InputError(
+        raise EmptyFrame(
             what, hint=("Check the masks, and whether the depths are in the right unit and format")
         )
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])

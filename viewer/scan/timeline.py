@@ -11,13 +11,14 @@ import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import InputError, shortened
+from ..errors import EmptyFrame, InputError, shortened
 from ..task import Cancelled, Task
 from .cache import PoseCache, default_budget
 from .faces import Faces
@@ -38,15 +39,16 @@ _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
 class ScanMessage:
     """A message about a scan for the user.
 
-    kind: "broken" (the frame cannot be read), "dropped" (points that are not finite or not measured were left
-    out), "shortened" (splats far larger than the scan were), "unit" (lengths in another unit than the scan's,
-    or a name of it that is no unit), "assumed" (what range views do not state), "times" or "beside"
-    (files in its folder may be another scan), "normals", "camera", "aside" (files that the scan leaves out),
-    "take" (its folder holds several), "contradiction" (a frame does not fit the scan's decisions) or
-    "correction" (one that nothing uses). index: the frame; None where it concerns all.
+    kind: "broken" (the frame cannot be read), "empty" (it holds no points), "dropped" (points that are
+    not finite or not measured were left out), "shortened" (splats far larger than the scan were), "unit"
+    (lengths in another unit than the scan's, or a name of it that is no unit), "assumed" (what range
+    views do not state), "times" or "beside" (files in its folder may be another scan), "normals",
+    "camera", "aside" (files that the scan leaves out), "take" (its folder holds several), "contradiction"
+    (a frame does not fit the scan's decisions) or "correction" (one that nothing uses). index: the frame;
+    None where it concerns all.
     """
 
-    kind: Literal["broken", "dropped", "shortened", "beside"] | ReportKind
+    kind: Literal["broken", "empty", "dropped", "shortened", "beside"] | ReportKind
     text: str
     index: int | None = None
 
@@ -163,9 +165,18 @@ class Timeline:
 
     @property
     def broken(self) -> dict[int, InputError]:
-        """The frames found unreadable so far, and why."""
+        """The frames found unreadable or empty so far, and why."""
         with self._state:
             return dict(self._broken)
+
+    @property
+    def empty(self) -> frozenset[int]:
+        """The frames found so far that hold no points, beside others that do."""
+        with self._state:
+            found = self._broken.items()
+            return frozenset(
+                index for index, error in found if isinstance(error, EmptyFrame) and len(self) > 1
+            )
 
     @property
     def loading(self) -> Task | None:
@@ -210,6 +221,16 @@ class Timeline:
         if begun is None:
             self._load(index, future)
         return future.result()
+
+    def drawn(self, index: int) -> Pose:
+        """The pose that a picture shows: as `pose` gives it, or one without points where the frame of a
+        sequence is empty. Raises InputError as `pose` does for other frames."""
+        try:
+            return self.pose(index)
+        except EmptyFrame:
+            if len(self) == 1:
+                raise
+            return Pose(index, float(self.times[index]), self.label(index), _no_points())
 
     def visit(self, index: int) -> Pose:
         """One pose as `pose` gives it, for who goes through all frames: one that is read for this takes no
@@ -291,8 +312,11 @@ class Timeline:
         """Note why a frame cannot be read, once; returns the error to raise. Runs locked."""
         if index not in self._broken:
             self._broken[index] = _at_rest(error, len(self._broken) < _TRACEBACKS)
-            what = f"Scan4D leaves out {frame_in_words(index)}: {error}"
-            self.messages.append(ScanMessage("broken", what, index))
+            is_empty = isinstance(error, EmptyFrame) and len(self) > 1
+            kind: Literal["empty", "broken"] = "empty" if is_empty else "broken"
+            done = "shows an empty picture for" if is_empty else "leaves out"
+            what = f"Scan4D {done} {frame_in_words(index)}: {error}"
+            self.messages.append(ScanMessage(kind, what, index))
         return copy.copy(self._broken[index])
 
     def _held(self, index: int) -> Pose | None:
@@ -455,6 +479,11 @@ class Timeline:
         with self._state:
             if not any(notice.kind == kind for notice in self.messages):
                 self.messages.append(ScanMessage(kind, text, index))
+
+
+@cache
+def _no_points() -> PointCloud:
+    return PointCloud.from_arrays(np.zeros((0, 3), np.float32))
 
 
 def _checked_times(times: ArrayLike, source: FrameSource) -> NDArray[np.float64]:

@@ -137,7 +137,7 @@ def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
         ({"SIZE": "4 4 3 4 8 2"}, "unknown PCD type and size 'F3'"),
         ({"COUNT": f"1 1 1 1 {10**12} 1"}, "has 1,000,000,000,005 values a point, more than the 4,096"),
         ({"COUNT": "1 1 1 1 0 1"}, "promises 3 points"),
-        ({"POINTS": "0"}, "promises 0 points"),
+        ({"POINTS": "0"}, "holds no points"),
         ({"POINTS": "-3"}, "promises -3 points"),
         ({"POINTS": "9" * 5000}, "the number of points is .9+\\.\\.\\.., which is not a usable whole number"),
         ({"COUNT": "1 1 1 1 x 1"}, "a COUNT is .x., which is not a usable whole number"),

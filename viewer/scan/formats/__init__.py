@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, Scan4DError, explained, shortened, unknown_name
+from ...errors import EmptyFrame, InputError, Scan4DError, explained, shortened, unknown_name
 from ...extensions import load_modules, package_of
 from ...files import whole_file
 from ..admission import admit
@@ -206,7 +206,7 @@ def frames(path: Path | str, decided: Decided | None = None) -> Callable[[int], 
 def _with_points(scanned: Scanned) -> Scanned:
     if isinstance(scanned, PointCloud) and not len(scanned):
         what = f"none of its {scanned.dropped} points has finite coordinates"
-        raise InputError(what if scanned.dropped else "holds no points")
+        raise EmptyFrame(what if scanned.dropped else "holds no points")
     return scanned
 
 
@@ -339,7 +339,8 @@ def one_message(
         with np.errstate(all="ignore"):
             yield
     except Scan4DError as error:
-        raise InputError(_bounded(error.what), error.where or where, error.hint or hint) from error
+        kind = EmptyFrame if isinstance(error, EmptyFrame) else InputError
+        raise kind(_bounded(error.what), error.where or where, error.hint or hint) from error
     except MemoryError as error:
         raise InputError(f"{failed}: not enough memory", where, "Close other programs") from error
     except OSError as refused:

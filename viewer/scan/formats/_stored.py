@@ -13,7 +13,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import EmptyFrame, InputError
 from ..admission import MOST_FRAMES, check_count
 
 _CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
@@ -74,7 +74,7 @@ class StoredArray:
         if self.dtype.kind not in "fiu":
             raise InputError(f"array '{self.name}' is of type {self.dtype}, expected numbers")
         if not self.nbytes:
-            raise InputError(f"holds no points: array '{self.name}' has shape {self.shape}")
+            raise EmptyFrame(f"holds no points: array '{self.name}' has shape {self.shape}")
         check_count(math.prod(self.shape[:-2]), MOST_FRAMES, "frames")
         return self.shape[:-2]
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import EmptyFrame, InputError
 from ...helper import start_python
 from ...task import checkpoint
 from ...unfinished import temporary_folder
@@ -142,7 +142,9 @@ def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:
                 parts.setdefault(name, []).append(values)
         done += len(points)
     if not done:
-        raise InputError("holds no points" if not count else "holds none of the points that it promises")
+        if not count:
+            raise EmptyFrame("holds no points")
+        raise InputError("holds none of the points that it promises")
     if done < count:
         raise too_few(done, count, "points")
     columns = {name: np.concatenate(parts.pop(name)) for name in list(parts)}

@@ -21,7 +21,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, shortened, unknown_name
+from ...errors import EmptyFrame, InputError, shortened, unknown_name
 from ...rigid import rigid_matrix
 from ..admission import (
     MOST_COLUMNS,
@@ -198,6 +198,8 @@ def _read_header(head: bytes) -> _Header:
             raise unknown_name("PCD type and size", code[:_LONGEST_WORD], list(_TYPES))
     sides = words["POINTS"] if "POINTS" in words else words["WIDTH"] + words["HEIGHT"]
     points = math.prod(whole_number(side, "the number of points") for side in sides)
+    if points == 0:
+        raise EmptyFrame("holds no points, as its header states")
     if points < 1 or min(counts) < 1:
         raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
     check_count(sum(counts), MOST_COLUMNS, "values a point")

@@ -20,7 +20,7 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import EmptyFrame, InputError
 from ...task import checkpoint
 from ..admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
 from ..contents import PointContents, Stated
@@ -70,7 +70,7 @@ def contents(path: Path, frame: int = 0) -> PointContents:
             raise InputError(f"has no vertex element, only: {listed(names)}")
         before, vertex = header.elements[: names.index("vertex")], header.elements[names.index("vertex")]
         if not vertex.count:
-            raise InputError("holds no vertices")
+            raise EmptyFrame("holds no vertices")
         properties = [p.name for p in vertex.numbers]
         if not has_positions(properties):
             odd, found = header.odd_lines, listed(properties)
