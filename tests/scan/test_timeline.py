@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import InputError
+from viewer.scan import points
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline
@@ -100,6 +101,27 @@ def test_a_pose_knows_its_place_and_is_read_once() -> None:
         assert (pose.index, pose.time, pose.label) == (3, pytest.approx(0.3), "3.fake")
         assert scan.pose(3) is pose is scan.ready(3)
     assert source.loads == [3]
+
+
+def test_who_draws_a_pose_finds_no_bounds_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The thread that reads has found them."""
+    searches: list[threading.Thread] = []
+    for name in ("_extremes", "_quantile_box"):
+        find = getattr(points, name)
+        monkeypatch.setattr(
+            points,
+            name,
+            lambda *given, find=find: (searches.append(threading.current_thread()), find(*given))[1],
+        )
+    with timeline(Frames()) as scan:
+        scan.request(3)
+        wait_until(lambda: scan.ready(3))
+        pose = scan.ready(3)
+        assert pose is not None
+        searches.clear()
+        assert (pose.drawn_bounds().center == 3).all()
+        assert pose.cloud.longest_reach() == 0
+    assert searches == []
 
 
 def test_iteration_gives_all_poses_in_order() -> None:

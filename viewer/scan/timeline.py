@@ -396,7 +396,7 @@ class Timeline:
         """Read a pose outside the lock and note what came of it; the future gets the pose or the error."""
         try:
             pose = self._shared(self._read(index))
-            pose.drawn_bounds()  # which the first picture needs: found here, on the thread that reads
+            _find_what_pictures_need(pose)
             self.finish(pose)
         except BaseException as error:
             with self._state:
@@ -508,3 +508,10 @@ def _at_rest(error: InputError, has_traceback: bool) -> InputError:
     if has_traceback:
         stored.add_note("".join(traceback.format_exception(error)))
     return stored
+
+
+def _find_what_pictures_need(pose: Pose) -> None:
+    """Let the points remember their bounds and largest splat: here, on the thread that reads."""
+    pose.drawn_bounds()
+    if isinstance(pose.points, PointCloud):
+        pose.points.longest_reach()

@@ -64,8 +64,7 @@ def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
     radii = cloud.splat_reach()
     sample = radii[:: max(1, len(radii) // _SAMPLE)]
     known = sample[(sample > 0) & np.isfinite(sample)]
-    largest = float(radii.max(where=np.isfinite(radii), initial=0.0))
-    return float(np.quantile(known, 0.9)) if known.size else 0.0, largest
+    return float(np.quantile(known, 0.9)) if known.size else 0.0, cloud.longest_reach()
 
 
 def _plain_sums(gpu: Gpu, size: tuple[int, int]) -> CellSums:

@@ -454,6 +454,7 @@ def _series(case: Case, points: int, options: Namespace) -> Row:
         cloud = replace(shapes[number % _POSES], **{name: getattr(shapes[number % _POSES], name).copy()
                                                     for name in ("positions", *case.of)})  # fmt: skip
         drawn.pose = Pose(number, 0.1 * number, "new", cloud)
+        drawn.pose.drawn_bounds(), cloud.longest_reach()  # which the thread that reads finds
         drawn.finish()
         start = time.perf_counter()
         drawn.submit(number)
