@@ -150,6 +150,27 @@ def test_the_drawing_thread_neither_orders_points_nor_tests_chunks(
     assert threading.current_thread() not in threads
 
 
+@pytest.mark.parametrize("is_hidden", [True, False])
+def test_graphics_cards_look_for_hidden_chunks_where_many_are(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, is_hidden: bool
+) -> None:
+    """Pictures are the same whether they look or not."""
+    cloud = shells("chance")
+    request, surface = request_of(cloud, looking(cloud, 0), 1), Surface(renderer.gpu, SIZE)
+    in_order(renderer, request, surface)
+    monkeypatch.setattr(renderer.gpu, "software", False)
+    monkeypatch.setattr(culling, "_PAYS", 0.0 if is_hidden else 1.0)
+    looked = []
+    for turn in range(6):
+        near = replace(request, camera=looking(cloud, 10 * turn))
+        render_frame(renderer, near, surface)
+        looked.append("chunks" in surface.stats.counted)
+        alone = Surface(renderer.gpu, SIZE)
+        render_frame(renderer, replace(near, pose=Pose(1, 0.0, "", replace(cloud))), alone)
+        assert (surface.row == alone.row).all()
+    assert looked == ([True] * 6 if is_hidden else [True, True, False, False, False, False])
+
+
 def test_chunks_in_view_are_counted_on_the_gpu(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where few points are in view these are drawn alone; where many are, some pictures do not look."""
     cloud = shells("chance")

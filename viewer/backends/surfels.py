@@ -238,7 +238,7 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
     own, known = frame.params.radius != "uniform", True
     if frame.params.radius == "auto" and pose.stored.axes is None:
         gaps = pose.cached(GapRadii)
-        if frame.moving and pose.gpu.software and gaps.presumes_none(pose):
+        if frame.moving and gaps.presumes_none(pose):
             surface.stats.simplified = True
             surface.stats.skipped["gaps"] = "playback runs, and the radii of the last pose left no gaps"
         else:

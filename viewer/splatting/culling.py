@@ -34,6 +34,9 @@ _ROUNDING = 1e-5  # of the pose's size, by which boxes are larger for the same r
 START, FIND, _GIVE, VIEW = range(4)  # steps of chunks/cull.comp
 UPLOAD_SECONDS = 0.004  # that one picture spends on uploading what is in order
 _MOST_PICTURES = 15  # until the chunks in view are counted again
+# Share of the chunks in view that must be hidden for a graphics card to gain by looking for them. Pictures
+# that do without otherwise, and pictures that look before the share is read.
+_PAYS, _PAUSE, _LOOKS = 0.65, 64, 2
 LAST, NOW, IN_VIEW, FACES_AWAY = 1, 2, 4, 8  # bits of what is seen, as it has them
 
 
@@ -182,6 +185,7 @@ class CulledChunks:
         if rows is not None:
             self._gathering = in_background(Task("Ordering points"), lambda: positions.take(rows, axis=0))
         self._looks_again_in = 0  # pictures, until the chunks in view are counted again
+        self._pause = self._looked = 0  # pictures that do not look for hidden chunks, and those that did
 
     def upload(self, end: float) -> bool:
         """Upload rows and positions until that time of the performance counter; whether all are there."""
@@ -222,12 +226,31 @@ class CulledChunks:
         if self._looks_again_in:
             self._looks_again_in -= 1
             return None
-        self._margins = Margins(self._boxes.slack, margin + SLACK)
-        listed = self._list(surface, VIEW)
+        listed = self.in_view(surface, margin)
         if (points := len(listed)) > most:
             self._looks_again_in = min(int(points / most), _MOST_PICTURES)
             return None
         return listed, points
+
+    def looks_for_hidden(self, surface: RenderTarget) -> bool:
+        """Whether this picture looks for hidden chunks: always on software drivers. On graphics cards, the
+        counts of the last picture that looked decide now and then whether the next ones do."""
+        if self._gpu.software:
+            return True
+        if self._pause == 0 and self._looked >= _LOOKS:
+            counts, self._looked = counts_of(self._boxes.seen(surface)), _LOOKS - _PAUSE
+            if counts["hidden"] < _PAYS * (counts["hidden"] + counts["shown"]):
+                self._pause, self._looked = _PAUSE, 0
+        if self._pause:
+            self._pause -= 1
+            return False
+        self._looked += 1
+        return True
+
+    def in_view(self, surface: RenderTarget, margin: float) -> IndexList:
+        """All chunks in view. margin: as in `start`."""
+        self._margins = Margins(self._boxes.slack, margin + SLACK)
+        return self._list(surface, VIEW)
 
     def start(self, surface: RenderTarget, margin: float) -> IndexList:
         """The chunks to draw first. margin: pixels around a point that it may cover."""

@@ -165,7 +165,10 @@ def _draw_chunks(
         left_out = max(chunks.count - found[1], 0)
         surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} points are in groups out of view"
         return
-
+    if not chunks.looks_for_hidden(surface):
+        with keeping_nearest(pose.gpu, surface.depths, surface.rows) as nearest:
+            nearest.take(visits(chunks.in_view(surface, margin)))
+        return
     with keeping_nearest(
         pose.gpu, surface.depths, surface.rows, lambda: visits(chunks.shown(surface))
     ) as nearest:

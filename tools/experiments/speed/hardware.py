@@ -20,7 +20,8 @@ in no pass.
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
 copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32,
-64, 32-read and 64-read (whether a cell is read before). --order file draws all points without chunks.
+64, 32-read and 64-read (whether a cell is read before). --order file draws all points without
+chunks. --hidden always or never looks for hidden chunks of points on graphics cards.
 """
 
 from __future__ import annotations
@@ -59,6 +60,7 @@ from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
+from viewer.splatting import culling
 from viewer.view import View
 
 LOOK = Look(light="flat", eye_dome=False, background="#000000")
@@ -308,6 +310,8 @@ def _choose(options: Namespace) -> None:
         gpu.reads_first = options.atomics.endswith("read")
     if options.order == "file":
         chunks.LEAST = 1 << 40
+    if options.hidden:
+        culling._PAYS = {"always": 0.0, "never": 2.0}[options.hidden]
 
 
 def _sizes(options: Namespace) -> list[int]:
@@ -574,6 +578,7 @@ EXPERIMENT = Script(
         "clearing": "",
         "atomics": "",
         "order": "",
+        "hidden": "",
     },
 )
 
