@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..admission import opened
+from ..admission import admit, opened
 from ..contents import PointContents, TextureContents
 from ..faces import Faces
 from ._columns import batches, bounded_lines, parse_table, whole_numbers
@@ -34,6 +34,7 @@ _HEAD = 1 << 16  # characters in which `mtllib` stands
 # Numbers of a vertex -> where its red, green and blue begin; 4, 7 and 8 numbers have a weight behind z.
 _COLORS_AT = {6: 3, 7: 4, 8: 4}
 _MOST_NUMBERS = 8
+_JOINING = 3  # times the bytes of textured corners: in pieces, joined, and with their positions
 _BLANKS = {" ", "\t"}
 
 
@@ -163,9 +164,11 @@ def _texture(text: TextIOWrapper, path: Path) -> TextureContents | None:
         return None
     uv = parse_table(_lines(text, "vt"), (0, 1))
     numbers = {name: number for number, name in enumerate(materials)}
-    pieces = [_textured(rows, numbers) for rows in batches(_textured_polygons(text), _FACES_AT_ONCE)] or [
-        np.empty((0, 3), np.int64)
-    ]
+    pieces, taken, held = [np.empty((0, 3), np.int64)], uv.nbytes, path.stat().st_size
+    for rows in batches(_textured_polygons(text), _FACES_AT_ONCE):
+        pieces.append(_textured(rows, numbers))
+        taken += _JOINING * pieces[-1].nbytes
+        admit(held, taken)
     vertices, corners, used = np.concatenate(pieces).T
     return TextureContents(
         images=tuple(material.image for material in materials.values()),
