@@ -337,7 +337,7 @@ def _draw_two(points: Points, surface: Surface, params: Params, instancing: str,
     if params.passes == "two_large":
         points, splats = splats.larger(points), replace(splats, enlarge=1.0)
     if splats.enlarge == 1 and splats.epsilon == 0:
-        surface.stats.skipped["second pass"] = "nothing is enlarged or blended"
+        surface.stats.skipped["second pass"] = "no splat is enlarged or blended"
         _draw_nearest(points, surface, instancing, splats)
     elif instancing == "tiles":
         passes.tiled_two_passes(points, surface, splats)

@@ -174,7 +174,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
         found, timeline = args.scan, open_scan(args.scan, read=stated_corrections(args))
     elif entry.scan is None:
         hint = f"Name the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
-        raise InputError("does not name its scan", args.replay, hint)
+        raise InputError("does not contain the name of its scan", args.replay, hint)
     else:
         found, timeline = _open(entry.scan, args.replay)
     hash = fingerprint_as(entry.hash, timeline.files)

@@ -110,7 +110,9 @@ def _named(names: list[str]) -> _Named:
         scan = Recording.load(path).entries[0].scan
         if scan is None:
             raise InputError(
-                "does not name its scan", path, "Open the scan, then drop this file onto the window"
+                "does not contain the name of its scan",
+                path,
+                "Open the scan, then drop this file onto the window",
             )
         return _Named([scan_path(scan, path)], replay=path)
     return _Named(names)

@@ -58,7 +58,7 @@ def test_json_brings_back_the_record() -> None:
     "data", [None, [], {}, {"decisions": {"camera": 1}}, {"decisions": {}, "aside": [1]}]
 )
 def test_damaged_json_is_refused(data: object) -> None:
-    with pytest.raises(InputError, match="no record"):
+    with pytest.raises(InputError, match="not a record"):
         Reading.from_json(data)
 
 

@@ -371,7 +371,7 @@ def subject(
     else:
         needs = [Path(data or "") / need for need in scene.needs]
     if count is not None and not (scene.counts and 1 <= count <= _MOST_POINTS):
-        known = f"1 to {_MOST_POINTS:,}" if scene.counts else "only the number of points that was scanned"
+        known = f"1 to {_MOST_POINTS:,}" if scene.counts else "only as many points as the scanner measured"
         raise InputError(f"is not available with {count:,} points", name_or_file, f"The scene has {known}")
     if noise and scene.noise is None:
         raise InputError("has no noise", name_or_file, "Only simulated scans have noise: use NAME-simulated")

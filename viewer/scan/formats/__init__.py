@@ -283,7 +283,7 @@ def _formats() -> dict[str, ModuleType]:
         if not hasattr(module, "SUFFIXES"):
             if not hasattr(module, "find"):
                 raise InputError(
-                    "it has neither SUFFIXES nor find", hint="See viewer/scan/formats/__init__.py"
+                    "the module has neither SUFFIXES nor find", hint="See viewer/scan/formats/__init__.py"
                 )
             return  # for folders: see viewer/scan/range_folders
         if not isinstance(module.SUFFIXES, tuple):
@@ -291,7 +291,7 @@ def _formats() -> dict[str, ModuleType]:
         reads = "contents" if hasattr(module, "contents") else "read"
         if missing := [name for name in ("TITLE", reads) if not hasattr(module, name)]:
             raise InputError(
-                f"it has SUFFIXES, but no {' and no '.join(missing)}", hint="Add what is missing"
+                f"the module has SUFFIXES, but no {' and no '.join(missing)}", hint="Add what is missing"
             )
         for suffix in module.SUFFIXES:
             if not (isinstance(suffix, str) and suffix.startswith(".") and suffix == suffix.lower()):

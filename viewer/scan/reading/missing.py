@@ -125,7 +125,7 @@ def find_in_frame(points: NDArray, decided: Decided) -> Unmeasured | None:
 def decide(found: Unmeasured | None, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
     """Decide which value means "not measured", and count the points of a frame that it removes; else null."""
     removed = 0 if found is None else int(np.count_nonzero(found.rows))
-    why = f"Scan4D leaves out {removed:,} points that have this value" if removed else ""
+    why = f"Scan4D leaves out {removed:,} points with the value that means 'not measured'" if removed else ""
     if KEY in corrections:
         return Decision(KEY, NONE if found is None else found.value, "user", "--read", why)
     if found is None:

@@ -245,7 +245,7 @@ class Reading:
                 ),
             )
         except (AttributeError, KeyError, TypeError, ValueError) as error:
-            raise InputError(f"is no record of how a scan was read: {shortened(data)}") from error
+            raise InputError(f"is not a record of how Scan4D read a scan: {shortened(data)}") from error
 
 
 def shown_value(value: Any) -> str:

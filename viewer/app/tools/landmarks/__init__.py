@@ -503,5 +503,8 @@ COMMANDS = {
 MOUSE = (
     ("Click while placing", "Place the next landmark"),
     ("Drag a landmark while placing", "Correct the landmark in this frame"),
-    ("Arrows after placing or choosing a landmark", "Move the landmark by a pixel, until the frame changes"),
+    (
+        "Arrow keys, after you place or choose a landmark",
+        "Move the landmark by a pixel, until the frame changes",
+    ),
 )

@@ -355,6 +355,6 @@ COMMANDS = {
 }  # fmt: skip
 MOUSE = (
     ("Drag, after Outline a region", "Measure the area and the perimeter inside the outline"),
-    ("Drag the line in a plot, or click", "Go to that frame"),
+    ("Drag the line in the plot, or click in the plot", "Go to that frame"),
     ("Wheel, drag, right drag, double click in a plot", "Zoom, move, zoom to a box, show all"),
 )
