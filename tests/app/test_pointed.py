@@ -46,7 +46,7 @@ def test_it_says_where_another_surface_may_be_meant() -> None:
 def test_what_was_filled_is_no_point() -> None:
     assert describe_pick(Picked(np.zeros(3), level=2), "frame 1/1", Scale("units"), 1.0)[1:] == [
         "frame 1/1",
-        "hole filled from level 2",
+        "in a hole that the renderer filled from level 2",
     ]
 
 

@@ -151,7 +151,7 @@ def test_from_opening_a_scan_to_the_curve_of_the_mouth_in_four_actions(
         assert [row["frame"] for row in rows] == [str(frame + 1) for frame in range(FRAMES)]
         np.testing.assert_allclose([float(row[name]) for row in rows], wanted, atol=2 * CLICK)
         ctrl(screen, "k")
-        app.told("Copied the numbers of 1 curves")
+        app.told("Copied amplitude, onset, peak and duration of 1 curves")
         (numbers,) = pasted(screen)
         assert float(numbers["amplitude"]) == pytest.approx(OPENING, rel=0.03)
         reach = WIDE * math.sqrt(2 * math.log(10))

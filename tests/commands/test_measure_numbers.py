@@ -276,5 +276,5 @@ def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -
 
 def test_smoothing_without_measures_or_speeds_is_refused(refused: Callable[..., str]) -> None:
     words = ("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", "--smoothing", "0.5")
-    assert "--smoothing: has nothing to smooth. Use it with --measures" in refused(*words)
+    assert "--smoothing: has nothing to smooth. Use this option with --measures" in refused(*words)
     assert not Path("out.csv").exists()

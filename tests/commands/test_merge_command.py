@@ -103,7 +103,10 @@ def test_points_are_those_that_are_kept(run: Run) -> None:
         (("pods.exr", "-o", "nowhere/out.exr"), "there is no folder 'nowhere'"),
         (("pods.exr", "-o", "out.jpg"), "out.jpg: "),
         (("pods.exr", "-o", "out.exr", "--report", "out.txt"), "out.txt: "),
-        (("pods.exr", "-o", "out.exr", "--ties", "-1"), "the threshold of ties must be 0 or more, not -1"),
+        (
+            ("pods.exr", "-o", "out.exr", "--ties", "-1"),
+            "the difference up to which weights are tied must be 0 or more",
+        ),
         (("seq", "-o", "out.exr"), "out.exr: is one file, but there are several results"),
     ],
 )

@@ -78,7 +78,9 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     film = suffix == FILM_SUFFIX
     if places > 1 or (places and film):
         raise InputError(
-            "has too many number fields", path, "Use no field such as %04d for a film, and one for pictures"
+            "has too many number fields",
+            path,
+            "For a film, use no number field such as %04d in the name. For pictures, use one number field",
         )
     if several and not places and not film:
         film_hint = f" or {path.stem}{FILM_SUFFIX}" if FILM_SUFFIX in suffixes else ""

@@ -176,7 +176,7 @@ def test_tps_of_other_programs(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.positions[0, 0], [0.5, 1, 0])
     assert np.isnan(found.positions[0, 1]).all()
     np.testing.assert_array_equal(found.positions[1], [[1, 2, 3], [4, -5, 6]])
-    assert [text.split()[0:2] for text in found.remarks] == [["Scan4D", "leaves"], ["Its", "landmarks"]]
+    assert [text.split()[0:2] for text in found.remarks] == [["Scan4D", "leaves"], ["The", "landmarks"]]
 
 
 MORPHOLOGIKA = """[Individuals]

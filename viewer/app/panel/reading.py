@@ -77,4 +77,4 @@ def _others(record: Reading) -> Iterator[tuple[str, str, str]]:
     for text in record.unused:
         yield "Not used", text, "The file contains these data, but Scan4D does not use them"
     for one in record.contradictions:
-        yield "Contradiction", one.what, "This frame does not fit the decisions for the whole scan"
+        yield "Contradiction", one.what, "This frame contradicts what Scan4D decided for the whole scan"

@@ -138,7 +138,7 @@ def _long(
     cells, numerals = array("q"), array("d")  # frame, number, line and state; x, y, z and sigma of each row
     for line, row in rows:
         if len(row) != len(columns):
-            raise at_line(f"the row has {len(row)} values for {len(columns)} columns", line, _HINT)
+            raise at_line(f"has {len(row)} values for {len(columns)} columns", line, _HINT)
         if kind_at is not None and row[kind_at].strip().lower() != "landmark":
             continue
         frame = 0 if frame_at is None else _frame(row[frame_at], line)
@@ -210,7 +210,7 @@ def _wide(
     positions: list[list[list[float]]] = []
     for line, row in rows:
         if len(row) != len(columns):
-            raise at_line(f"the row has {len(row)} values for {len(columns)} columns", line, _HINT)
+            raise at_line(f"has {len(row)} values for {len(columns)} columns", line, _HINT)
         frames.append(len(frames) if frame_at is None else _frame(row[frame_at], line))
         if len(frames) > 1 and frames[-1] <= frames[-2]:
             raise at_line(
