@@ -169,6 +169,7 @@ _BY_SUFFIX = {
     ".xyznrgb": [*_AXES, *_NORMAL, *_RGB], ".xyzi": [*_AXES, "intensity"],
 }  # fmt: skip
 _UNIT_SHARE, _UNIT_WITHIN = 0.99, 1e-3  # rows of normals, and how far their length is from 1
+_SAMPLE = 1 << 16  # rows whose lengths and decimals are looked at
 _LEAST = 3  # rows that count 1, 2, 3
 _RELATED = 0.5  # correlation of a row or column of a grid with a coordinate
 
@@ -236,7 +237,7 @@ def _fronts(table: NDArray[np.float64]) -> Iterator[tuple[list[str], str]]:
     if count < _LEAST or width < 4:
         return
     first = table[:, 0]
-    if first[0] in (0, 1) and (np.diff(first) == 1).all():
+    if first[0] in (0, 1) and first[1] - first[0] == 1 and (np.diff(first) == 1).all():
         if not any((first == table[:, at]).all() for at in range(1, width)):
             yield ["number"], f"The first column counts {first[0]:g}, {first[1]:g}, {first[2]:g} and so on."
     elif width >= 5 and _is_grid(table):
@@ -246,7 +247,7 @@ def _fronts(table: NDArray[np.float64]) -> Iterator[tuple[list[str], str]]:
 def _is_grid(table: NDArray[np.float64]) -> bool:
     """Whether the first two of five or more columns count a grid, which the next ones follow."""
     pair = table[:, :2]
-    if not (pair == np.rint(pair)).all() or (pair < 0).any():
+    if (pair[:_LEAST] != np.rint(pair[:_LEAST])).any() or (pair != np.rint(pair)).any() or (pair < 0).any():
         return False
     ordered = any(
         (np.diff(major) >= 0).all() and (np.diff(minor)[np.diff(major) == 0] > 0).all()
@@ -287,12 +288,13 @@ def _block(three: NDArray[np.float64], width: int) -> tuple[str | None, str]:
     """The kind of three columns, "r", "nx" or None, and why. width: of the table."""
     if not len(three):
         return None, ""
-    length = np.sqrt((three**2).sum(axis=1))
+    some_rows = three[:: max(1, len(three) // _SAMPLE)]
+    length = np.sqrt(np.einsum("ij,ij->i", some_rows, some_rows))
     some = length > 0
     if some.any() and (np.abs(length[some] - 1) <= _UNIT_WITHIN).mean() >= _UNIT_SHARE and some.mean() > 0.5:
         return "nx", "Rows of length 1 are normals."
     low, high = three.min(), three.max()
-    is_whole = (three == np.rint(three)).all()
+    is_whole = bool((some_rows == np.rint(some_rows)).all())
     if low >= 0 and high <= 255 and is_whole and high > 0:
         return "r", "Whole numbers up to 255 are colors."
     if low >= 0 and high <= 1 and not is_whole:

@@ -25,6 +25,7 @@ _LOOKED_AT = 200  # lines, of which the last ones tell the separator and the dec
 _SAMPLE = 40
 _ROWS_AT_ONCE = 1 << 12  # of text, since numpy holds the interpreter's lock while it grows a table
 _CHARACTERS_AT_ONCE = 1 << 22  # of those rows
+_LINES = 1 << 5  # whose characters are counted together
 
 # --- encoding -----------------------------------------------------------------------------------
 
@@ -382,11 +383,9 @@ def _batch(lines: Iterator[str], most: int) -> list[str]:
     """The next lines, few enough to hold."""
     batch: list[str] = []
     size = 0
-    for line in islice(lines, max(most, 0)):
-        batch.append(line)
-        size += len(line)
-        if size > _CHARACTERS_AT_ONCE:
-            break
+    while size <= _CHARACTERS_AT_ONCE and (part := list(islice(lines, min(_LINES, most - len(batch))))):
+        batch += part
+        size += sum(map(len, part))
     return batch
 
 
