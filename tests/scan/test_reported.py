@@ -21,7 +21,6 @@ from viewer.analysis.landmarks.files import read_landmarks
 from viewer.errors import InputError
 
 # What Scan4D does not read rightly yet, by area. A mark goes with the work that makes its test pass.
-ARRAYS = pytest.mark.xfail(strict=True, reason="arrays and pictures")
 
 RED, GREEN, BLUE, YELLOW = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]
 
@@ -186,12 +185,10 @@ def test_10_the_color_range_is_that_of_the_sequence(reported: Path) -> None:
     assert firsts == [[156, 78, 39], [1, 1, 0], [156, 78, 39]]
 
 
-@ARRAYS
 def test_11_an_organised_cloud_is_one_frame(reported: Path) -> None:
     assert len(only(reported / "11_organised_24x32x3.npy")) == 768
 
 
-@ARRAYS
 def test_12_fps_of_an_archive(reported: Path) -> None:
     near(times(reported / "12_rate_50.npz"), (0, 0.02, 0.04, 0.06))
 
@@ -317,7 +314,6 @@ def depth_of(path: Path) -> NDArray[np.float32]:
     return view.depth[view.valid()]
 
 
-@ARRAYS
 def test_23_depth_of_a_value_socket(reported: Path) -> None:
     depth = depth_of(reported / "23_depth_value_socket.exr")
     near((depth.min(), depth.max()), (0.479, 0.6), 1e-3)
@@ -369,14 +365,12 @@ def test_30_times_of_a_german_spreadsheet(reported: Path) -> None:
     near(times(reported / "30_times_excel"), (0, 0.033, 0.066))
 
 
-@ARRAYS
 def test_31_structured_arrays(reported: Path) -> None:
     cloud = only(reported / "31_structured.npy")
     near(cloud.world(), [(1, 2, 3), (4, 5, 6)])
     near(cloud.scalars["intensity"], (9, 8))
 
 
-@ARRAYS
 def test_31_six_columns(reported: Path) -> None:
     cloud = only(reported / "31_xyzrgb_Nx6.npy")
     near(cloud.world(), [(0, 0, 0), (1, 0, 0), (0, 1, 0)])  # whose other columns are colours or normals
@@ -388,7 +382,6 @@ def test_32_sparse_points_of_colmap(reported: Path) -> None:
     assert colors(cloud) == [[115, 121, 122], [102, 209, 250], [245, 251, 249]]
 
 
-@ARRAYS
 def test_33_point_maps_are_frames(reported: Path) -> None:
     assert [len(cloud) for cloud in clouds(reported / "33_point_maps.npz")] == [768, 768]
 
@@ -445,7 +438,6 @@ def test_38_a_larger_picture(reported: Path) -> None:
 # --- siblings that the README names beside a case -------------------------------------------
 
 
-@ARRAYS
 @pytest.mark.parametrize("channel", ["depth", "Depth", "Y", "R", "Depth.V"])
 def test_a_depth_channel_of_any_name(tmp_path: Path, channel: str) -> None:
     OpenEXR = pytest.importorskip("OpenEXR")
@@ -473,7 +465,6 @@ def test_heads_of_other_programs(tmp_path: Path, names: str) -> None:
     near(only(table).world(), [(1, 2, 3), (4, 5, 6), (7, 8, 10)])
 
 
-@ARRAYS
 @pytest.mark.parametrize("name", ["pts3d", "point_map"])
 def test_point_maps_of_other_networks(tmp_path: Path, name: str) -> None:
     y, x = np.mgrid[0:24, 0:32] / 10
@@ -481,14 +472,12 @@ def test_point_maps_of_other_networks(tmp_path: Path, name: str) -> None:
     assert len(only(tmp_path / "maps.npz")) == 768
 
 
-@ARRAYS
 def test_six_columns_of_colors(tmp_path: Path) -> None:
     rows = np.array([(0, 0, 0, 200, 100, 50), (1, 0, 0, 10, 20, 30), (0, 1, 0, 0, 0, 255)], np.float32)
     np.save(tmp_path / "cloud.npy", rows)
     assert colors(only(tmp_path / "cloud.npy")) == [[200, 100, 50], [10, 20, 30], BLUE]
 
 
-@ARRAYS
 def test_structured_arrays_of_an_archive(tmp_path: Path) -> None:
     points = np.array([(1, 2, 3, 9), (4, 5, 6, 8)], [(name, "f4") for name in ("x", "y", "z", "intensity")])
     np.savez(tmp_path / "cloud.npz", points=points)

@@ -158,7 +158,6 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 3))}, r"\(2, 3\), but 'depth' has shape \(2, 2\)"),
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 2, 1))}, r"'mask' has shape \(2, 2, 1\)"),
         ({"depth": np.ones((2, 2)), "color": np.ones((2, 2, 2))}, r"array 'color' has shape \(2, 2, 2\)"),
-        ({"depth": np.ones((2, 2)), "color": np.ones((2, 2), int)}, "array 'color' is of type int64"),
         ({"depth": np.full((2, 2), "a")}, "array 'depth' is of type <U1, expected numbers"),
         ({"depth": np.full((2, 2), None)}, "'depth' is of type object|pickled"),
         ({"depth": np.ones((2, 2)), "fx": 3}, "its calibration lacks fy, cx, cy"),
@@ -174,7 +173,7 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
             {"depth": np.ones((2, 2)), "intrinsics": np.eye(4)},
             "'intrinsics' is .4, 4. float64, expected 9",
         ),
-        ({"depth": np.ones((2, 2)), "intrinsics": np.zeros((3, 3))}, "calibration is unusable: fx 0"),
+        ({"depth": np.ones((2, 2)), "intrinsics": np.zeros((3, 3))}, "calibration cannot be used: fx 0"),
         ({"depth": np.ones((2, 2)), "pose": np.eye(3)}, "'pose' is .3, 3. float64, expected 16 numbers"),
         ({"depth": np.ones((2, 2)), "pose": 2 * np.eye(4)}, "its pose is not a rotation and a translation"),
         ({"depth": np.ones((2, 2)), "world_to_camera": np.zeros((4, 4))}, "its pose is not a rotation"),
@@ -185,7 +184,10 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
         ({"depth": np.ones((2, 2)), "distortion": np.ones(3)}, "expected the numbers k1 k2 p1 p2"),
         ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add dx and dy"),
         ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "its cells have the unusable size 0 x -1"),
-        ({"normals": np.ones((2, 3))}, "has no array 'positions', only: normals. Name points 'positions'"),
+        (
+            {"normals": np.ones((2, 3))},
+            r"has no array of points, only: normals \(2, 3\). Name points 'positions'",
+        ),
     ],
 )
 def test_arrays_that_do_not_fit(arrays: dict[str, object], reason: str, path: Path) -> None:

@@ -243,9 +243,9 @@ def test_constant_arrays_of_modest_size_are_no_bomb(path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
-        ({"corners": np.eye(3)}, "no array 'positions', only: corners"),
-        ({"positions": np.zeros((4, 2))}, r"array 'positions' has shape \(4, 2\). Positions are \(N, 3\)"),
-        ({"positions": np.zeros((2, 2, 4, 3))}, "has shape"),
+        ({"corners": np.eye(3)}, "no array of points, only: corners"),
+        ({"positions": np.zeros((4, 2))}, r"array 'positions' has shape \(4, 2\). Points are \(N, 3\)"),
+        ({"positions": np.zeros((2, 2, 2, 4, 3))}, "has shape"),
         ({"positions": np.zeros((0, 5, 3))}, "holds no points"),
         ({"positions": np.zeros((0, 3))}, "holds no points"),
         ({"positions": np.array([["a", "b", "c"]])}, "expected numbers"),

@@ -6,7 +6,7 @@
 | `depth_scale` | how many of its numbers are one unit; 1 where it is missing |
 | `xyz` (H, W, 3) | instead: points in an image's axes, or with x right, y up and z towards the scanner |
 | `elevation` (H, W) | instead: heights of a terrain, in metres or the unit that `unit` states |
-| `color` (H, W), (H, W, 3 or 4) | uint8, or floats in 0..1, sRGB |
+| `color` (H, W), (H, W, 3 or 4) | sRGB on any scale |
 | `mask` (H, W), `confidence` (H, W) | above 0.01: use the depth; any real |
 | `intrinsics` or `K` (3, 3), or `fx` `fy` `cx` `cy` | pixels, the centre of the first one at 0, 0 |
 | `distortion` (4,), (5,) or (8,) | as OpenCV has it |
@@ -32,7 +32,11 @@ from ..admission import admit
 from ..grids import is_seen_from_behind, view_of_camera, view_of_grid
 from ..image_poses import IMAGE_AXES, UPRIGHT, from_camera_to_world, from_world_to_camera
 from ..points import UNKNOWN_UNIT
-from ..range_view import DepthKind, RangeView, assumed_pinhole, mask_of
+from ..range_view import DepthKind, RangeView, mask_of
+from ..reading.camera import CENTER, decide_view
+from ..reading.colors import settled_scale
+from ..reading.depths import measured_depths
+from ..reading.sequence import Decided
 from ..terrain import METRE, Ground, are_degrees, terrain_view
 from ..units import usable_unit
 from ._stored import StoredArray
@@ -45,7 +49,6 @@ _MOST_RATIO = 40  # of memory to the file: what is masked packs well
 _BYTES = {"depth": 16, "elevation": 24, "xyz": 140}  # of memory for a pixel of a view, beside what is stored
 _ROWS = 64  # of colours worked on together
 _LONGEST = 1024  # numbers, or bytes of a word, where few are expected
-_CENTER = 0.5  # of a pixel: in these arrays that of the first one is at 0, 0
 _AS_THEY_ARE = (slice(None), slice(None))
 _UPSIDE_DOWN = (slice(None, None, -1), slice(None))
 
@@ -63,7 +66,7 @@ def _source(arrays: _Arrays) -> str | None:
     return next((name for name in _IMAGES if name in arrays and arrays[name].shape[1:] != (3,)), None)
 
 
-def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
+def view_of_arrays(arrays: _Arrays, held: int, decided: Decided) -> RangeView:
     """The range view of the arrays of a file of `held` bytes. Raises InputError."""
     source = _source(arrays)
     assert source is not None
@@ -78,25 +81,25 @@ def view_of_arrays(arrays: _Arrays, held: int) -> RangeView:
     stored = sum(arrays[name].memory() for name in images)
     admit(held, stored + shape[0] * shape[1] * _BYTES[source], _MOST_RATIO)
     make = {"depth": _of_depth, "xyz": _of_grid, "elevation": _of_terrain}[source]
-    view, turned = make(_numbers(arrays[source]), arrays)
+    view, turned = make(_numbers(arrays[source]), arrays, decided)
     changes: dict[str, Any] = {}
     if "mask" in images:
         changes["mask"] = view.mask & mask_of(_numbers(arrays["mask"])[turned])
     if "color" in images:
-        changes["color"] = np.ascontiguousarray(_colors(_numbers(arrays["color"]))[turned])
+        changes["color"] = np.ascontiguousarray(_colors(_numbers(arrays["color"]), decided)[turned])
     if "confidence" in images:
         changes["confidence"] = _numbers(arrays["confidence"])[turned].astype(np.float32)
     return replace(view, **changes)
 
 
-def unit_of_arrays(arrays: _Arrays, held: int) -> str | None:
+def unit_of_arrays(arrays: _Arrays, held: int, decided: Decided) -> str | None:
     """The name of the unit of length of the view of a file of `held` bytes, or None. Raises InputError.
 
     This reads the heights of a terrain to find out whether its ground is in degrees.
     """
     if "unit" in arrays or _source(arrays) != "elevation":
         return _stated_unit(arrays)
-    return view_of_arrays(arrays, held).unit
+    return view_of_arrays(arrays, held, decided).unit
 
 
 def _unit(arrays: _Arrays) -> str | None:
@@ -107,7 +110,7 @@ def _stated_unit(arrays: _Arrays) -> str | None:
     return _word(arrays, "unit", "") if "unit" in arrays else None
 
 
-def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
+def _of_depth(stored: NDArray, arrays: _Arrays, decided: Decided) -> tuple[RangeView, _Turned]:
     scale = _number(arrays, "depth_scale", 1.0)
     if not (np.isfinite(scale) and scale > 0):
         raise InputError(
@@ -119,10 +122,8 @@ def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     kind = cast(DepthKind, _word(arrays, "kind", "z"))
     view = RangeView(
         depth=depth,
-        kind=kind,
-        mask=np.ones(depth.shape, bool) if stored.dtype.kind == "f" else stored != 0,
-        **_calibration(arrays, depth.shape[0], depth.shape[1], kind),
-        distortion=tuple(_vector(arrays, "distortion").tolist()) if "distortion" in arrays else (),
+        mask=measured_depths(stored, decided, () if stored.dtype.kind == "f" else (0,)),
+        **_camera(arrays, depth.shape[0], depth.shape[1], kind, decided),
         world_to_camera=UPRIGHT if (stated := _world_to_camera(arrays)) is None else stated,
         name="camera",
         unit=_unit(arrays) or UNKNOWN_UNIT,
@@ -130,7 +131,7 @@ def _of_depth(stored: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     return view, _AS_THEY_ARE
 
 
-def _of_grid(grid: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
+def _of_grid(grid: NDArray, arrays: _Arrays, decided: Decided) -> tuple[RangeView, _Turned]:
     if grid.dtype.kind != "f":
         raise InputError(f"array 'xyz' is of type {grid.dtype}, expected floats")
     unit, stated = _unit(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
@@ -144,7 +145,7 @@ def _of_grid(grid: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     return view, _AS_THEY_ARE
 
 
-def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
+def _of_terrain(heights: NDArray, arrays: _Arrays, decided: Decided) -> tuple[RangeView, _Turned]:
     rows, columns = heights.shape
     if all(name in arrays for name in _EDGES):
         left, end, first, last = (_number(arrays, name) for name in _EDGES)
@@ -161,18 +162,21 @@ def _of_terrain(heights: NDArray, arrays: _Arrays) -> tuple[RangeView, _Turned]:
     return terrain_view(heights, there, ground, "terrain"), ground.turned
 
 
-def _calibration(arrays: _Arrays, height: int, width: int, kind: str) -> dict[str, Any]:
-    """The pinhole; an assumed one if no array states it."""
+def _camera(arrays: _Arrays, height: int, width: int, kind: DepthKind, decided: Decided) -> dict[str, Any]:
+    """The camera and the kind of depth, as fields of a view; an assumed camera if no array states one."""
+    lens = tuple(_vector(arrays, "distortion").tolist()) if "distortion" in arrays else ()
     if stated := next((name for name in _MATRICES if name in arrays), None):
         matrix = _vector(arrays, stated, 9).reshape(3, 3)
         fx, fy, cx, cy = matrix[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     elif missing := [name for name in _PINHOLE if name not in arrays]:
         if len(missing) < len(_PINHOLE) or kind == "height":
             raise InputError(f"its calibration lacks {', '.join(missing)}")
-        return assumed_pinhole(width, height)
+        return decide_view(None, (width, height), decided) | {"kind": kind, "distortion": lens}
     else:
         fx, fy, cx, cy = (_number(arrays, name) for name in _PINHOLE)
-    return {"fx": fx, "fy": fy, "cx": cx + _CENTER, "cy": cy + _CENTER}
+    pinhole = {"fx": fx, "fy": fy, "cx": cx + CENTER, "cy": cy + CENTER}
+    camera = pinhole | {"kind": kind, "distortion": lens}
+    return decide_view(camera, (width, height), decided, stated or "fx, fy, cx, cy") | {"kind": kind}
 
 
 def _world_to_camera(arrays: _Arrays) -> NDArray[np.float64] | None:
@@ -182,19 +186,24 @@ def _world_to_camera(arrays: _Arrays) -> NDArray[np.float64] | None:
     return None
 
 
-def _colors(stored: NDArray) -> NDArray[np.uint8]:
+def _colors(stored: NDArray, decided: Decided) -> NDArray[np.uint8]:
     """sRGB, (H, W, 3), of grey or colour with or without alpha."""
     if stored.ndim > 3 or stored.shape[2:] not in ((), (1,), (3,), (4,)):
         raise InputError(f"array 'color' has shape {stored.shape}, expected (H, W), (H, W, 3) or (H, W, 4)")
-    if stored.dtype.kind == "f":
-        units, stored = stored, np.empty(stored.shape, np.uint8)
-        for top in range(0, len(units), _ROWS):
-            rows = np.nan_to_num(units[top : top + _ROWS])
-            stored[top : top + _ROWS] = np.rint(np.clip(rows, 0, 1) * 255)
     if stored.dtype != np.uint8:
-        raise InputError(f"array 'color' is of type {stored.dtype}, expected uint8 or floats in 0..1")
+        stored = _in_bytes(stored, decided)
     colors = stored if stored.ndim == 3 else stored[..., None]
     return colors[..., :3] if colors.shape[2] >= 3 else colors.repeat(3, axis=2)
+
+
+def _in_bytes(stored: NDArray, decided: Decided) -> NDArray[np.uint8]:
+    """Colours on the scale of the scan in 8 bit, a few rows at a time."""
+    full = settled_scale(stored.reshape(-1, stored.shape[-1] if stored.ndim == 3 else 1), decided)
+    made = np.empty(stored.shape, np.uint8)
+    for top in range(0, len(stored), _ROWS):
+        rows = np.nan_to_num(stored[top : top + _ROWS].astype(np.float64)) * (255 / full)
+        made[top : top + _ROWS] = np.rint(np.clip(rows, 0, 255))
+    return made
 
 
 def _numbers(array: StoredArray) -> NDArray:

@@ -1,6 +1,6 @@
 """Pictures with depth that other programs have written as EXR: which channels are one eye's, and its camera.
 
-A picture has a channel `Z`, by itself or at the end of a layer's name, and perhaps `R G B` and `A` in the
+A picture has a channel of depth (see `viewer/scan/reading/channels.py`), and perhaps `R G B` and `A` in the
 same layer or another. The attribute `multiView` and names of layers, or a part's `view`, mark two eyes.
 """
 
@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
-from ..range_view import RangeView, assumed_pinhole, mask_of
+from ...errors import InputError, shortened
+from ..range_view import RangeView, mask_of
+from ..reading.camera import decide_view
+from ..reading.channels import EXPECTED, decide, depth_channels
+from ..reading.depths import measured_depths
+from ..reading.sequence import Decided
 
-HINT = "Files of other programs must store the depth in a channel Z, as Blender, Nuke and renderers write it"
-
-_FARTHEST = 1e10  # what programs write where nothing is, and more
 _UNSKEWED = 1e-3  # what else there may be in a projection, as a part of its focal length
 _DEFAULT_SCREEN = (0.0, 0.0, 1.0)  # its centre and width, where nobody has set them
 
@@ -38,7 +39,7 @@ class RenderedEye:
     alpha: _Channel | None
 
 
-def rendered_eyes(headers: Sequence[dict[str, Any]]) -> list[RenderedEye]:
+def rendered_eyes(headers: Sequence[dict[str, Any]], decided: Decided) -> list[RenderedEye]:
     """The eyes whose camera the headers state; without a camera, the first. Raises InputError."""
     eyes: dict[str, dict[tuple[str, ...], _Layer]] = {}
     for part, header in enumerate(headers):
@@ -49,32 +50,51 @@ def rendered_eyes(headers: Sequence[dict[str, Any]]) -> list[RenderedEye]:
             eye = next((layer for layer in layers if layer in names), first)
             layer = tuple(layer for layer in layers if layer != eye)
             eyes.setdefault(eye, {}).setdefault(layer, {}).setdefault(word, (part, channel.name))
-    found = [eye for name, layers in eyes.items() if (eye := _eye(headers, name, layers)) is not None]
+    found = [
+        eye for name, layers in eyes.items() if (eye := _eye(headers, name, layers, decided)) is not None
+    ]
     if not found:
-        raise InputError("is not a range view: it has no channel Z", hint=HINT)
+        there = ", ".join(channel.name for header in headers for channel in header["channels"])
+        raise InputError(
+            f"is not a range view: none of its channels is depth ({shortened(there)})", hint=EXPECTED
+        )
     known = [eye for eye in found if "worldToCamera" in headers[eye.depth[0]]]
     return known or found[:1]
 
 
 def _eye(
-    headers: Sequence[dict[str, Any]], name: str, layers: dict[tuple[str, ...], _Layer]
+    headers: Sequence[dict[str, Any]], name: str, layers: dict[tuple[str, ...], _Layer], decided: Decided
 ) -> RenderedEye | None:
     """The picture in an eye's layers; the one with the shortest name where several have a depth."""
-    outer = [layers[key] for key in sorted(layers, key=len)]
-    # Beside an X, Z is of a direction or a position.
-    source = next((layer for layer in outer if "Z" in layer and "X" not in layer), None)
-    if source is None:
+    outer = sorted(layers, key=len)
+    by_name = {".".join([*layer, word]): (layer, word) for layer in outer for word in layers[layer]}
+    chosen = decide(list(by_name), decided.corrections)
+    if chosen is None:
         return None
-    part = source["Z"][0]
+    decided.note(chosen.decision)
+    for other in depth_channels(list(by_name)):
+        if other != chosen.name:
+            decided.note_unused(f"depth in the channel {other}")
+    key, depth_word = by_name[chosen.name]
+    source, depth = layers[key], layers[key][depth_word]
+    part = depth[0]
     name, window = name or headers[part].get("name") or f"part {part}", headers[part]["dataWindow"]
-    for layer in (source, *outer):
-        if {*"RGB"} <= layer.keys() and np.array_equal(headers[layer["R"][0]]["dataWindow"], window):
-            return RenderedEye(name, source["Z"], tuple(layer[word] for word in "RGB"), layer.get("A"))
-    return RenderedEye(name, source["Z"], (), source.get("A"))
+    for layer in (source, *(layers[other] for other in outer)):
+        of_depth = layer is source and depth_word in "RGB"
+        if not of_depth and {*"RGB"} <= layer.keys() and _has_window(headers[layer["R"][0]], window):
+            return RenderedEye(name, depth, tuple(layer[word] for word in "RGB"), layer.get("A"))
+    return RenderedEye(name, depth, (), source.get("A"))
+
+
+def _has_window(header: dict[str, Any], window: Any) -> bool:
+    return np.array_equal(header["dataWindow"], window)
 
 
 def view_of_eye(
-    headers: Sequence[dict[str, Any]], images: Sequence[dict[str, NDArray]], eye: RenderedEye
+    headers: Sequence[dict[str, Any]],
+    images: Sequence[dict[str, NDArray]],
+    eye: RenderedEye,
+    decided: Decided,
 ) -> RangeView:
     """The range view of an eye. images: the channels of every part by name, (H, W) each. Raises InputError.
 
@@ -83,7 +103,7 @@ def view_of_eye(
     header = headers[eye.depth[0]]
     stored = images[eye.depth[0]][eye.depth[1]]
     depth = stored.astype(np.float32)
-    mask = depth < min(_FARTHEST, float(np.finfo(stored.dtype).max))
+    mask = measured_depths(stored, decided)
     color = np.stack([images[part][name] for part, name in eye.colors], axis=2) if eye.colors else None
     if eye.alpha is not None:
         alpha = images[eye.alpha[0]][eye.alpha[1]]
@@ -92,7 +112,7 @@ def view_of_eye(
         if color is not None:  # which is multiplied by alpha
             color = color / np.where(seen, alpha, 1)[..., None]
     left, top = (header["dataWindow"][0] - header["displayWindow"][0]).tolist()
-    camera = _camera(header)
+    camera = _camera(header, decided)
     return RangeView(
         depth=depth,
         mask=mask,
@@ -102,7 +122,7 @@ def view_of_eye(
     )
 
 
-def _camera(header: dict[str, Any]) -> dict[str, Any]:
+def _camera(header: dict[str, Any], decided: Decided) -> dict[str, Any]:
     """The fields of a range view that the camera gives, in the display window."""
     low, high = header["displayWindow"]
     width, height = (high - low + 1).tolist()
@@ -111,14 +131,16 @@ def _camera(header: dict[str, Any]) -> dict[str, Any]:
     left_handed = np.linalg.det(to_camera) > 0  # as the camera's space is: then z of the world is turned
     pose = {"world_to_camera": _TURNED @ to_camera @ (_TURNED if left_handed else np.eye(4))}
     if placed and "worldToNDC" in header:
-        return pose | _projection(_matrix(header, "worldToNDC") @ np.linalg.inv(to_camera), width, height)
+        projection = _projection(_matrix(header, "worldToNDC") @ np.linalg.inv(to_camera), width, height)
+        return pose | decide_view(projection, (width, height), decided, "worldToNDC")
     screen = (*header["screenWindowCenter"], header["screenWindowWidth"])
     if screen == _DEFAULT_SCREEN:
-        return pose | assumed_pinhole(width, height)
+        return pose | decide_view(None, (width, height), decided)
     right, up, across = map(float, screen)
     fx = width / across
     fy = fx * float(header["pixelAspectRatio"])
-    return pose | {"fx": fx, "fy": fy, "cx": width / 2 - right * fx, "cy": height / 2 + up * fy}
+    pinhole = {"fx": fx, "fy": fy, "cx": width / 2 - right * fx, "cy": height / 2 + up * fy}
+    return pose | decide_view(pinhole, (width, height), decided, "screenWindowWidth")
 
 
 def _projection(to_ndc: NDArray[np.float64], width: int, height: int) -> dict[str, Any]:

@@ -13,8 +13,11 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ...errors import EmptyFrame, InputError
-from ..admission import MOST_FRAMES, check_count
+from ...errors import InputError
+from ..contents import PointContents
+from ..reading.columns import decide as decide_columns
+from ..reading.columns import names_of
+from ..reading.sequence import Decided
 
 _CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
 _LONGEST_HEADER = 10_000  # bytes, as numpy has it
@@ -63,21 +66,6 @@ class StoredArray:
         """Bytes of all values."""
         return math.prod(self.shape) * self.dtype.itemsize
 
-    @property
-    def sequence(self) -> tuple[int, ...]:
-        """Shape of a sequence: (T,) for positions (T, N, 3), () for (N, 3). Raises InputError for others."""
-        self._check_type()
-        if len(self.shape) not in (2, 3) or self.shape[-1] != 3:
-            raise InputError(
-                f"array '{self.name}' has shape {self.shape}", hint="Positions are (N, 3) or (T, N, 3)"
-            )
-        if self.dtype.kind not in "fiu":
-            raise InputError(f"array '{self.name}' is of type {self.dtype}, expected numbers")
-        if not self.nbytes:
-            raise EmptyFrame(f"holds no points: array '{self.name}' has shape {self.shape}")
-        check_count(math.prod(self.shape[:-2]), MOST_FRAMES, "frames")
-        return self.shape[:-2]
-
     def memory(self, frame: int | None = None) -> int:
         """Bytes that `read` takes."""
         is_part = frame is not None and not self.column_order
@@ -97,6 +85,15 @@ class StoredArray:
         self.stream.seek(frame * math.prod(shape) * self.dtype.itemsize, 1)
         return self._values(shape)
 
+    def first(self, count: int) -> NDArray:
+        """The first entries along the first axis; `read` still works then. Raises InputError as `read`."""
+        self._check_type()
+        at = self.stream.tell()
+        whole = self.column_order or count >= self.shape[0]
+        values = self._values(self.shape if whole else (count, *self.shape[1:]))[:count]
+        self.stream.seek(at)
+        return values
+
     def _check_type(self) -> None:
         if self.dtype.hasobject:
             raise InputError(f"array '{self.name}' holds pickled objects, which are refused")
@@ -109,3 +106,23 @@ class StoredArray:
                 raise InputError(f"array '{self.name}' ends early")
         values = flat.view(self.dtype)
         return values.reshape(shape[::-1]).T if self.column_order else values.reshape(shape)
+
+
+def rows_of_points(values: NDArray) -> NDArray:
+    """Points (N, 3) of any array whose last axis is x, y and z, at least in single precision."""
+    points = values.reshape(-1, 3)
+    return points.astype(np.float32) if points.dtype.itemsize < 4 and points.dtype.kind == "f" else points
+
+
+def columns_of_array(values: NDArray, held: int, decided: Decided) -> PointContents:
+    """The columns of points (N, C), or of an array of fields, by name. Raises InputError."""
+    if values.dtype.names is not None:
+        fields = {name: values[name] for name in values.dtype.names if values[name].ndim == 1}
+        return PointContents(columns=fields, held=held)
+    table = values.astype(np.float64, copy=False)
+    roles = decide_columns(table, corrections=decided.corrections)
+    decided.note(roles)
+    columns = dict(zip(names_of(roles.value), values.T, strict=True))
+    return PointContents(
+        columns=columns, is_named=False, has_roles="columns" in decided.corrections, held=held
+    )

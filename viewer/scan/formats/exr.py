@@ -37,6 +37,7 @@ from ..admission import MOST_MEMBERS, admit, check_count, opened, read_exactly, 
 from ..colors import linear_from_srgb8, srgb8_from_linear
 from ..points import UNKNOWN_UNIT
 from ..range_view import DepthKind, RangeView, mask_of, memory_of_merging
+from ..reading.sequence import Decided
 from ..units import usable_unit
 from ._exr_renders import rendered_eyes, view_of_eye
 
@@ -61,11 +62,12 @@ def read_unit(path: Path) -> str | None:
         return _unit(_headers(stream)[0])
 
 
-def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
+def read(path: Path, frame: int = 0, decided: Decided | None = None) -> tuple[RangeView, ...]:
     """The views in the order of the parts, or those of other programs' pictures.
 
     Raises InputError where a part is damaged or no range view.
     """
+    decided = decided or Decided()
     with opened(path) as stream:
         headers = _headers(stream)
         check_count(len(headers), MOST_MEMBERS, "parts")
@@ -74,14 +76,14 @@ def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
             _check_flat(header, _name(header, number))
             if is_ours:
                 _check_form(header, _name(header, number))
-        eyes = [] if is_ours else rendered_eyes(headers)
+        eyes = [] if is_ours else rendered_eyes(headers, decided)
         needed = _memory(headers, _pixel_bytes(stream, len(headers)), len(eyes))
         admit(size_of(stream), needed, _MOST_RATIO)
         images = _decoded(stream, len(headers))
         if is_ours:
             views = tuple(_view(header, images.pop(0), _name(header, n)) for n, header in enumerate(headers))
         else:
-            views = tuple(view_of_eye(headers, images, eye) for eye in eyes)
+            views = tuple(view_of_eye(headers, images, eye, decided) for eye in eyes)
             del images
         admit(size_of(stream), memory_of_merging(views), _MOST_RATIO)
     return views

@@ -1,35 +1,39 @@
-"""NPY: one NumPy array of positions, (N, 3), or (T, N, 3) for a sequence."""
+"""NPY: one NumPy array of points.
+
+(N, 3), or (N, C) with more columns, or (N,) of fields; (T, N, 3) for a sequence; (H, W, 3) for an organised
+cloud, (S, H, W, 3) for a sequence of these. See `viewer/scan/reading/arrays.py`.
+"""
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
-from typing import BinaryIO
 
 from ..admission import admit, opened, size_of
 from ..points import PointCloud
-from ..reading.cloud import cloud_of
+from ..reading.arrays import point_array
+from ..reading.cloud import assemble, cloud_of
 from ..reading.sequence import Decided
-from ._stored import StoredArray
+from ._stored import StoredArray, columns_of_array, rows_of_points
 
 TITLE = "NPY"
 SUFFIXES = (".npy",)
 
 
-def frame_count(path: Path) -> int:
-    """T of a (T, N, 3) array, else 1."""
+def frame_count(path: Path, decided: Decided) -> int:
+    """How many frames the array holds."""
     with opened(path) as stream:
-        return math.prod(_positions(stream).sequence)
+        array = StoredArray.open("positions", stream, size_of(stream))
+        return point_array(array, array.first, decided).frames
 
 
 def read(path: Path, frame: int, decided: Decided) -> PointCloud:
-    """One frame of the positions; the other frames are not read. Raises InputError."""
+    """One frame of the points; the other frames are not read. Raises InputError."""
     with opened(path) as stream:
-        positions = _positions(stream)
-        share = frame if positions.sequence else None
-        admit(size_of(stream), positions.memory(share))
-        return cloud_of([positions.read(share)], {}, {}, held=size_of(stream), decided=decided)
-
-
-def _positions(stream: BinaryIO) -> StoredArray:
-    return StoredArray.open("positions", stream, size_of(stream))
+        held = size_of(stream)
+        array = StoredArray.open("positions", stream, held)
+        what = point_array(array, array.first, decided)
+        share = frame if what.sequence else None
+        admit(held, array.memory(share))
+        if array.dtype.names is not None or array.shape[-1] != 3:
+            return assemble(columns_of_array(array.read(), held, decided), decided)
+        return cloud_of([rows_of_points(array.read(share))], {}, {}, held=held, decided=decided)

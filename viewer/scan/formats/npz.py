@@ -1,17 +1,16 @@
 """NPZ: NumPy arrays by name.
 
-`positions` (N, 3), or (T, N, 3) for a sequence, else `points`, `vertices`, or `xyz` (N, 3); optional
-`normals` (…, N, 3), `colors` (…, N, 3 or 4)
-uint8 or float in 0..1, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N)
-by their names, `origin` (3,) that is to be added to the positions, `viewpoint` (3,), where the scanner stood,
-`times` (T,) in seconds, `faces` (F, 3) whole numbers, which tell the topology of all frames. Attributes of a
-sequence may lack T: then all frames share them. Arrays of other shapes are left alone. Without `positions`,
-`depth`, `xyz` or `elevation` make a range view; see `_array_views`.
+`positions` of one of the shapes in `viewer/scan/reading/arrays.py`, or an array that other programs call
+otherwise, such as `points` or `world_points`; optional `normals` (…, N, 3), `colors` (…, N, 3 or 4) on any
+scale, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N) by their names,
+`origin` (3,) that is to be added to the positions, `viewpoint` (3,), where the scanner stood, `times` (T,) in
+seconds or a rate such as `fps`, `faces` (F, 3) whole numbers, which tell the topology of all frames.
+Attributes of a sequence may lack T: then all frames share them. Scan4D passes over arrays of other shapes.
+Without `positions`, `depth`, `xyz` or `elevation` make a range view; see `_array_views`.
 """
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -25,18 +24,19 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, shortened
 from ..admission import MOST_MEMBERS, admit, check_count, opened, size_of
 from ..contents import Deferred
 from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ..pose import Scanned
-from ..reading.cloud import cloud_of
+from ..reading.arrays import PointArray, point_array, points_among, stated_times
+from ..reading.cloud import assemble, cloud_of
 from ..reading.sequence import Decided
 from ._array_views import makes_views, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
 from ._precision import within_decimals
-from ._stored import StoredArray
+from ._stored import StoredArray, columns_of_array, rows_of_points
 from ._topology import with_topology
 
 TITLE = "NPZ"
@@ -49,9 +49,9 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
     "radii": [()],
     "axes": [(4,)],
 }
-_ALSO_POSITIONS = ("points", "vertices", "xyz")  # what other programs call them; the first that is there
+_ALSO_COLORS = ("color", "rgb", "images", "image")  # what other programs call them beside point maps
 _OF_ALL = {"origin", "times", "viewpoint"}
-_FORM = "Name points 'positions', (N, 3) or (T, N, 3), and range images 'depth', (H, W)"
+_FORM = "Name points 'positions', (N, 3), (T, N, 3) or (H, W, 3), and range images 'depth', (H, W)"
 _SAVE_ANEW = "Save the arrays with numpy.savez"
 _MOST_RATIO, _FREE = 64, 180 << 20  # bytes to unpack for those packed, and beyond: scans pack to a tenth
 _ENCRYPTED = 1  # a bit of a member's flags
@@ -65,43 +65,54 @@ _SAMPLE = 1 << 13  # positions looked at
 _FAR = 16  # radii of the points from their origin, where float32 still tells a millionth of one
 
 
-def frame_count(path: Path) -> int:
-    """T of (T, N, 3) positions, else 1."""
+def frame_count(path: Path, decided: Decided) -> int:
+    """How many frames the points have; 1 for a range view."""
     with opened(path) as stream, _arrays(stream) as arrays:
-        return 1 if _is_range_scan(arrays) else math.prod(_positions(arrays).sequence)
+        return 1 if _is_range_scan(arrays) else _points(arrays, decided).frames
 
 
-def read_unit(path: Path) -> str | None:
+def read_unit(path: Path, decided: Decided) -> str | None:
     """The unit of a range view, or None."""
     with opened(path) as stream, _arrays(stream) as arrays:
-        return unit_of_arrays(arrays, size_of(stream)) if _is_range_scan(arrays) else None
+        return unit_of_arrays(arrays, size_of(stream), decided) if _is_range_scan(arrays) else None
 
 
-def read_times(path: Path) -> NDArray[np.float64] | None:
-    """The array `times`, (T,) float64 seconds, or None."""
+def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
+    """Seconds of the frames, (T,) float64, of an array of times, a rate or a step; or None."""
     with opened(path) as stream, _arrays(stream) as arrays:
-        sequence = () if _is_range_scan(arrays) else _positions(arrays).sequence
-        return _vector(arrays["times"], *sequence) if sequence and "times" in arrays else None
+        if _is_range_scan(arrays) or not (points := _points(arrays, decided)).sequence:
+            return None
+        stated = stated_times(arrays, points.frames)
+        return None if stated is None else stated[0]
 
 
 def read(path: Path, frame: int, decided: Decided) -> Scanned:
     """One frame; it reads no array that is not needed, and no other frame. Raises InputError."""
     with opened(path) as stream, _arrays(stream) as arrays:
         if _is_range_scan(arrays):
-            return (view_of_arrays(arrays, size_of(stream)),)
-        shares = _shares(arrays, frame)
-        share, held = shares.pop("positions"), size_of(stream)
-        admit(held, arrays["positions"].memory(share))
-        positions = [arrays["positions"].read(share)]
+            return (view_of_arrays(arrays, size_of(stream), decided),)
+        points, held, array = _points(arrays, decided), size_of(stream), arrays["positions"]
+        if array.dtype.names is not None or array.shape[-1] != 3:
+            admit(held, array.memory())
+            return assemble(columns_of_array(array.read(), held, decided), decided)
+        shares = _shares(arrays, points, frame)
+        share = shares.pop("positions")
+        admit(held, array.memory(share))
+        positions = [rows_of_points(array.read(share))]
         shift, origin = None, None
         if "origin" in arrays:
             stored = _vector(arrays["origin"], 3)
             shift, origin = _shifted(positions[0], stored)
+
+        def rows(array: StoredArray, share: int | None) -> NDArray:
+            values = array.read(share)
+            return values.reshape(points.count, *values.shape[len(points.grid) :]) if points.grid else values
+
         values = {
-            name: Deferred(partial(array.read, share), array.dtype, width)
+            name: Deferred(partial(rows, array, share), array.dtype, width)
             for name, share in shares.items()
             for array in [arrays[name]]
-            for width in [array.memory(share) // (len(positions[0]) * array.dtype.itemsize)]
+            for width in [array.memory(share) // (points.count * array.dtype.itemsize)]
         }
         attributes = {name: values.pop(name) for name in _OF_POINTS if name in values}
         cloud = cloud_of(positions, attributes, values, shift, held, decided=decided)
@@ -177,16 +188,20 @@ def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
             for info in infos
             for name in [info.filename.removesuffix(".npy")]
         }
-        called = next((name for name in _ALSO_POSITIONS if _are_points(name, arrays)), None)
-        if called and "positions" not in arrays and not makes_views(arrays):
-            arrays["positions"] = arrays.pop(called)
+        called = points_among(arrays)
+        if called is not None and "positions" not in arrays and not makes_views(arrays):
+            _rename(arrays, called)
         yield arrays
 
 
-def _are_points(name: str, arrays: dict[str, StoredArray]) -> bool:
-    """Whether there is an array of this name that has points; `xyz` of three dimensions is an image."""
-    shape = arrays[name].shape if name in arrays else ()
-    return shape[-1:] == (3,) and len(shape) in ((2,) if name == "xyz" else (2, 3))
+def _rename(arrays: dict[str, StoredArray], called: str) -> None:
+    """Have the array of points be `positions`, as its own name says `point maps`; and theirs its partners."""
+    arrays["positions"] = arrays.pop(called)
+    if "colors" not in arrays:
+        shape = arrays["positions"].shape[:-1]
+        alike = [name for name in _ALSO_COLORS if name in arrays and arrays[name].shape[:-1] == shape]
+        if alike:
+            arrays["colors"] = arrays.pop(alike[0])
 
 
 def _check_directory(stream: BinaryIO) -> None:
@@ -221,16 +236,16 @@ def _check_members(infos: Sequence[ZipInfo], held: int) -> None:
         raise InputError(f"{held} bytes would unpack to {unpacked}", hint=_SAVE_ANEW)
 
 
-def _shares(arrays: dict[str, StoredArray], frame: int) -> dict[str, int | None]:
+def _shares(arrays: dict[str, StoredArray], points: PointArray, frame: int) -> dict[str, int | None]:
     """The arrays of points, and which entry of each belongs to the frame; None: all of it is shared.
 
     Raises InputError where a reserved name has another shape than the positions ask for.
     """
-    positions = _positions(arrays)
-    sequence, count = positions.sequence, positions.shape[-2]
+    sequence = points.sequence
+    forms = [(points.count,), *([points.grid] if points.grid else [])]
     shares: dict[str, int | None] = {}
     for name, array in arrays.items():
-        shapes = [(count, *tail) for tail in _OF_POINTS.get(name, [()])]
+        shapes = [(*form, *tail) for form in forms for tail in _OF_POINTS.get(name, [()])]
         if array.shape in shapes:
             share = None
         elif sequence and array.shape in [(*sequence, *shape) for shape in shapes]:
@@ -248,11 +263,13 @@ def _is_range_scan(arrays: dict[str, StoredArray]) -> bool:
     return "positions" not in arrays and makes_views(arrays)
 
 
-def _positions(arrays: dict[str, StoredArray]) -> StoredArray:
+def _points(arrays: dict[str, StoredArray], decided: Decided) -> PointArray:
+    """Decide what the array of points is. Raises InputError where there is none."""
     if "positions" not in arrays:
-        found = f"has no array 'positions', only: {', '.join(arrays) or 'none'}"
-        raise InputError(found, hint=_FORM)
-    return arrays["positions"]
+        there = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise InputError(f"has no array of points, only: {shortened(there) or 'none'}", hint=_FORM)
+    array = arrays["positions"]
+    return point_array(array, array.first, decided, arrays)
 
 
 def _faces(arrays: dict[str, StoredArray], held: int, held_before: int = 0) -> Iterator[Faces]:

@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..points import UNKNOWN_UNIT
-from ..range_view import RangeView, assumed_pinhole
+from ..range_view import RangeView
+from ..reading.camera import decide_view
+from ..reading.depths import measured_depths
+from ..reading.sequence import Decided
 from ..terrain import METRE, Ground, are_degrees, terrain_view
 from ..units import conversion
 from ._pictures import numbers_of_picture, opened_picture
@@ -40,22 +43,22 @@ def read_unit(path: Path) -> str | None:
     return read(path)[0].unit  # heights tell whether the ground is in degrees
 
 
-def read(path: Path, frame: int = 0) -> tuple[RangeView, ...]:
+def read(path: Path, frame: int = 0, decided: Decided | None = None) -> tuple[RangeView, ...]:
     """The terrain or the depth as one view. Raises InputError for pictures in colour, too."""
     with opened_picture(path, ("TIFF",)) as image:
         tags = dict(image.tag_v2)  # type: ignore[attr-defined]
         numbers = numbers_of_picture(image)
-    return (_terrain(numbers, tags) if _has_ground(tags) else _depth(numbers),)
+    return (_terrain(numbers, tags) if _has_ground(tags) else _depth(numbers, decided or Decided()),)
 
 
-def _depth(numbers: NDArray) -> RangeView:
+def _depth(numbers: NDArray, decided: Decided) -> RangeView:
     height, width = numbers.shape
     return RangeView(
         depth=numbers.astype(np.float32),
-        mask=np.ones(numbers.shape, bool),
+        mask=measured_depths(numbers, decided),
         world_to_camera=np.eye(4),
         name="camera",
-        **assumed_pinhole(width, height),
+        **decide_view(None, (width, height), decided),
     )
 
 

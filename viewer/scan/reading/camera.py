@@ -8,7 +8,7 @@ passes over such a default.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from ...errors import InputError
 from ..contents import StatedCamera
 from ..range_view import DepthKind, assumed_pinhole
 from .record import Decision, Source
+from .sequence import Decided
 
 Size = tuple[int, int]  # width and height, pixels
 
@@ -117,6 +118,30 @@ def decide_camera(
         assumed=assumed,
     )
     return DecidedCamera(camera, (decision, of_scale))
+
+
+def decide_view(
+    stated: Mapping[str, Any] | None, size: Size, decided: Decided, where: str = ""
+) -> dict[str, Any]:
+    """The camera of a picture in a file that states it or not; the decision goes into the record.
+
+    stated: fields of a `RangeView` (fx, fy, cx, cy and perhaps kind and distortion), None where the file is
+    silent. Returns such fields. Raises InputError where the user's camera cannot be the picture's.
+    """
+    camera = decided.corrections.get("camera")
+    if isinstance(camera, str):
+        raise InputError("--read camera of a single file needs numbers, not a file", hint=_STATE_IT)
+    if stated is None or camera is not None:
+        sources = CameraSources(corrected=None if camera is None else corrected_camera(camera))
+        found = decide_camera(sources, size)
+        decided.note(found.decisions[0])
+        return found.camera.of_view
+    value = {name: stated[name] for name in ("fx", "fy")} | {
+        name: stated[name] - CENTER for name in ("cx", "cy")
+    }
+    value |= {"distortion": list(stated.get("distortion", ())), "kind": stated.get("kind", "z")}
+    decided.note(Decision("camera", value, "file", where, changes_numbers=True))
+    return dict(stated)
 
 
 def scaled(camera: StatedCamera, size: Size) -> StatedCamera:
