@@ -20,8 +20,6 @@ from viewer import PointCloud, cli, open_scan
 from viewer.analysis.landmarks.files import read_landmarks
 from viewer.errors import InputError
 
-# What Scan4D does not read rightly yet, by area. A mark goes with the work that makes its test pass.
-
 RED, GREEN, BLUE, YELLOW = [255, 0, 0], [0, 255, 0], [0, 0, 255], [255, 255, 0]
 
 
