@@ -18,7 +18,6 @@ from ..bounds import Bounds
 from ..csv_text import save_rows, text_of_cell
 from ..errors import InputError
 from ..files import absolute, printable
-from ..output.export import is_pattern, numbered
 from ..scan import formats
 from ..scan.open import entries, open_scan
 from ..scan.pose import Pose
@@ -173,6 +172,8 @@ def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list
 
     Raises InputError where a times.csv holds the times of other files, or would be one to other frames.
     """
+    from ..output.export import is_pattern, numbered  # takes 40 ms, which `scan4d info` does not need
+
     files = [numbered(out, index) for index in indices]
     if not is_pattern(out):
         return files
@@ -185,6 +186,8 @@ def frame_outputs(out: Path, indices: Sequence[int], timeline: Timeline) -> list
 def with_files(out: Path, poses: Iterable[Pose], count: int) -> Iterator[tuple[Pose, Path]]:
     """Poses, so many, each with the file that it goes to; for a pattern, times.csv beside them when all are
     written."""
+    from ..output.export import is_pattern, numbered
+
     rows: list[tuple[str, float]] = []
     with progress(count) as tick:
         for pose in poses:
