@@ -115,8 +115,11 @@ def test_nothing_to_open(tmp_path: Path) -> None:
     assert "holds no scan files. Known files: .asc, .csv, .exr, .las, .laz, .npy" in message(tmp_path)
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
     assert message(tmp_path).endswith("holds no scan files. Its folders: a9, a10, b")
-    assert "a.jpg: unknown file suffix '.jpg'. Known: .asc, .csv, .exr, .las, .laz" in message(
+    assert "a.jpg: unknown file suffix '.jpg'. Scan4D does not read a picture alone" in message(
         put(tmp_path, "a.jpg") / "a.jpg"
+    )
+    assert "a.odd: unknown file suffix '.odd'. Known: .asc, .csv, .exr, .las, .laz" in message(
+        put(tmp_path, "a.odd") / "a.odd"
     )
     assert "is empty" in message_of_pose(put_empty(tmp_path / "empty.ply"))
     assert "is neither a file nor a folder" in message(os.devnull)
