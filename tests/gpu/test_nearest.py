@@ -17,6 +17,7 @@ from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.gpu import gl, scatter
 from viewer.gpu.constants import NO_DEPTH, NOTHING
+from viewer.gpu.context import WIDE_EXTENSIONS
 from viewer.gpu.shader import Source
 from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
@@ -75,11 +76,11 @@ def test_what_a_picture_left_half_done_is_cleared(renderer: Renderer) -> None:
 def test_pictures_are_the_same_by_either_atomics(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    if not renderer.gpu.wide_atomics:
+    if not renderer.gpu.ctx.extensions >= WIDE_EXTENSIONS:
         pytest.skip("this driver has no 64-bit atomics")
-    one = pictures(renderer, name)
-    monkeypatch.setattr(renderer.gpu, "wide_atomics", False)
-    assert all((a == b).all() for a, b in zip(one, pictures(renderer, name), strict=True))
+    two = pictures(renderer, name)
+    monkeypatch.setattr(renderer.gpu, "wide_atomics", True)
+    assert all((a == b).all() for a, b in zip(pictures(renderer, name), two, strict=True))
 
 
 @pytest.mark.parametrize("name", POINTS)
