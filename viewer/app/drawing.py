@@ -133,7 +133,9 @@ class Drawing(WindowPart):
         """Show the picture in the window. is_dimmed: whether it is not the one that is asked for."""
         viewport = self.viewport
         self.window.fill(self.window_look.palette.panel)
-        if viewport.is_visible and (viewport.is_there or self.playback.problem is None):
+        if self.playback.is_empty:
+            viewport.present_nothing()
+        elif viewport.is_visible and (viewport.is_there or self.playback.problem is None):
             viewport.present(is_dimmed or viewport.shows_another_scan)
 
     @property

@@ -105,6 +105,11 @@ class Playback(WindowPart):
         return self.timeline.broken.get(self.session.index)
 
     @property
+    def is_empty(self) -> bool:
+        """Whether the current frame holds no points, so that the view shows only the background."""
+        return self.session.index in self.timeline.empty
+
+    @property
     def waiting(self) -> bool:
         """Whether the current frame is still being read or prepared."""
         return (self.pose is None or self.pose.index != self.session.index) and self.problem is None

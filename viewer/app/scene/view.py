@@ -12,6 +12,7 @@ from ...camera import Camera
 from ...files import printable
 from ...geometry import Vector
 from ...scan.pose import Pose
+from ...scan.times import frame_in_words
 from .. import notices, theme, widgets
 from ..failures import Failures
 from ..keys import Keys
@@ -179,6 +180,8 @@ class SceneView(WindowPart):
             return str(self.replayer.replaying)
         if playback.pose is None:
             return str(playback.problem) if playback.problem else None
+        if playback.is_empty:
+            return f"{frame_in_words(self.session.index).capitalize()} is empty"
         if playback.player.playing or playback.pose.index == self.session.index:
             return self._words_on_nothing()
         return (

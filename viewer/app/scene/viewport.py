@@ -16,7 +16,7 @@ from ...drawing.plan import Effort, Failed, Plan, Ready, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request, colorable, fallback
 from ...errors import Scan4DError, failure_in_words
-from ...look import SAMPLES
+from ...look import SAMPLES, rgba
 from ...picture.present import Presenter
 from ...picture.soften import soften
 from ...picture.surface import Surface
@@ -284,6 +284,15 @@ class Viewport:
         if self.surface is not None:
             light = _DIMMED if dimmed else 1.0
             self._presenter.present(self.surface, *self.rectangle[:2], self.size, light)
+
+    def present_nothing(self) -> None:
+        """Fill its rectangle of the window with the background of the last picture, for an empty frame."""
+        if self.request is not None:
+            ctx = self.renderer.gpu.ctx
+            ctx.screen.use()
+            ctx.clear(
+                *(part / 255 for part in rgba(self.request.look.background)[:3]), viewport=self.rectangle
+            )
 
     @property
     def image(self) -> int | None:
