@@ -290,9 +290,8 @@ class Viewport:
         if self.request is not None:
             ctx = self.renderer.gpu.ctx
             ctx.screen.use()
-            ctx.clear(
-                *(part / 255 for part in rgba(self.request.look.background)[:3]), viewport=self.rectangle
-            )
+            red, green, blue = (part / 255 for part in rgba(self.request.look.background)[:3])
+            ctx.clear(red, green, blue, viewport=self.rectangle)
 
     @property
     def image(self) -> int | None:
