@@ -150,8 +150,8 @@ def test_a_command_that_draws_range_views_merges_nothing(
 ) -> None:
     poses = []
 
-    def noted(timeline: Timeline, indices: list[int]) -> Iterator[Pose]:
-        for pose in read_poses(timeline, indices):
+    def noted(timeline: Timeline, indices: list[int], **options: bool) -> Iterator[Pose]:
+        for pose in read_poses(timeline, indices, **options):
             poses.append(pose)
             yield pose
 

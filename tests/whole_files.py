@@ -30,6 +30,11 @@ TEXTS = {
     "commas.xyz": "# x y z\n1,2,3\n4,5,6\n",
     "named.csv": '"x";"y";"z";"GPS Time"\r\n1;2;3;4\r\n5;6;7;8\r\n',
     "tabs.txt": "X\tY\tZ\tR\tG\tB\n1\t2\t3\t4\t5\t6\n",
+    "plain.asc": "1 2 3\n4 5 6\n7 8 9\n",
+    "normals.xyzn": "1 2 3 0 0 1\n4 5 6 0 1 0\n7 8 9 1 0 0\n",
+    "colors.xyzrgb": "1 2 3 255 0 0\n4 5 6 0 255 0\n7 8 9 0 0 255\n",
+    "both.xyznrgb": "1 2 3 0 0 1 255 0 0\n4 5 6 0 1 0 0 255 0\n7 8 9 1 0 0 0 0 255\n",
+    "intensity.xyzi": "1 2 3 10\n4 5 6 20\n7 8 9 30\n",
     "count.pts": "2\n1 2 3 4 5 6 7\n8 9 1 2 3 4 5\n",
 }
 

@@ -105,7 +105,7 @@ def test_f6_leads_through_panel_and_timeline_and_back(app: RunningApp) -> None:
 def test_a_widget_of_the_panel_is_worked_by_keys(app: RunningApp) -> None:
     assert app.settle().clicking is None
     app.press("F6", "Home", "Return")  # closes the first section
-    app.press("Tab", "Tab", "Tab", "Return")  # over the next head and the template to a button
+    app.press(*["Tab"] * 4, "Return")  # over the next heads and the template to a button
     assert app.settle().clicking == "landmarks"
     app.press("Return")
     assert app.settle().clicking is None

@@ -17,7 +17,7 @@ def test_an_assumption_is_explained_with_its_alternatives() -> None:
     assert lines[0] == "units"
     assert "Source: assumed" in lines
     assert "The file states none" in lines
-    assert [line for line in lines if "can change what you measure" in line]
+    assert [line for line in lines if "what you measure may be wrong" in line]
     assert lines[-1].endswith("for example: mm, m")
     assert len(explanation(Decision("format", "PLY"))) == 2
 

@@ -395,7 +395,7 @@ def test_the_summary_of_each_command_is_one_sentence_on_one_line(
 def test_the_docs_name_every_flag_and_no_other(run: Run) -> None:
     page = (ROOT / "docs" / "reference" / "command-line.md").read_text(encoding="utf-8")
     sections = dict(re.findall(r"^## `scan4d (\w+).*?`\n(.*?)(?=^## |\Z)", page, re.M | re.S))
-    common = {"--device", "--unit", "--fps", "--up", "--quiet", "--debug"}
+    common = {"--device", "--unit", "--fps", "--read", "--take", "--up", "--quiet", "--debug"}
     assert sorted(sections) == list(command_names())
     for command in command_names():
         flags = set(re.findall(r"(?<![\w-])--[a-z]+", run(command, "--help").out)) - common - {"--help"}

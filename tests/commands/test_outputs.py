@@ -433,9 +433,9 @@ def test_a_full_disk_is_told_and_nothing_is_left(suffix: str, tmp_path: Path) ->
         path = disk / f"a{suffix}"
         with pytest.raises(InputError, match="the disk is full") as error:  # noqa: PT012
             if suffix in export.OUTPUT_SUFFIXES:
-                with export.pictures(path, (320, 240), 25) as put:
+                with export.pictures(path, (320, 240), None) as put:
                     for number in range(20 if suffix == ".mp4" else 1):
-                        put(noise, number, None, None)  # type: ignore[arg-type]
+                        put(noise, number, number / 25, None, None)  # type: ignore[arg-type]
             elif suffix == ".svo":
                 formats.write_poses(path, [Pose.of(0, 0.0, "a", points)], "mm", stop=Stop("depth", depth=16))
             else:

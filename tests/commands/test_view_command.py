@@ -80,7 +80,9 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     from viewer import app
 
     calls: list[tuple[object, dict[str, object]]] = []
-    monkeypatch.setattr(app, "run", lambda scans, **options: calls.append((scans, options)) or 0)
+    monkeypatch.setattr(
+        app, "run", lambda scans, start, **options: calls.append((scans, {**start._asdict(), **options})) or 0
+    )
     monkeypatch.setenv("DISPLAY", ":7")
     ball = str(scans / "ball.npz")
     assert run("view", ball, "demo", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
@@ -88,7 +90,7 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     opened = [options.pop("opened") for _, options in calls]
     assert [timeline.name for timeline in opened] == ["ball.npz", "demo"], "opened once, and handed over"
     assert (opened[0].unit, opened[0].times[0]) == ("mm", 0.0)
-    nothing = {"replay": None, "session": None, "refused": None}
+    nothing = {"replay": None, "session": None, "refused": None, "corrections": {}}
     assert calls == [
         ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, **nothing}),
         (["demo"], {"unit": None, "fps": None, "up": None, "device": None, **nothing}),
@@ -103,9 +105,9 @@ def test_view_opens_a_session_with_its_scan(
     calls: list[tuple[object, object]] = []
     refusals: list[object] = []
 
-    def opened(scans: object, **options: object) -> int:
-        calls.append((scans, options["session"]))
-        refusals.append(options["refused"])
+    def opened(scans: object, start: app.Start, **options: object) -> int:
+        calls.append((scans, start.session))
+        refusals.append(start.refused)
         return 0
 
     monkeypatch.setattr(app, "run", opened)

@@ -25,6 +25,7 @@ from viewer.scan.formats import exr, ply
 from viewer.scan.open import find_source
 from viewer.scan.points import PointCloud
 from viewer.scan.range_view import RangeView, merge
+from viewer.scan.reading.sequence import Decided
 
 _READS = """
 import sys
@@ -272,7 +273,7 @@ def test_a_file_cut_while_it_is_read_gives_no_partial_frame(
 
         monkeypatch.setattr(admission, "size_of", cut_after_the_first_look)
         with pytest.raises(Exception) as caught:  # noqa: PT011  the door makes one message of any
-            formats._readable(path).read(path)
+            formats._scanned(formats._readable(path), path, 0, Decided())
         assert path.stat().st_size == uncut // 2
         assert str(caught.value)
         monkeypatch.setattr(admission, "size_of", size_of)

@@ -83,7 +83,7 @@ def test_degrees_are_told_from_lengths(numbers: tuple[float, ...], found: bool) 
         ({"down": np.nan}, "its cells have the unusable size 30 x nan"),
         ({"left": np.inf}, "starting at inf"),
         ({"degrees": True}, "its centre is at .* degrees of latitude"),
-        ({"degrees": True, "first": 40.0, "down": -0.1, "unit": "units"}, "its heights are in 'units', over"),
+        ({"degrees": True, "first": 40.0, "down": -0.1, "unit": "units"}, "its heights are in 'units', but"),
     ],
 )
 def test_grounds_that_are_none(changes: dict[str, object], reason: str) -> None:

@@ -214,7 +214,7 @@ def test_depths_that_are_none_are_holes() -> None:
      ("outliers", np.nan), ("grazing", 91), ("gain", (1.0, -1.0, 1.0)), ("gain", (1.0, 1.0, np.inf))],
 )  # fmt: skip
 def test_faults_that_cannot_be_are_one_message(name: str, value: float) -> None:
-    with pytest.raises(InputError, match=f"{name} is"):
+    with pytest.raises(InputError, match=f"a scanner's {name} must be"):
         Faults(**{name: value})
 
 
@@ -380,16 +380,16 @@ def test_gain_and_calibration_error_may_differ_from_pod_to_pod(
         (("--elevation", "inf"), "finite"),
         (("--pods", "3", "--noise", "1,2"), "2 values for 3 pods"),
         (("--noise", "x"), "'x' is not a number"),
-        (("--noise=-1",), "noise is -1"),
-        (("--dropouts", "2"), "dropouts is 2"),
-        (("--outliers", "nan"), "outliers is nan"),
-        (("--grazing", "100"), "grazing is 100"),
-        (("--disparity=-1",), "disparity is -1"),
+        (("--noise=-1",), "noise must be 0 or more, not -1"),
+        (("--dropouts", "2"), "dropouts must be 0 to 1, not 2"),
+        (("--outliers", "nan"), "outliers must be 0 to 1, not nan"),
+        (("--grazing", "100"), "grazing must be 0 to 90, not 100"),
+        (("--disparity=-1",), "disparity must be 0 or more, not -1"),
         (("--dropouts", "1"), "holds no points"),
         (("--gain", "1,2"), "neither one factor"),
         (("--gain", "1", "2", "3"), "3 values for 2 pods"),
-        (("--gain=-1",), "gain is -1"),
-        (("--calibration-error", "181"), "calibration error is 181"),
+        (("--gain=-1",), "gain must be 0 or more, not -1"),
+        (("--calibration-error", "181"), "calibration error must be 0 to 180, not 181"),
         (("--fov", "180"), "fov_y"),
         (("--size", "0x5"), "not a size"),
         (("--size", "100000x100000"), "too large"),

@@ -100,7 +100,7 @@ def test_splats_on_hardware_go_the_way_that_was_measured(
         render_frame(renderer, request, surface)
         assert {name for name, _ in surface.stats.passes}
         passes = [name for name, _ in surface.stats.passes if name != "clear"]
-        assert len(passes) < 20, "passes of the trial are not the picture's"
+        assert len(passes) < 30, "passes of the trial are not the picture's"
         chosen.add(surface.stats.chosen["instancing"])
         pictures.append(surface.row)
         renderer.release()

@@ -20,7 +20,7 @@ def with_uncertainty(value: float, sigma: float, unit: str = "") -> str:
         return f"{value:.6g} {unit}".rstrip()
     power = math.floor(math.log10(uncertainty))
     decimals = (
-        -power if float(f"{uncertainty:.0e}") >= 2 * 10.0**power else 1 - power
+        -power if float(f"{uncertainty:.1e}") >= 2 * 10.0**power else 1 - power
     )  # two digits from 1.0 to 1.9
     if not _DECIMALS[0] <= decimals <= _DECIMALS[1]:
         return f"{value:.6g} ± {uncertainty:.1g} {unit}".rstrip()

@@ -165,8 +165,8 @@ def _common_arguments() -> _Parser:
         nargs="+",
         default={},
         metavar="KEY=VALUE",
-        help="correct how Scan4D reads the scan, for example decimal=, or unit=mm. 'scan4d info --verbose' "
-        "lists the decisions",
+        help="correct how Scan4D reads the scan, for example decimal=, or unit=mm. 'scan4d info' lists "
+        "the decisions",
     )
     group.add_argument(
         "--take", metavar="NAME", help="which scan of a folder that holds several, or all as one scan"

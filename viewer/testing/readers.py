@@ -66,7 +66,8 @@ def _it_declares_itself(suffix: str, module: ModuleType) -> None:
         assert each == each.lower(), f"{each}: suffixes must be in lower case"
         assert each.startswith("."), f"{each}: suffixes must begin with a dot"
     assert suffix in module.SUFFIXES
-    assert callable(module.read)
+    hooks = [getattr(module, name, None) for name in ("contents", "read")]
+    assert any(map(callable, hooks)), "a reader needs the function contents or read"
 
 
 def _it_refuses_what_is_no_file(suffix: str, module: ModuleType) -> None:

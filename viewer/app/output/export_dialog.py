@@ -140,7 +140,7 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
 def _edit_quality(choices: Choices, shown: str) -> Choices:
     """Declare the choice of samples. shown: the word for that of the view."""
     titles = {
-        AS_SHOWN: f"Anti-aliasing as in the section Appearance: {QUALITY_WORDS[shown]}",
+        AS_SHOWN: f"Anti-aliasing as shown: {QUALITY_WORDS[shown]}",
         **QUALITY_WORDS,
     }
     imgui.begin_disabled(choices.format == EXR)
