@@ -59,7 +59,6 @@ def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.Monke
     np.testing.assert_array_equal(picture(saved), replayed(saved, "again.png")[0])
 
 
-@pytest.mark.slow
 def test_other_renderers_show_other_colours_and_say_so(app: RunningApp) -> None:
     above = slice(0, app.view()[3] // 2)  # the messages
     before = shown(app)[above].copy()
