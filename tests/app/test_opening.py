@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewer.app.files.opening import Opening, find_facts, read_from
+from viewer.app.files.opening import Opening, Way, begin, find_facts, read_from
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
 from viewer.errors import InputError, Scan4DError
@@ -42,7 +42,7 @@ def no_session() -> None:
 
 def start(opening: Opening, scan: Path, index: int = 0) -> None:
     saved = SavedSession("scan", None, index, Document())
-    opening.start(str(scan), scan.name, lambda: saved, lambda: open_scan(scan))
+    opening.start(str(scan), scan.name, Way(lambda: saved, lambda read: open_scan(scan, read=read)))
 
 
 def test_an_opened_scan_has_its_first_pose_in_memory(tmp_path: Path) -> None:
@@ -90,19 +90,19 @@ def test_a_sequence_opens_where_its_first_frame_is_broken(tmp_path: Path) -> Non
 
 
 def test_whatever_goes_wrong_is_one_message(tmp_path: Path) -> None:
-    def fail() -> Timeline:
+    def fail(_: object) -> Timeline:
         raise KeyError("x")
 
     opening = Opening()
-    opening.start("scan", "scan", no_session, fail)
+    opening.start("scan", "scan", Way(no_session, fail))
     with pytest.raises(Scan4DError, match=r"scan: cannot be opened \(KeyError: 'x'\)"):
         taken(opening)
 
 
-def slow(folder: Path, gate: threading.Event, opened: Future[Timeline]) -> Callable[[], Timeline]:
+def slow(folder: Path, gate: threading.Event, opened: Future[Timeline]) -> Callable[[object], Timeline]:
     """Opens a scan when the gate does."""
 
-    def open_it() -> Timeline:
+    def open_it(_: object) -> Timeline:
         gate.wait()
         opened.set_result(open_scan(folder))
         return opened.result()
@@ -120,7 +120,7 @@ def is_closed(timeline: Timeline) -> bool:
 
 def test_another_scan_takes_the_place_of_the_one_being_opened(tmp_path: Path) -> None:
     gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
-    opening.start("slow", "slow", no_session, slow(save(tmp_path / "slow"), gate, opened))
+    opening.start("slow", "slow", Way(no_session, slow(save(tmp_path / "slow"), gate, opened)))
     former = opening.task
     assert former is not None
     start(opening, save(tmp_path / "fast"))
@@ -137,7 +137,7 @@ def test_another_scan_takes_the_place_of_the_one_being_opened(tmp_path: Path) ->
 
 def test_what_was_cancelled_never_comes(tmp_path: Path) -> None:
     gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
-    opening.start("slow", "slow", no_session, slow(save(tmp_path / "slow"), gate, opened))
+    opening.start("slow", "slow", Way(no_session, slow(save(tmp_path / "slow"), gate, opened)))
     opening.cancel()
     assert opening.scan is None
     assert opening.take() is None
@@ -152,7 +152,7 @@ def test_what_was_cancelled_never_comes(tmp_path: Path) -> None:
 def test_what_was_ready_and_never_taken_is_closed(tmp_path: Path) -> None:
     gate, opened, opening = threading.Event(), Future[Timeline](), Opening()
     gate.set()
-    opening.start("slow", "slow", no_session, slow(save(tmp_path / "slow"), gate, opened))
+    opening.start("slow", "slow", Way(no_session, slow(save(tmp_path / "slow"), gate, opened)))
     left = opened.result()
     threads = [thread for thread in threading.enumerate() if thread.name == "Opening slow"]
     for thread in threads:
@@ -177,12 +177,12 @@ def test_a_folder_that_cannot_be_read_at_all_is_refused_in_one_message(tmp_path:
         (scan / f"{number}.npy").write_bytes(b"nothing")
     opened: list[Timeline] = []
 
-    def open_it() -> Timeline:
+    def open_it(_: object) -> Timeline:
         opened.append(open_scan(scan))
         return opened[0]
 
     opening = Opening()
-    opening.start("scan", "scan", no_session, open_it)
+    opening.start("scan", "scan", Way(no_session, open_it))
     with pytest.raises(
         InputError, match=r"scan: Scan4D cannot read any of its 3 frames\. The first problem: \S+0\.npy"
     ):
@@ -194,9 +194,9 @@ def test_a_scan_begins_with_the_next_frame_that_can_be_read(tmp_path: Path) -> N
     scan = save(tmp_path / "scan", 4)
     for broken in (0, 1, 3):
         (scan / f"{broken}.npy").write_bytes(b"nothing")
-    for begin, order in ((0, {0, 1}), (3, {3, 0, 1})):
+    for start_at, order in ((0, {0, 1}), (3, {3, 0, 1})):
         with open_scan(scan) as timeline:
-            assert read_from(timeline, begin) == 2
+            assert read_from(timeline, start_at) == 2
             assert set(timeline.broken) == order
             assert timeline.ready(2) is not None
 
@@ -219,3 +219,39 @@ def test_every_odd_or_hostile_file_opens_or_is_refused_in_one_message(data_dir: 
     for name, told in refused.items():
         assert name in told
         assert len(told) < 1000
+
+
+def table(path: Path) -> Path:
+    """Four columns without names, x = y = z, so that nothing but a correction says what they are."""
+    rows = np.random.default_rng(0).random((50, 4))
+    np.savetxt(path, rows)
+    return path
+
+
+def test_a_scan_is_opened_with_the_corrections_of_its_document(tmp_path: Path) -> None:
+    scan = table(tmp_path / "points.txt")
+    left = SavedSession("scan", None, 0, Document(reading={"columns": "- x y z"}))
+    with begin(Way(lambda: left, lambda read: open_scan(scan, read=read))).timeline as timeline:
+        pose = timeline.pose(0)
+        assert np.allclose(pose.cloud.positions + pose.origin, np.loadtxt(scan)[:, 1:], atol=1e-6)
+
+
+def test_corrections_of_the_command_line_win_over_those_of_the_document(tmp_path: Path) -> None:
+    scan = table(tmp_path / "points.txt")
+    left = SavedSession("scan", None, 0, Document(reading={"columns": "- x y z", "unit": "mm"}))
+    way = Way(lambda: left, lambda read: open_scan(scan, read=read), stated={"columns": "x - y z"})
+    opened = begin(way)
+    opened.timeline.close()
+    assert opened.reading == {"columns": "x - y z", "unit": "mm"}
+
+
+def test_a_scan_opens_without_corrections_that_it_cannot_be_read_with(tmp_path: Path) -> None:
+    scan = save(tmp_path / "scan")
+    left = SavedSession("scan", None, 1, Document(reading={"times": "none.csv"}))
+    way = Way(lambda: left, lambda read: open_scan(scan, read=read))
+    opened = begin(way, read_from)
+    opened.timeline.close()
+    assert opened.reading == {}
+    assert "reads it without them" in str(opened.problem)
+    with pytest.raises(InputError):
+        begin(way._replace(must_correct=True), read_from)

@@ -57,7 +57,17 @@ def run(
         up_vector(start.up)
     found, problems = named_scans(scans)
     is_lost, found = not found, found or [DEMO]
-    timeline = opened or open_scan(found[0], start.unit, start.fps, start.corrections)
+    from .files.opening import Way, begin, find_stored
+
+    def open_first(reading: Mapping[str, str]) -> Timeline:
+        if opened is not None and reading == (start.corrections or {}):
+            return opened
+        return open_scan(found[0], start.unit, start.fps, reading)
+
+    first = Way(lambda: find_stored(found[0], start.up), open_first, start.session, start.corrections or {})
+    begun = begin(first)
+    if opened is not None and begun.timeline is not opened:
+        opened.close()
     from .closing import Signals
 
     with Signals() as signals:
@@ -79,7 +89,7 @@ def run(
         try:
             with uncollected():  # tools are imported
                 stated = StatedOptions(start.unit, start.fps, start.up, start.corrections)
-                app = App(window, found, timeline, stored, stated, start.session)
+                app = App(window, found, begun, stored, stated)
             try:
                 for note in notes:
                     app.notices.tell(note)

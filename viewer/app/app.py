@@ -9,16 +9,13 @@ import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ..document.saved_session import SavedSession
 from ..document.schema import usable
 from ..drawing.renderer import Renderer
 from ..folders import user_folder
 from ..gpu.context import Gpu
-from ..scan.timeline import Timeline
 from . import keys
 from .failures import Failures
-from .files.opener import find_stored
-from .files.opening import begin
+from .files.opening import Opened
 from .menus import Commands
 from .notices import Notices
 from .part import Parts
@@ -50,23 +47,21 @@ class App:
         self,
         window: Window,
         scans: Sequence[str],
-        timeline: Timeline,
+        opened: Opened,
         stored: Mapping[str, Any],
         stated: StatedOptions,
-        session: SavedSession | None = None,
     ) -> None:
-        """stored: name of a part -> the values that come back, as JSON has them. session: to open the first
-        scan with."""
+        """opened: the first of the scans. stored: name of a part -> the values that come back, as JSON has
+        them."""
         self.window, self.commands, self.notices = window, Commands(), Notices()
         log.debug("%s", window.placement)
         self.failures = Failures(self.notices.tell_of_scan)
         self.renderer = Renderer(Gpu(window.ctx))
         self.viewport = Viewport(self.renderer, (0, 0, *window.buffer_size))
-        opened = begin(timeline, lambda: find_stored(scans[0], stated.up), session)
         settings = usable(SessionSettings(), stored.get(Session.name, {}))
         document = settings.document if stated.up is None else settings.document.with_up(stated.up)
         self.session = Session(scans[0], document, settings.pace, opened.left)
-        self.playback = Playback(timeline, self.session, opened.first)
+        self.playback = Playback(opened.timeline, self.session, opened.first)
         modules = ToolModules(self.commands)
         self.keys, problems = keys.load_keys(user_folder() / keys.FILE, self.commands)
         shared = {

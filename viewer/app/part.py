@@ -118,6 +118,11 @@ class WindowPart:
         """Functions that Escape asks, and the layer of each: the highest is asked first."""
         return ((self.layer, self.on_escape),)
 
+    @property
+    def mark(self) -> str:
+        """Words on why the header of the section has a mark; empty where it has none."""
+        return ""
+
     # --- the end ----------------------------------------------------------------------
 
     def finish(self) -> None:

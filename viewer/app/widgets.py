@@ -23,6 +23,7 @@ from . import theme
 T = TypeVar("T")
 _LABEL_SHARE = 0.46  # of the width
 _DIALOG_WIDTH = 34.0  # in heights of the font
+_DOT = 0.2  # radius of a mark on an assumption, in heights of the font
 _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
 _TOOLTIP = 60  # characters of a line
 _NO_PUSH = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
@@ -140,6 +141,28 @@ def tooltip(text: str) -> None:
         imgui.text_unformatted(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+
+
+def mark_header(text: str) -> None:
+    """Draw a dot at the right end of the last widget, the header of a section, and explain it with a text."""
+    low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+    middle = ImVec2(high.x - imgui.get_frame_height() / 2, (low.y + high.y) / 2)
+    fill_mark(imgui.get_window_draw_list(), middle, _DOT * imgui.get_font_size(), 0, dot_color())
+    tooltip(text)
+
+
+def dot() -> None:
+    """Declare a dot as wide as a space between widgets, before a text on the same line."""
+    start, size = imgui.get_cursor_screen_pos(), imgui.get_font_size()
+    middle = ImVec2(start.x + _DOT * size, start.y + imgui.get_text_line_height() / 2)
+    fill_mark(imgui.get_window_draw_list(), middle, _DOT * size, 0, dot_color())
+    imgui.dummy(ImVec2(2 * _DOT * size, imgui.get_text_line_height()))
+    imgui.same_line()
+
+
+def dot_color() -> int:
+    """The colour of a mark on an assumption, packed for ImGui: the accent of the theme."""
+    return imgui.get_color_u32(imgui.Col_.check_mark)
 
 
 def fact(name: str, text: str) -> None:

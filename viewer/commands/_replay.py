@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from argparse import Namespace
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import replace
 from itertools import compress, groupby
@@ -63,14 +63,11 @@ def planned(args: Namespace) -> Iterator[Plan]:
 
 def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
     """The files that the scans of the entries are read from; errors in these come later."""
-    for scan in dict.fromkeys(args.scan or entry.scan for entry in entries):
+    several = {(args.scan or entry.scan, *sorted(entry.reading.items())): entry for entry in entries}
+    for entry in several.values():
         with suppress(InputError):
-            if scan is not None:
-                with (
-                    open_scan(scan, read=stated_corrections(args))
-                    if args.scan
-                    else _open(scan, args.replay)[1] as timeline
-                ):
+            if args.scan is not None or entry.scan is not None:
+                with _found(entry, args)[1] as timeline:
                     yield from scan_inputs(timeline)
 
 
@@ -120,12 +117,17 @@ class _Opened(NamedTuple):
 def _opened(entries: Sequence[Entry], args: Namespace) -> Generator[tuple[int, Entry, _Opened]]:
     """The entries by number, each with its scan, of which one at a time is open. Raises InputError."""
     salt = new_salt() if args.anonymous else None
-    for _, group in groupby(enumerate(entries), lambda item: (item[1].scan, item[1].hash)):
+    for _, group in groupby(enumerate(entries), lambda item: _scan_as_read(item[1])):
         first, *others = group
         opened = _scan_of(first[1], args, salt)
         with opened.timeline:
             for number, entry in (first, *others):
                 yield number, entry, opened
+
+
+def _scan_as_read(entry: Entry) -> tuple[object, ...]:
+    """The scan of an entry, and the corrections of how Scan4D reads it."""
+    return entry.scan, entry.hash, dict(entry.reading)
 
 
 def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
@@ -148,6 +150,7 @@ def _completed(entry: Entry, request: Request, args: Namespace, opened: _Opened)
     unit = args.unit or entry.unit or opened.timeline.unit
     look = replace(entry.look, quality=request.look.quality)
     shown = replace(entry, scan=opened.name, hash=opened.hash, look=look, marks=marks, unit=unit)
+    shown = shown.with_reading(opened.timeline)
     if not (entry.anonymous or args.anonymous):
         return shown
     time = float(request.pose.time)
@@ -170,13 +173,7 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
     salt: of the hash where what is drawn is made anonymous. Raises InputError where it is unusable, or where
     the one that was named is another one.
     """
-    if args.scan is not None:
-        found, timeline = args.scan, open_scan(args.scan, read=stated_corrections(args))
-    elif entry.scan is None:
-        hint = f"Name the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
-        raise InputError("does not contain the name of its scan", args.replay, hint)
-    else:
-        found, timeline = _open(entry.scan, args.replay)
+    found, timeline = _found(entry, args)
     hash = fingerprint_as(entry.hash, timeline.files)
     if None not in (hash, entry.hash) and hash != entry.hash:
         if args.scan is not None:
@@ -189,14 +186,28 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
     return _Opened(found, timeline, hash)
 
 
-def _open(scan: str, path: Path) -> tuple[str, Timeline]:
+def _found(entry: Entry, args: Namespace) -> tuple[str, Timeline]:
+    """The scan of an entry and its name, read as the entry says; corrections of the command line win.
+
+    Raises InputError where the scan is missing or unusable.
+    """
+    read = {**entry.reading, **stated_corrections(args)}
+    if args.scan is not None:
+        return args.scan, open_scan(args.scan, read=read)
+    if entry.scan is None:
+        hint = f"Name the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
+        raise InputError("does not contain the name of its scan", args.replay, hint)
+    return _open(entry.scan, args.replay, read)
+
+
+def _open(scan: str, path: Path, read: Mapping[str, str]) -> tuple[str, Timeline]:
     """A scan that a recording names, and how it was found: beside the recording, or as it is named.
 
     Raises InputError where it is in neither folder, or unusable.
     """
     for folder in checked_scan_paths(scan, path):
         try:
-            return folder, open_scan(folder)
+            return folder, open_scan(folder, read=read)
         except InputError as error:
             if os.path.exists(folder):
                 raise

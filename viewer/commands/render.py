@@ -182,6 +182,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
                 if args.anonymous:
                     request = anonymous_request(request, start=float(timeline.times[0]))
                 entry = Entry.of(request, scan, hash, size, timeline.unit, marks, choice=choice)
+                entry = entry.with_reading(timeline)
                 entry = replace(entry.without_names() if args.anonymous else entry, at=shot.start)
                 yield shot.number, request, entry, entry.legend(timeline, request.pose)
 

@@ -26,6 +26,7 @@ from .part import Part
 from .schema import (
     DAMAGED,
     BackendName,
+    CorrectedTexts,
     FrameRate,
     Kind,
     PoseNumber,
@@ -125,7 +126,8 @@ class Document:
     shown_unit: of displayed lengths, None for the scan's own. front: degrees that the front of the scan
     is turned about what is up. span: the first and the last frame that playing keeps to, None for all. fps:
     frames a second as the user says, None as the scan does. times_by_names: whether the names of the frames
-    tell when they are. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a
+    tell when they are. reading: corrections of how Scan4D reads the scan, key -> text, as `--read` takes
+    them. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a
     tool that is not there, what its file said. unread: fields that are not known here or could not be read ->
     what the file said, which is written again; so is what was made anew of params and parts, under names such
     as "parts.measurements".
@@ -147,6 +149,7 @@ class Document:
     span: Span | None = None
     fps: FrameRate | None = None
     times_by_names: bool = False
+    reading: CorrectedTexts = field(default_factory=dict)
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
     unread: Values = field(default_factory=dict)

@@ -55,6 +55,8 @@ from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.open import is_demo, searches_folders
 from ..scan.pose import Pose
+from ..scan.reading.corrections import Corrections
+from ..scan.reading.record import Reading
 from ..scan.timeline import Timeline
 from ..scan.units import Scale
 from .anonymous import anonymous_unit
@@ -62,6 +64,7 @@ from .landmarks import Note
 from .schema import (
     DAMAGED,
     BackendName,
+    CorrectedTexts,
     Count,
     Hash,
     Kind,
@@ -70,6 +73,7 @@ from .schema import (
     Stamp,
     Time,
     Unit,
+    Values,
     check_format,
     is_object,
     plain,
@@ -105,8 +109,9 @@ class Entry:
     `anonymous_request` has it. notes: of the
     scan, where the marks show them. labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
-    the scan says which it is. at: seconds since the recording began; entries that differ in it alone
-    are equal.
+    the scan says which it is. reading: corrections of how Scan4D reads the scan, as documents have them.
+    record: how Scan4D read it (see `Reading.to_json`), for information only. at: seconds since the recording
+    began; entries that differ in it alone are equal.
     """
 
     scan: ScanName | None
@@ -132,6 +137,8 @@ class Entry:
     labels: tuple[LabelSpot, ...] = ()
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
+    reading: CorrectedTexts = field(default_factory=dict)
+    record: Values = field(default_factory=dict)
     at: Stamp = field(default=0.0, compare=False)
 
     @classmethod
@@ -163,6 +170,11 @@ class Entry:
             scale=1.0 if choice is None else choice.configuration.scale,
             automatic=None if choice is None else choice.report,
         )  # fmt: skip
+
+    def with_reading(self, timeline: Timeline) -> Entry:
+        """The entry with how Scan4D reads its scan: the user's corrections, and the record."""
+        texts = dict(timeline.decided.corrections.texts)
+        return replace(self, reading=texts, record=timeline.reading.to_json())
 
     def with_notes(self, notes: tuple[Note, ...]) -> Entry:
         """The entry with the notes of its scan, if the marks show them."""
@@ -267,6 +279,8 @@ class Entry:
             landmarks=tuple(replace(one, name="") for one in self.landmarks),
             measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
             plot=self.plot and self.plot.without_names(), labels=(),
+            reading=Corrections.parse(self.reading).without_names(),
+            record=Reading.from_json(self.record).without_names().to_json() if self.record else {},
         )  # fmt: skip
 
     def description(self) -> str:

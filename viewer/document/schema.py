@@ -34,6 +34,7 @@ from ..errors import InputError, explained, shortened, unknown_name
 from ..files import parsed_json, read_text
 from ..output.export import read_description
 from ..params import describe, parse, renamed
+from ..scan.reading.corrections import Corrections
 from ..scan.times import FPS_LIMITS
 from ..scan.units import checked_unit
 
@@ -109,6 +110,15 @@ Time = Annotated[float, Kind("a time in seconds", lambda value: abs(value) <= _L
 FrameRate = Annotated[float, Kind("frames a second", lambda value: FPS_LIMITS[0] <= value <= FPS_LIMITS[1])]
 Stamp = Annotated[float, Kind("a time from 0 to 86400 s", _is_stamp)]
 Values = Annotated[Any, Kind("an object with named values", is_object)]
+
+
+def _read_corrections(data: Any) -> dict[str, str]:
+    if not is_object(data) or not all(isinstance(text, str) for text in data.values()):
+        raise InputError(f"is not an object with texts but {shortened(data)}", hint=DAMAGED)
+    return dict(Corrections.parse(data).texts)
+
+
+CorrectedTexts = Annotated[Mapping[str, str], ReadBy(_read_corrections)]
 
 
 def _known_backend(value: Any) -> str:

@@ -9,17 +9,18 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from ...backends import backend
-from ...document.saved_session import SavedSession, stored
+from ...document.saved_session import SavedSession
 from ...errors import Scan4DError
 from ...scan.open import DEMO, open_scan
 from ...scan.pose import Pose
+from ...scan.timeline import Timeline
 from ...task import Task, in_background
 from ..notices import Notices, Problem
 from ..part import Parts, WindowPart
 from ..playing.playback import Playback
 from ..session import Session, known_as
 from ..window import Window
-from .opening import Opened, Opening, find_facts
+from .opening import Opened, Opening, Way, find_facts, find_stored
 from .same_content import offer_of_change, offer_of_stored
 from .scans import title
 
@@ -31,7 +32,8 @@ class Opener(WindowPart):
     """Opens scans, and has all parts begin with each.
 
     opened: the first scan. unit, fps, up: what the command line states of all scans. corrections: of how
-    Scan4D reads those that it names, which are `named`. job: what is being opened.
+    Scan4D reads those that it names, which are `named`. job: what is being opened. reading: the corrections
+    that the open scan was opened with.
     """
 
     name = "opener"
@@ -56,6 +58,7 @@ class Opener(WindowPart):
 
     def __post_init__(self) -> None:
         self.job = Opening()
+        self.reading: Mapping[str, str] = {}
         self._reported: set[str] = set()  # what could not be read of documents
         self._has_begun = self._looks_further = False  # whether a frame of any scan was shown, or looked for
         self._messages_read = 0
@@ -66,11 +69,24 @@ class Opener(WindowPart):
 
         session: to open it with; None: as it was left.
         """
-        self.notices.end("opening")
         left = self.session.left(scan)
         find = (lambda: find_stored(scan, self.up)) if left is None else lambda: left
-        read = self.corrections if scan in self.named else None
-        self.job.start(scan, title(scan), find, lambda: open_scan(scan, self.unit, self.fps, read), session)
+        stated = self.corrections if scan in self.named and left is None and session is None else None
+        self._start(scan, Way(find, partial(self._open, scan), session, stated or {}))
+
+    def reread(self) -> None:
+        """Open the scan that is open anew, with the corrections that its document has now. Its history, the
+        camera and the frame stay."""
+        scan = self.session.scan
+        as_it_is = replace(self.session.saved(self.session.index), hash=None)
+        self._start(scan, Way(lambda: as_it_is, partial(self._open, scan), must_correct=True))
+
+    def _start(self, scan: str, way: Way) -> None:
+        self.notices.end("opening")
+        self.job.start(scan, title(scan), way)
+
+    def _open(self, scan: str, reading: Mapping[str, str]) -> Timeline:
+        return open_scan(scan, self.unit, self.fps, reading)
 
     def advance(self, now: float) -> None:
         """Show the scan that has been opened, where one has, and pass on what the timeline reports."""
@@ -99,12 +115,16 @@ class Opener(WindowPart):
 
     def begin(self, opened: Opened) -> None:
         """Have all parts begin with a scan, whose session and playback have."""
-        timeline, self.session.hash_found, _, left, problem, session = opened
+        timeline, self.session.hash_found, _, left, problem, session, self.reading = opened
         timeline.finish = self._find_facts
         if session is not None:
             self.session.take_up(session)
         if self.unit:
             self.session.amend(unit=self.unit)
+        if problem and self.session.document.reading:  # which it could not be read with
+            self.session.change("Read without corrections", reading=self.reading)
+        else:
+            self.session.amend(reading=self.reading)
         for part in self.parts:
             part.begin_scan(timeline)
         if problem:
@@ -178,10 +198,3 @@ class Opener(WindowPart):
     def close(self) -> None:
         """Give up what is being opened."""
         self.job.cancel()
-
-
-def find_stored(scan: str, up: str | None) -> SavedSession | None:
-    """Find what is kept of a scan. up: the up axis that the command line states. Raises InputError where that
-    is damaged."""
-    found = stored(known_as(scan))
-    return found if found is None or up is None else replace(found, document=found.document.with_up(up))

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future, wait
+from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ...document.recording import fingerprint
-from ...document.saved_session import SavedSession
+from ...document.saved_session import SavedSession, stored
 from ...errors import InputError, Scan4DError
 from ...scan.pose import Pose
 from ...scan.spacing import spacings
 from ...scan.timeline import Timeline
 from ...task import Cancelled, Task, checkpoint, in_background
+from ..session import known_as
 
 log = logging.getLogger(__name__)
 _MANY = 200_000  # points, of which facts take longer to find than a window may stop for
@@ -42,32 +45,74 @@ class Opened(NamedTuple):
 
     hash: its `fingerprint`, which takes a moment for a large file. first: the frame to begin with. left: how
     it was left, None where it was never open. problem: why that cannot come back. session: what the user
-    opens it with, None where that is the scan alone.
+    opens it with, None where that is the scan alone. reading: the corrections that it was opened with.
     """
 
     timeline: Timeline
     hash: Future[str | None]
     first: int
-    left: SavedSession | None = None
-    problem: str | None = None
+    left: SavedSession | None
+    problem: str | None
+    session: SavedSession | None
+    reading: Mapping[str, str]
+
+
+class Way(NamedTuple):
+    """How to open a scan.
+
+    find: finds how it was left, and may raise InputError. open_it: opens it, with corrections of how Scan4D
+    reads it. session: to open it with; None: as it was left. stated: corrections of the command line, which
+    win over those of the document. must_correct: whether it is not to be opened without its corrections.
+    """
+
+    find: Callable[[], SavedSession | None]
+    open_it: Callable[[Mapping[str, str]], Timeline]
     session: SavedSession | None = None
+    stated: Mapping[str, str] = MappingProxyType({})
+    must_correct: bool = False
 
 
-Find = Callable[[], SavedSession | None]  # how a scan was left; it may raise InputError
+def begin(way: Way, check: Callable[[Timeline, int], int] = lambda _, first: first) -> Opened:
+    """Open a scan as it was left, have its poses come with their facts, and find its hash in the background.
 
-
-def begin(timeline: Timeline, find: Find, session: SavedSession | None = None) -> Opened:
-    """Have its poses come with their facts, and find its hash in the background."""
-    timeline.finish = partial(find_facts, is_first=True)
-    hash = in_background(Task("Computing the checksum"), lambda: fingerprint(timeline.files))
+    check: finds the frame to begin with, and may raise InputError. Where the scan cannot be opened with the
+    corrections of its document, it is opened without them, and the problem says so. Raises InputError.
+    """
     left, problem = None, None
     try:
-        left = find()
+        left = way.find()
     except InputError as error:
         problem = str(error)
-    begins = session or left
-    first = 0 if begins is None else min(begins.pose, len(timeline) - 1)
-    return Opened(timeline, hash, first, left, problem, session)
+    begins = way.session or left
+    first, own = (0, {}) if begins is None else (begins.pose, begins.document.reading)
+
+    def opened(reading: Mapping[str, str]) -> Opened:
+        timeline = way.open_it(reading)
+        timeline.finish = partial(find_facts, is_first=True)
+        try:
+            found = check(timeline, min(first, len(timeline) - 1))
+        except (InputError, Cancelled):
+            timeline.close()
+            raise
+        hash = in_background(Task("Computing the checksum"), lambda: fingerprint(timeline.files))
+        return Opened(timeline, hash, found, left, problem, way.session, reading)
+
+    both = {**own, **way.stated}
+    try:
+        return opened(both)
+    except InputError as error:
+        if both == way.stated or way.must_correct:
+            raise
+        ours = opened(way.stated)
+        what = f"Scan4D cannot read the scan with its saved corrections, and reads it without them: {error}"
+        return ours._replace(problem=what)
+
+
+def find_stored(scan: str, up: str | None) -> SavedSession | None:
+    """Find what is kept of a scan. up: the up axis that the command line states. Raises InputError where that
+    is damaged."""
+    found = stored(known_as(scan))
+    return found if found is None or up is None else replace(found, document=found.document.with_up(up))
 
 
 class Opening:
@@ -81,18 +126,11 @@ class Opening:
         self.task: Task | None = None
         self._future: Future[Opened] | None = None
 
-    def start(
-        self,
-        scan: str,
-        title: str,
-        find: Find,
-        open_it: Callable[[], Timeline],
-        session: SavedSession | None = None,
-    ) -> None:
-        """Open a scan instead of any other that is being opened. session: to open it with."""
+    def start(self, scan: str, title: str, way: Way) -> None:
+        """Open a scan instead of any other that is being opened."""
         self.cancel()
         self.scan, self.task = scan, Task(f"Opening {title}")
-        self._future = in_background(self.task, lambda: _opened(lambda: begin(open_it(), find, session)))
+        self._future = in_background(self.task, lambda: _opened(way))
 
     def cancel(self) -> None:
         """Give up what is being opened."""
@@ -122,19 +160,13 @@ def _close_unclaimed(future: Future[Opened]) -> None:
         future.result().timeline.close()
 
 
-def _opened(begin_it: Callable[[], Opened]) -> Opened:
+def _opened(way: Way) -> Opened:
     """A scan of which a frame is in memory, the one to begin with or the next that can be read, and whose
     hash is known.
 
     Raises InputError where it has no frame that can be read.
     """
-    opened = begin_it()
-    timeline = opened.timeline
-    try:
-        opened = opened._replace(first=read_from(timeline, opened.first))
-    except (InputError, Cancelled):
-        timeline.close()
-        raise
+    opened = begin(way, read_from)
     wait([opened.hash])
     return opened
 

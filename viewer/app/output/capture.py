@@ -87,6 +87,7 @@ class Capture(WindowPart):
             request, session.scan, session.hash, viewport.size, self.playback.unit,
             self.marks_of_files() if marks is None else marks, self.choice_of(request),
         )  # fmt: skip
+        entry = entry.with_reading(self.playback.timeline)
         entry = entry.with_notes(session.document.part(Landmarks).notes)
         entry = entry.with_drawn(self.drawn(request.pose.index))
         labels = self.label_places().spots if entry.marks else ()

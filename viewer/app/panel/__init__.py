@@ -65,24 +65,30 @@ class Panel(WindowPart):
         imgui.begin_child("settings", window_flags=self.keyboard.flags("panel"))
         self.keyboard.take("panel")
         ui = Ui(self.keys)
-        sections = [(part.SECTION, part.panel, False) for part in self.parts if part.SECTION is not None]
+        parts = [part for part in self.parts if part.SECTION is not None]
+        sections = [(part.SECTION, part.panel, False) for part in parts]
+        marks = {part.SECTION.title: part.mark for part in parts}
         sections += [
             (Section(title, _TOOLS_RANK), declare, is_revealed)
             for title, is_revealed, declare in self.tools.sections()
         ]
         for section, declare, is_revealed in sorted(sections, key=lambda found: found[0].rank):
             if self.playback.pose is not None or not section.needs_pose:
-                self._draw_section(section.title, partial(declare, ui), section.is_open, is_revealed)
+                about = marks.get(section.title, "")
+                self._draw_section(section, partial(declare, ui), is_revealed, about)
         imgui.end_child()
 
     def _draw_section(
-        self, title: str, declare: Callable[[], object], is_open: bool, is_revealed: bool
+        self, section: Section, declare: Callable[[], object], is_revealed: bool, mark: str
     ) -> None:
-        """Declare a section. is_open: at first. is_revealed: whether to open it and scroll to its end."""
-        name, opened = title.rpartition("###")[2], self.opened
-        imgui.set_next_item_open(is_revealed or opened.get(name, is_open))
-        shows = imgui.collapsing_header(title)
-        if opened.get(name, is_open) != shows:
+        """Declare a section. is_revealed: whether to open it and scroll to its end. mark: words on why its
+        header has a mark, empty where it has none."""
+        name, opened = section.title.rpartition("###")[2], self.opened
+        imgui.set_next_item_open(is_revealed or opened.get(name, section.is_open))
+        shows = imgui.collapsing_header(section.title)
+        if mark:
+            widgets.mark_header(mark)
+        if opened.get(name, section.is_open) != shows:
             self.opened = {**opened, name: shows}
         if shows:
             imgui.push_id(widgets.unhidden(name))  # what other sections declare may have the same labels

@@ -1,70 +1,143 @@
-"""The panel's section on how Scan4D read the scan: each decision, its source, and what is assumed."""
+"""The panel's section on how Scan4D read the scan: each decision, its source, and what is assumed. The user
+corrects each of them here."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
+from ...errors import InputError
+from ...scan.reading.corrections import CORRECTED
 from ...scan.reading.record import Decision, Reading
 from .. import widgets
+from ..files.rereading import Rereading
 from ..part import Section, WindowPart
-from ..playing.playback import Playback
-from ..session import Session
 from ..ui import Ui
 
-MARK = "\u2022"  # before an assumption that can change a number
 _MARKED = "Scan4D assumes this value. If the value is wrong, what you measure may be wrong too."
+_AUTOMATIC, _OTHER = "Automatic", "Other..."
 
 
 @dataclass(eq=False)
 class ReadingSection(WindowPart):
-    """The section."""
+    """The section: a row a decision. Enter or a click on its value lists other values."""
 
     name = "reading_section"
     SECTION = Section("How this was read", 12, is_open=False)
-    session: Session
-    playback: Playback
+    rereading: Rereading
+
+    def __post_init__(self) -> None:
+        self._field = widgets.NameField()  # its subject is the key whose value the user types
+        self._problems: dict[str, str] = {}  # key -> why what the user typed is unusable
+
+    @property
+    def mark(self) -> str:
+        """Words on what is assumed and can change a number."""
+        return words_on_assumed(self.rereading.record)
+
+    def begin_scan(self, timeline: object) -> None:
+        """Drop what was typed."""
+        self._field.subject, self._problems = None, {}
 
     def panel(self, ui: Ui) -> None:
         """Declare it."""
-        record = self.record
-        for decision in record.decisions.values():
-            if decision.value is not None:
-                _draw(decision)
+        record = self.rereading.record
+        for key, decision in record.decisions.items():
+            if decision.value is not None or self.rereading.is_corrected(key):
+                imgui.push_id(key)
+                self._draw(decision, record)
+                imgui.pop_id()
         for name, text, help in _others(record):
             widgets.fact(name, text)
             widgets.tooltip(help)
 
-    @property
-    def record(self) -> Reading:
-        """The record of the open scan, with what the user states about it in the panel."""
-        record, document = self.playback.timeline.reading, self.session.document
-        if document.unit is not None and document.unit != record["unit"].value:
-            stated = Decision("unit", document.unit, "user", "the panel", changes_numbers=True)
-            record = record.with_(stated)
-        return record
+    def _draw(self, decision: Decision, record: Reading) -> None:
+        """Declare one decision: its name and its source on a line, and below them its value as a list."""
+        key = decision.key
+        if decision.is_marked:
+            widgets.dot()
+        imgui.text_unformatted(decision.label)
+        imgui.same_line()
+        room = imgui.get_content_region_avail().x
+        imgui.text_disabled(widgets.unhidden(widgets.fitted(decision.shown_source, room)))
+        if key not in CORRECTED:
+            imgui.text_wrapped(decision.shown)
+            widgets.tooltip("\n".join(explanation(decision)))
+            return
+        gutter = imgui.get_frame_height() if self.rereading.is_corrected(key) else 0.0
+        if self._field.subject == key:
+            self._draw_field(key)
+        else:
+            self._draw_values(decision, record, gutter)
+            if gutter:
+                imgui.same_line(0, 0)
+                if widgets.flat_button(icons.ICON_FA_ARROW_ROTATE_LEFT, "Reset: Scan4D decides by itself"):
+                    self._correct(key, None)
+        if key in self._problems:
+            imgui.text_wrapped(self._problems[key])
+
+    def _draw_values(self, decision: Decision, record: Reading, gutter: float) -> None:
+        """Declare the list of values. gutter: width to leave at its right, pixels."""
+        imgui.set_next_item_width(-1 - gutter if gutter else -1)
+        room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height() - gutter
+        is_open = imgui.begin_combo("##value", widgets.unhidden(widgets.fitted(decision.shown, room)))
+        if not is_open:
+            widgets.tooltip("\n".join(explanation(decision)))
+            return
+        key, is_corrected = decision.key, self.rereading.is_corrected(decision.key)
+        if imgui.selectable(_AUTOMATIC, not is_corrected)[0] and is_corrected:
+            self._correct(key, None)
+        for text in choices(decision, record):
+            if imgui.selectable(widgets.labelled(text, text), False)[0]:
+                self._correct(key, text)
+        if imgui.selectable(_OTHER, False)[0]:
+            self._field.begin(key, self.rereading.text_of(key) or next(iter(decision.alternatives), ""))
+        imgui.end_combo()
+
+    def _draw_field(self, key: str) -> None:
+        """Declare the field that the user types a value into."""
+        text = self._field.draw(-1)
+        widgets.tooltip(f"Type {CORRECTED[key].form}. Press Enter to read the scan with it.")
+        if text is not None and text.strip():
+            self._correct(key, text.strip())
+
+    def _correct(self, key: str, text: str | None) -> None:
+        """Correct a decision, or tell why that is impossible."""
+        self._problems.pop(key, None)
+        try:
+            self.rereading.correct(key, text)
+        except InputError as error:
+            self._problems[key] = str(error)
 
 
-def _draw(decision: Decision) -> None:
-    """Declare one decision: its name, its value, and its source as a tooltip."""
-    mark = f"{MARK} " if decision.is_marked else ""
-    widgets.fact(f"{mark}{decision.label}", f"{decision.shown} ({decision.shown_source})")
-    if imgui.is_item_hovered():
-        widgets.tooltip("\n".join(explanation(decision)))
+def choices(decision: Decision, record: Reading) -> list[str]:
+    """The values that the list of a decision offers, as `--read` takes them: its alternatives first."""
+    takes = [take.name for take in record.takes] if decision.key == "take" else []
+    found = [*decision.alternatives, *takes, *CORRECTED[decision.key].choices]
+    return [text for text in dict.fromkeys(found) if text != decision.shown]
+
+
+def words_on_assumed(record: Reading) -> str:
+    """Words on the assumptions that can change a number; empty where there is none."""
+    if not (marks := record.marks()):
+        return ""
+    warning = "If a value is wrong, what you measure may be wrong too."
+    return "\n".join(["Scan4D assumes:", *marks, warning, "Change it in the section 'How this was read'."])
 
 
 def explanation(decision: Decision) -> list[str]:
-    """Lines on a decision: its source, its reason, and how to change it."""
+    """Lines on a decision: its source, its reason, and how to change it on the command line."""
     lines = [decision.shown, f"Source: {decision.shown_source}"]
     if decision.is_marked:
         lines.append(_MARKED)
     if decision.why:
         lines.append(decision.why)
     if decision.alternatives:
-        choices = ", ".join(decision.alternatives)
-        lines.append(f"Change it with --read {decision.key}=VALUE, for example: {choices}")
+        listed = ", ".join(decision.alternatives)
+        lines.append(f"On the command line: --read {decision.key}=VALUE, for example: {listed}")
     return lines
 
 

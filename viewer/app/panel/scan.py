@@ -18,6 +18,7 @@ from ...scan.reading.unit import guess_unit
 from ...scan.times import FPS_LIMITS, TIMES_FILE
 from ...scan.units import UNIT_WORDS, is_length
 from .. import widgets
+from ..files.rereading import Rereading
 from ..files.scans import Scans, title
 from ..keys import Keys
 from ..part import Section, WindowPart
@@ -27,6 +28,7 @@ from ..scene.framing import Framing
 from ..scene.steering import Steering
 from ..session import Session
 from ..ui import Ui
+from .reading import words_on_assumed
 
 _OWN = "own"  # the unit that the scan has
 _PLURALS = {"m": "metres", "mm": "millimetres"}  # of the units that are guessed
@@ -46,6 +48,12 @@ class ScanSection(WindowPart):
     framing: Framing
     steering: Steering
     keys: Keys
+    rereading: Rereading
+
+    @property
+    def mark(self) -> str:
+        """Words on what Scan4D assumes about the scan and can change a number."""
+        return words_on_assumed(self.rereading.record)
 
     def panel(self, ui: Ui) -> None:
         """Declare it."""

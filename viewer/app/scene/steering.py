@@ -90,6 +90,11 @@ class Steering(WindowPart):
         return self.gesture is not None or self.is_turned or self.turntable.is_on
 
     @property
+    def is_at_first(self) -> bool:
+        """Whether the camera is still the one that the scan was first shown with."""
+        return self._first is not None and self._first == self.session.document.camera
+
+    @property
     def _up(self) -> str:
         return self.session.document.look.up
 

@@ -29,6 +29,11 @@ def _one_of(*words: str) -> Callable[[str], str]:
     return parse
 
 
+def _words(form: str, *words: str) -> Key:
+    """A key whose values are these words."""
+    return Key(_one_of(*words), form, words)
+
+
 def _columns(text: str) -> tuple[str, ...]:
     roles = tuple(text.replace(",", " ").split())
     repeated = {role for role in roles if role != "-" and roles.count(role) > 1}
@@ -102,31 +107,34 @@ def _times(text: str) -> str:
 @dataclass(frozen=True)
 class Key:
     """A key that a user can correct. parse: the value from text, ValueError where it is none. form: what
-    the text looks like, for messages and help."""
+    the text looks like, for messages and help. choices: common texts, for lists."""
 
     parse: Callable[[str], Any]
     form: str
+    choices: tuple[str, ...] = ()
 
 
 CORRECTED = {
     "columns": Key(_columns, f"a role for each column, with x, y and z, from {' '.join(ROLES)} or a name"),
-    "separator": Key(_one_of("blank", "tab", "comma", "semicolon"), "blank, tab, comma or semicolon"),
-    "decimal": Key(_one_of(".", ","), "'.' or ','"),
+    "separator": _words("blank, tab, comma or semicolon", "blank", "tab", "comma", "semicolon"),
+    "decimal": _words("'.' or ','", ".", ","),
     "skip": Key(_lines, "a number of lines"),
-    "encoding": Key(_one_of("utf-8", "utf-16", "latin-1"), "utf-8, utf-16 or latin-1"),
-    "colors": Key(_one_of("1", "255", "65535", "none"), "the largest value 1, 255 or 65535, or none"),
-    "normals": Key(_one_of("stored", "none"), "stored or none"),
-    "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number"),
-    "texture": Key(_one_of("vertices", "dense", "none"), "vertices, dense or none"),
-    "splats": Key(_one_of("yes", "no"), "yes or no"),
+    "encoding": _words("utf-8, utf-16 or latin-1", "utf-8", "utf-16", "latin-1"),
+    "colors": _words("the largest value 1, 255 or 65535, or none", "1", "255", "65535", "none"),
+    "normals": _words("stored or none", "stored", "none"),
+    "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number", ("none", "0,0,0")),
+    "texture": _words("vertices, dense or none", "vertices", "dense", "none"),
+    "splats": _words("yes or no", "yes", "no"),
     "camera": Key(_camera, "fx,fy,cx,cy in pixels, then 4, 5 or 8 lens coefficients or none; or a file"),
     "depth-scale": Key(_positive, "a number of steps in one unit, above 0"),
     "depth-channel": Key(str, "a channel of the EXR file"),
-    "axes": Key(_axes, "LPS, RAS, unknown, or three signed axes such as '+x -z +y'"),
-    "unit": Key(checked_unit, "a short word such as mm"),
+    "axes": Key(
+        _axes, "LPS, RAS, unknown, or three signed axes such as '+x -z +y'", ("LPS", "RAS", "unknown")
+    ),
+    "unit": Key(checked_unit, "a short word such as mm", ("mm", "cm", "m")),
     "frames": Key(str, "a pattern such as '*.ply', or rows, image or cloud for an array"),
-    "take": Key(str, "a name, or all"),
-    "times": Key(_times, "names, index, fps:50, column:NAME, or a file"),
+    "take": Key(str, "a name, or all", ("all",)),
+    "times": Key(_times, "names, index, fps:50, column:NAME, or a file", ("names", "index")),
 }
 
 
@@ -170,6 +178,11 @@ class Corrections(Mapping[str, Any]):
         """Return these corrections with others, which win for keys of both. Raises InputError."""
         return Corrections.parse({**self.texts, **texts})
 
+    def without_names(self) -> dict[str, str]:
+        """The texts of those corrections that name no file, take, channel or column: such a name may tell
+        whose scan it is."""
+        return {key: text for key, text in self.texts.items() if not _holds_name(key, self._values[key])}
+
     def decision(self, key: str, value: Any = None) -> Decision | None:
         """The user's decision about a key; None where the user leaves it open. value: what stands in the
         record instead of the parsed value."""
@@ -181,6 +194,19 @@ class Corrections(Mapping[str, Any]):
 
 
 NOTHING_CORRECTED = Corrections()
+
+
+def _holds_name(key: str, value: Any) -> bool:
+    """Whether the value of a correction is, or contains, a name that the user or a file gave."""
+    if key == "columns":
+        return not {*value} <= {*ROLES}
+    if key == "camera":
+        return isinstance(value, str)
+    if key == "times":
+        return value not in ("names", "index") and not value.startswith("fps:")
+    if key == "frames":
+        return value not in ("rows", "image", "cloud")
+    return key in ("take", "unit", "depth-channel")
 
 
 def _value(key: str, text: str) -> Any:

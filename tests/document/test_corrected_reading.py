@@ -1,0 +1,89 @@
+"""Corrections of how Scan4D reads a scan are stored in documents and recordings, and can be undone."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.camera import Camera
+from viewer.document.document import Document
+from viewer.document.history import History
+from viewer.document.recording import Entry, Recording
+from viewer.document.saved_session import SavedSession
+from viewer.document.schema import plain
+from viewer.look import Look
+from viewer.scan.open import open_scan
+
+READING = {"columns": "x y z - intensity", "camera": "290,290,159.5,89.5"}
+
+
+def entry(**fields: object) -> Entry:
+    values = {
+        "scan": "scan", "hash": None, "pose": 0, "time": 0.0, "size": (8, 8), "camera": Camera(),
+        "backend": "points", "params": {}, "look": Look(),
+    }  # fmt: skip
+    return Entry.from_json(plain({**values, **fields}))
+
+
+def test_a_document_stores_its_corrections(tmp_path: Path) -> None:
+    path = tmp_path / "face.scan4d.json"
+    SavedSession("scan", None, 0, Document(reading=READING)).save(path)
+    assert SavedSession.load(path).document.reading == READING
+    assert SavedSession.load(path).document.unreadable == ()
+
+
+@pytest.mark.parametrize("reading", [{"colour": "1"}, {"skip": "many"}, {"skip": 3}, ["skip"]])
+def test_corrections_that_cannot_be_used_stay_unread(reading: object) -> None:
+    document = Document.from_json({"reading": reading})
+    assert document.reading == {}
+    assert document.unread == {"reading": reading}
+
+
+def test_a_correction_is_a_step_of_the_history() -> None:
+    history = History(Document())
+    history.change("Correct the camera", replace(history.document, reading=READING))
+    history.undo()
+    assert history.document.reading == {}
+    history.redo()
+    assert history.document.reading == READING
+
+
+def test_another_scan_begins_without_corrections() -> None:
+    assert Document(reading=READING).for_another(Document()).reading == {}
+
+
+def test_an_entry_has_the_corrections_and_the_record_of_its_scan(tmp_path: Path) -> None:
+    table = tmp_path / "points.txt"
+    np.savetxt(table, np.random.default_rng(0).random((20, 4)))
+    with open_scan(table, read={"columns": "- x y z"}) as timeline:
+        timeline.pose(0)
+        told = entry().with_reading(timeline)
+    assert told.reading == {"columns": "- x y z"}
+    assert told.record["decisions"]["columns"]["source"] == "user"
+    path = tmp_path / "recording.json"
+    Recording((told,)).save(path)
+    assert Recording.load(path).entries == (told,)
+
+
+def test_an_anonymous_entry_has_no_names_in_its_corrections_and_record() -> None:
+    reading = {
+        "camera": "jane.txt", "take": "jane_", "frames": "jane*.ply", "times": "column:jane", "unit": "jane",
+        "columns": "x y z jane", "skip": "2", "depth-channel": "jane",
+    }  # fmt: skip
+    record = {
+        "decisions": {
+            "frames": {
+                "value": "jane1.ply", "source": "folder", "from": "jane", "why": "jane",
+                "alternatives": ["jane"],
+            },
+        },
+        "assumed": [], "aside": [{"file": "jane.ply", "why": "copy"}], "unused": [], "takes": [],
+        "contradictions": [],
+    }  # fmt: skip
+    nameless = entry(reading=reading, record=record).without_names()
+    assert nameless.reading == {"skip": "2"}
+    assert "jane" not in json.dumps(nameless.to_json())

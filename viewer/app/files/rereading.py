@@ -1,0 +1,102 @@
+"""Reading the open scan anew as soon as its document has other corrections of how Scan4D reads it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from ...scan.reading.corrections import Corrections
+from ...scan.reading.record import KEYS, Decision, Reading
+from ...scan.units import checked_unit
+from ..part import WindowPart
+from ..playing.playback import Playback
+from ..scene.steering import Steering
+from ..session import Session
+from .opener import Opener
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(eq=False)
+class Rereading(WindowPart):
+    """Corrects how Scan4D reads the open scan: a correction is a step of the history, and the scan is opened
+    anew with it. Where Scan4D cannot read the scan so, the step goes and the scan stays as it is.
+
+    The frame and the camera stay; a camera that the user has not moved is fitted to the new points.
+    """
+
+    name = "rereading"
+    doing = "Reading the scan anew"
+    turn = -5
+    session: Session
+    playback: Playback
+    opener: Opener
+    steering: Steering
+
+    def __post_init__(self) -> None:
+        self._asked: Mapping[str, str] | None = None  # the corrections that it is being opened with
+        self._step = ""  # the name of the last correction in the history
+        self._refits = False  # whether the camera is to be fitted
+
+    @property
+    def record(self) -> Reading:
+        """The record of the open scan, with what the panel states about it."""
+        record, document = self.playback.timeline.reading, self.session.document
+        if document.unit is not None and document.unit != record["unit"].value:
+            stated = Decision("unit", document.unit, "user", "the panel", changes_numbers=True)
+            record = record.with_(stated)
+        return record
+
+    def is_corrected(self, key: str) -> bool:
+        """Whether the user says how Scan4D reads this."""
+        document = self.session.document
+        by_fields = {"unit": document.unit, "times": document.fps or document.times_by_names or None}
+        return key in document.reading or by_fields.get(key) is not None
+
+    def text_of(self, key: str) -> str:
+        """The text of a correction; empty where there is none."""
+        return self.session.document.reading.get(key, "")
+
+    def correct(self, key: str, text: str | None) -> None:
+        """Have Scan4D read the scan with this correction. text: as `--read` takes it; None: as Scan4D decides
+        by itself. Raises InputError where it is unusable."""
+        others = {name: one for name, one in self.session.document.reading.items() if name != key}
+        fields: dict[str, object] = {"reading": others}
+        if key == "unit":
+            fields["unit"] = None if text is None else checked_unit(text.strip())
+        elif text is not None:
+            fields["reading"] = dict(Corrections.parse({**others, key: text}).texts)
+        if key == "times":
+            fields |= {"fps": None, "times_by_names": False}
+        label = KEYS[key].lower()
+        self._step = f"Correct the {label}" if text is not None else f"Reset the {label}"
+        self.session.change(self._step, **fields)
+
+    def advance(self, now: float) -> None:
+        """Open the scan anew where its document has other corrections than it was opened with."""
+        wanted, job = self.session.document.reading, self.opener.job
+        if job.scan is None:
+            self._asked = None
+        if wanted in (self.opener.reading, self._asked) or (job.scan is not None and self._asked is None):
+            return
+        self._refits = self.steering.is_at_first
+        log.debug("reads the scan anew with %s", dict(wanted))
+        self.opener.reread()
+        self._asked = wanted
+
+    def refused(self, problem: str) -> bool:
+        """Take back the corrections that the scan cannot be read with."""
+        if self._asked is not None:
+            self._asked = None
+            if self.session.history.undoes == self._step:
+                self.session.history.undo()
+            if self.session.document.reading != self.opener.reading:
+                self.session.change("Take the correction back", reading=self.opener.reading)
+        return False
+
+    def begin_scan(self, timeline: object) -> None:
+        """Take in that a scan was opened."""
+        if self._asked is not None and self._refits:
+            self.session.amend(camera=None, pivot=None)
+        self._asked, self._refits = None, False
