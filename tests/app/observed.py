@@ -20,6 +20,7 @@ from dataclasses import asdict
 from typing import Any
 
 import glfw
+import numpy as np
 from acting import Actor
 from cut_texts import CutTexts
 from imgui_bundle import imgui
@@ -148,6 +149,7 @@ def is_idle(app: App) -> bool:
         app.glide.is_on,
         app.tasks.all, app.tools.followed.is_busy, app.scans.waits, app.browser.waits,
         app.choosing.is_due,
+        app.session.document.reading != app.opener.reading,
         playback.pose is not None and not app.viewport.is_complete,
         playback.pose is not None and not (app.viewport.is_refined or app.steering.moves),
     )  # fmt: skip
@@ -212,6 +214,8 @@ def shown(app: App) -> dict[str, Any]:
         "knows_files": app.changes._known is not None,
         "undoes": app.session.history.undoes,
         "redoes": app.session.history.redoes,
+        "record": app.rereading.record.to_json()["decisions"],
+        "extent": app.playback.pose and np.ptp(app.playback.pose.sample, axis=0).tolist(),
     }
     if viewport.is_there and viewport.request is not None and surface is not None:
         state |= {

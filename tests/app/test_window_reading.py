@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
-from virtual_screen import PANEL, Screen, running_app
+from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app, stored_of
 
-from viewer.app.panel.reading import explanation
-from viewer.scan.reading.record import Decision
+from viewer.app.panel.reading import choices, explanation, words_on_assumed
+from viewer.scan.reading.record import Decision, Reading, Take
 
 
 def test_an_assumption_is_explained_with_its_alternatives() -> None:
@@ -32,3 +33,93 @@ def test_the_section_shows_every_decision(screen: Screen, tmp_path: Path) -> Non
         after = screen.picture()
         assert (before != after).any()
     assert "Traceback" not in app.log()
+
+
+def test_a_list_offers_the_alternatives_first_and_no_value_twice() -> None:
+    columns = Decision("columns", ["x", "y", "z"], "assumed", "", "", ("x y z r g b",), True)
+    assert choices(columns, Reading()) == ["x y z r g b"]
+    take = Decision("take", "anna", "assumed", "", "", ("bert", "all"))
+    record = Reading(takes=(Take("anna", "anna*", 2), Take("bert", "bert*", 2)))
+    assert choices(take, record) == ["bert", "all"]
+    assert choices(Decision("normals", "stored"), Reading()) == ["none"]
+
+
+def test_only_assumptions_that_change_numbers_are_marked() -> None:
+    assert words_on_assumed(Reading.of(Decision("axes", "unknown", "assumed"))) == ""
+    unit = Decision("unit", "units", "assumed", changes_numbers=True)
+    assert "unit units" in words_on_assumed(Reading.of(unit))
+
+
+@pytest.fixture
+def depth_folder(tmp_path: Path) -> Path:
+    """Two depth pictures, 40 x 30, of a wall at 1 m, whose camera nothing states."""
+    from PIL import Image
+
+    folder = tmp_path / "wall"
+    (folder / "depth").mkdir(parents=True)
+    for number in range(2):
+        depth = np.full((30, 40), 1000, np.uint16)
+        Image.fromarray(depth).save(folder / "depth" / f"{number}.png")
+    return folder
+
+
+@pytest.fixture
+def table(tmp_path: Path) -> Path:
+    """Four columns without names: the last three are the positions, which nothing says."""
+    rows = np.random.default_rng(0).uniform(0, (1, 2, 3, 4), (300, 4))
+    np.savetxt(tmp_path / "points.txt", rows)
+    return tmp_path / "points.txt"
+
+
+@pytest.mark.slow
+def test_unnamed_columns_are_corrected_undone_and_stored(screen: Screen, tmp_path: Path, table: Path) -> None:
+    with running_app(screen, tmp_path, table) as app:
+        assert app.settle().extent == pytest.approx([1, 2, 3], rel=0.1)
+        app.act(PANEL, ("item_open", "How this was read"))
+        type_into(app, "columns", "- x y z")
+        corrected = app.see(lambda state: state.extent and state.extent[0] > 1.5)
+        assert corrected.extent == pytest.approx([2, 3, 4], rel=0.1)
+        assert corrected.record["columns"]["source"] == "user"
+        app.screen.do("key", "ctrl+z")
+        app.see(lambda state: state.extent[0] < 1.5)
+        assert app.settle().document["reading"] == {}
+        app.screen.do("key", "ctrl+y")
+        app.see(lambda state: state.extent[0] > 1.5)
+        app.settle()
+        app.screen.do("key", "ctrl+q")
+        app.process.wait(PATIENCE)
+    assert stored_of(tmp_path, table).document.reading == {"columns": "- x y z"}
+    with running_app(screen, tmp_path, table) as app:
+        assert app.settle().extent == pytest.approx([2, 3, 4], rel=0.1)
+        app.act(PANEL, ("item_click", "How this was read/columns/\uf0e2"))
+        app.see(lambda state: state.extent[0] < 1.5)
+
+
+def type_into(app: RunningApp, key: str, text: str) -> None:
+    """Choose "Other..." in the list of a decision, and type a value."""
+    app.choose(PANEL, f"How this was read/{key}/##value", "Other...")
+    app.settle()
+    app.screen.do("key", "ctrl+a")
+    app.screen.do("type", "--delay", "30", "--", text)
+    app.screen.do("key", "Return")
+
+
+@pytest.mark.slow
+def test_a_camera_is_corrected_and_one_that_fails_is_taken_back(
+    screen: Screen, tmp_path: Path, depth_folder: Path
+) -> None:
+    with running_app(screen, tmp_path, depth_folder) as app:
+        before = app.settle()
+        app.act(PANEL, ("item_open", "How this was read"))
+        picture = screen.picture()
+        type_into(app, "camera", "20,20,19.5,14.5")
+        state = app.see(lambda state: state.record["camera"]["source"] == "user")
+        assert app.settle().extent[:2] == pytest.approx([39 / 20, 29 / 20], rel=0.02)
+        assert state.extent != before.extent
+        assert (screen.picture() != picture).any()
+        type_into(app, "camera", "none.txt")
+        app.see(lambda state: any("Cannot open" in note for note in state.shown_notes))
+        after = app.settle()
+        assert after.document["reading"] == {"camera": "20,20,19.5,14.5"}
+        assert after.extent == state.extent
+        assert "Traceback" not in app.log()
