@@ -123,3 +123,18 @@ def test_a_camera_is_corrected_and_one_that_fails_is_taken_back(
         assert after.document["reading"] == {"camera": "20,20,19.5,14.5"}
         assert after.extent == state.extent
         assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_columns_are_corrected_with_the_keyboard_alone(screen: Screen, tmp_path: Path, table: Path) -> None:
+    with running_app(screen, tmp_path, table) as app:
+        app.press("F6", "Home", "Return", "Tab", "Return")  # closes the section Scan, opens the next one
+        app.press(*["Tab"] * 5, "Return")  # encoding, separator, decimal mark, lines to skip, columns
+        assert app.settle().lists == 1
+        app.press("End", "Return")  # "Other..."
+        app.screen.do("key", "ctrl+a", "type", "--delay", "30", "--", "- x y z")
+        app.screen.do("key", "Return")
+        app.see(lambda state: state.extent[0] > 1.5)
+        assert app.settle().undoes == "Correct the columns"
+        app.press("ctrl+z")
+        app.see(lambda state: state.extent[0] < 1.5)

@@ -62,7 +62,8 @@ class ReadingSection(WindowPart):
         imgui.text_unformatted(decision.label)
         imgui.same_line()
         room = imgui.get_content_region_avail().x
-        imgui.text_disabled(widgets.unhidden(widgets.fitted(decision.shown_source, room)))
+        source = "set by you" if decision.source == "user" else decision.shown_source
+        imgui.text_disabled(widgets.fitted(source, room))
         if key not in CORRECTED:
             imgui.text_wrapped(decision.shown)
             widgets.tooltip("\n".join(explanation(decision)))
@@ -94,7 +95,7 @@ class ReadingSection(WindowPart):
             if imgui.selectable(widgets.labelled(text, text), False)[0]:
                 self._correct(key, text)
         if imgui.selectable(_OTHER, False)[0]:
-            self._field.begin(key, self.rereading.text_of(key) or next(iter(decision.alternatives), ""))
+            self._field.begin(key, self.rereading.text_of(key) or as_text(decision))
         imgui.end_combo()
 
     def _draw_field(self, key: str) -> None:
@@ -111,6 +112,15 @@ class ReadingSection(WindowPart):
             self.rereading.correct(key, text)
         except InputError as error:
             self._problems[key] = str(error)
+
+
+def as_text(decision: Decision) -> str:
+    """The value of a decision as `--read` takes it, for the user to change."""
+    value = decision.value
+    if isinstance(value, dict) and {"fx", "fy", "cx", "cy"} <= value.keys():
+        lens = value.get("distortion") or []
+        return ",".join(f"{one:g}" for one in (*(value[name] for name in ("fx", "fy", "cx", "cy")), *lens))
+    return "" if value is None else decision.shown
 
 
 def choices(decision: Decision, record: Reading) -> list[str]:
