@@ -34,6 +34,8 @@ from viewer.rigid import STILL
 from viewer.scan.layers import Layers
 from viewer.scan.open import open_scan
 from viewer.scan.pose import Pose
+from viewer.scan.reading.record import Reading
+from viewer.scan.reading.sequence import Decided
 
 POSE = Pose(0, 0.0, "ball", sphere(100))
 
@@ -48,6 +50,13 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return home
 
 
+class Poses(list[Pose]):
+    """Poses of a scan that nobody corrects."""
+
+    decided = Decided()
+    reading = Reading()
+
+
 @pytest.fixture
 def app() -> Any:
     """What Capture needs, with a picture. told: the notes."""
@@ -60,7 +69,7 @@ def app() -> Any:
         note=told.append,
         viewport=picture,
         session=session,
-        playback=SimpleNamespace(unit="mm", timeline=[POSE]),
+        playback=SimpleNamespace(unit="mm", timeline=Poses([POSE])),
     )
 
 

@@ -9,12 +9,8 @@ from typing import Any
 
 from ...errors import InputError, shortened, unknown_name
 from ..units import checked_unit
-from .record import Decision
+from .record import ROLES, Decision, holds_name
 
-ROLES = (
-    "x", "y", "z", "nx", "ny", "nz", "r", "g", "b", "a", "intensity", "radius", "number", "row", "column",
-    "frame", "time", "id", "label", "-",
-)  # fmt: skip
 _LENS_COUNTS = (0, 4, 5, 8)  # of coefficients, see viewer/scan/lens.py
 _MOST_LINES = 1 << 16
 
@@ -181,7 +177,7 @@ class Corrections(Mapping[str, Any]):
     def without_names(self) -> dict[str, str]:
         """The texts of those corrections that name no file, take, channel or column: such a name may tell
         whose scan it is."""
-        return {key: text for key, text in self.texts.items() if not _holds_name(key, self._values[key])}
+        return {key: text for key, text in self.texts.items() if not holds_name(key, self._values[key])}
 
     def decision(self, key: str, value: Any = None) -> Decision | None:
         """The user's decision about a key; None where the user leaves it open. value: what stands in the
@@ -194,19 +190,6 @@ class Corrections(Mapping[str, Any]):
 
 
 NOTHING_CORRECTED = Corrections()
-
-
-def _holds_name(key: str, value: Any) -> bool:
-    """Whether the value of a correction is, or contains, a name that the user or a file gave."""
-    if key == "columns":
-        return not {*value} <= {*ROLES}
-    if key == "camera":
-        return isinstance(value, str)
-    if key == "times":
-        return value not in ("names", "index") and not value.startswith("fps:")
-    if key == "frames":
-        return value not in ("rows", "image", "cloud")
-    return key in ("take", "unit", "depth-channel")
 
 
 def _value(key: str, text: str) -> Any:

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 
 from ...errors import InputError, shortened, unknown_name
 from ..times import frame_in_words
+from ..units import is_length
 
 Source = Literal["file", "neighbour", "folder", "user", "assumed"]
 
@@ -33,6 +34,10 @@ KEYS = {
     "texture": "Texture",
     "splats": "Gaussian splats",
 }
+ROLES = (  # of columns; a column with another role is a number by the name that it has
+    "x", "y", "z", "nx", "ny", "nz", "r", "g", "b", "a", "intensity", "radius", "number", "row", "column",
+    "frame", "time", "id", "label", "-",
+)  # fmt: skip
 _SOURCES = {  # as people read them, where no file is named
     "file": "the file", "neighbour": "a file beside it", "folder": "file names", "user": "you",
     "assumed": "assumed",
@@ -191,19 +196,13 @@ class Reading:
         ]
 
     def without_names(self) -> Reading:
-        """The record without names of files, which may name a person; sources and numbers stay."""
-        secret = {"frames", "take", "texture"}
+        """The record without names that a user or a file gave, which may name a person: of files, takes,
+        columns, channels and units. Sources and numbers stay."""
         decisions = {
-            key: replace(
-                one,
-                value=None if key in secret else _without_file(one.value),
-                where="",
-                alternatives=() if key in {*secret, "camera", "times"} else one.alternatives,
-                why="",
-            )
+            key: replace(one, value=_without_names(key, one.value), where="", alternatives=(), why="")
             for key, one in self.decisions.items()
         }
-        return Reading(decisions, unused=self.unused)
+        return Reading(decisions)
 
     def to_json(self) -> dict[str, Any]:
         """Plain values, as `scan4d info --json` prints them and documents store them."""
@@ -277,6 +276,25 @@ def _in_full(decision: Decision) -> str:
     return ". ".join(part.rstrip(".") for part in parts if part)
 
 
-def _without_file(value: Any) -> Any:
-    """A value without the name of a file in it."""
-    return {key: one for key, one in value.items() if key != "file"} if isinstance(value, Mapping) else value
+def holds_name(key: str, value: Any) -> bool:
+    """Whether a value of a decision or a correction is, or contains, a name that a user or a file gave."""
+    if key == "columns" and not isinstance(value, str):
+        return not {*(value or ())} <= {*ROLES}
+    if key == "unit":
+        return value is not None and not is_length(value)
+    if key == "camera":
+        return isinstance(value, str)
+    if key == "times" and isinstance(value, str):
+        return value not in ("names", "index") and not value.startswith("fps:")
+    if key == "frames":
+        return value not in ("rows", "image", "cloud")
+    return key in ("columns", "take", "times", "texture", "depth-channel") and isinstance(value, str)
+
+
+def _without_names(key: str, value: Any) -> Any:
+    """A value without names that a user or a file gave."""
+    if key == "columns" and isinstance(value, (list, tuple)):
+        return [role if role in ROLES else "scalar" for role in value]
+    if isinstance(value, Mapping):
+        return {name: one for name, one in value.items() if not isinstance(one, str) or name == "kind"}
+    return None if holds_name(key, value) else value
