@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app, stored_of
 
+from viewer import cli
 from viewer.app.panel.reading import choices, explanation, words_on_assumed
 from viewer.scan.reading.record import Decision, Reading, Take
 
@@ -137,4 +138,19 @@ def test_columns_are_corrected_with_the_keyboard_alone(screen: Screen, tmp_path:
         app.see(lambda state: state.extent[0] > 1.5)
         assert app.settle().undoes == "Correct the columns"
         app.press("ctrl+z")
+        app.see(lambda state: state.extent[0] < 1.5)
+
+
+@pytest.mark.slow
+def test_a_replay_reads_the_scan_as_its_picture_did(screen: Screen, tmp_path: Path, table: Path) -> None:
+    picture = tmp_path / "corrected.png"
+    small = ("--size", "64x48", "--backend", "points")
+    assert cli.main(["render", str(table), *small, "--read", "columns=- x y z", "-o", str(picture)]) == 0
+    with running_app(screen, tmp_path, table) as app:
+        assert app.settle().extent[0] < 1.5
+        app.drop(picture)
+        app.see(lambda state: state.extent[0] > 1.5)
+        app.see(is_replaying=False)
+        assert app.settle().document["reading"] == {"columns": "- x y z"}
+        app.screen.do("key", "ctrl+z")
         app.see(lambda state: state.extent[0] < 1.5)

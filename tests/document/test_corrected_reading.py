@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
+from viewer import cli
 from viewer.camera import Camera
 from viewer.document.document import Document
 from viewer.document.history import History
@@ -16,6 +18,7 @@ from viewer.document.recording import Entry, Recording
 from viewer.document.saved_session import SavedSession
 from viewer.document.schema import plain
 from viewer.look import Look
+from viewer.output.export import read_description
 from viewer.scan.open import open_scan
 
 READING = {"columns": "x y z - intensity", "camera": "290,290,159.5,89.5"}
@@ -87,3 +90,18 @@ def test_an_anonymous_entry_has_no_names_in_its_corrections_and_record() -> None
     nameless = entry(reading=reading, record=record).without_names()
     assert nameless.reading == {"skip": "2"}
     assert "jane" not in json.dumps(nameless.to_json())
+
+
+def test_a_replayed_picture_reads_the_scan_as_the_first_did(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("points.txt", np.random.default_rng(0).uniform(0, (1, 2, 3, 4), (300, 4)))
+    small = ["--size", "64x48", "--backend", "points"]
+    assert cli.main(["render", "points.txt", *small, "--read", "columns=- x y z", "-o", "a.png"]) == 0
+    assert cli.main(["render", "--replay", "a.png", "-o", "b.png"]) == 0
+    first, again = (np.asarray(Image.open(name)) for name in ("a.png", "b.png"))
+    assert np.array_equal(first, again)
+    told = json.loads(read_description(Path("b.png")))
+    assert told["reading"] == {"columns": "- x y z"}
+    assert told["record"]["decisions"]["columns"]["source"] == "user"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -42,6 +42,7 @@ class Replaying:
         self.since: float | None = None  # by the clock, when the last one was there in full
         self.asked: str | None = None  # the scan that was to be opened
         self.compared: str | None = None  # the scan whose hash was
+        self.read_as: Mapping[str, str] | None = None  # the corrections that the scan was to be read with
 
     def __str__(self) -> str:
         return f"Replaying {self.path.name}: {self.next} of {len(self.recording.entries)}. Esc to stop."
@@ -132,6 +133,8 @@ class Replayer(WindowPart):
         entry = replaying.recording.entries[replaying.next]
         if not self._has_opened(replaying, entry):
             return self.opener.job.scan is not None
+        if not self._is_read_as(replaying, entry):
+            return True
         timeline = self.playback.timeline
         if entry.pose in timeline.broken or entry.pose >= len(timeline):
             self.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown: Scan4D skips it.")
@@ -166,6 +169,19 @@ class Replayer(WindowPart):
                     partial(_changed, replaying.path, scan, entry.hash, self.playback.timeline.files)
                 )
         return True
+
+    def _is_read_as(self, replaying: Replaying, entry: Entry) -> bool:
+        """Whether the scan is read with the corrections of an entry, as far as that is possible."""
+        document, wanted = self.session.document, dict(entry.reading)
+        if document.reading != self.opener.reading:  # it is about to be read anew
+            return False
+        now = {key: text for key, text in document.reading.items() if key != "unit"}
+        if entry.anonymous or wanted in (now, replaying.read_as):
+            return True
+        replaying.read_as = wanted
+        unit = {key: text for key, text in document.reading.items() if key == "unit"}
+        self.session.change("Replay", merge="replay", reading={**unit, **wanted})
+        return False
 
     def _show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""
