@@ -119,7 +119,7 @@ CORRECTED = {
     "colors": _words("the largest value 1, 255 or 65535, or none", "1", "255", "65535", "none"),
     "normals": _words("stored or none", "stored", "none"),
     "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number", ("none", "0,0,0")),
-    "texture": _words("vertices, dense or none", "vertices", "dense", "none"),
+    "texture": Key(_one_of("vertices", "dense", "none"), "vertices, dense or none", ("vertices", "none")),
     "splats": _words("yes or no", "yes", "no"),
     "camera": Key(_camera, "fx,fy,cx,cy in pixels, then 4, 5 or 8 lens coefficients or none; or a file"),
     "depth-scale": Key(_positive, "a number of steps in one unit, above 0"),
