@@ -172,9 +172,8 @@ class Entry:
         )  # fmt: skip
 
     def with_reading(self, timeline: Timeline) -> Entry:
-        """The entry with how Scan4D reads its scan: the user's corrections, and the record. The entry has
-        the unit beside these."""
-        texts = {key: text for key, text in timeline.decided.corrections.texts.items() if key != "unit"}
+        """The entry with how Scan4D reads its scan: the user's corrections, and the record."""
+        texts = dict(timeline.decided.corrections.texts)
         return replace(self, reading=texts, record=timeline.reading.to_json())
 
     def with_notes(self, notes: tuple[Note, ...]) -> Entry:

@@ -172,7 +172,8 @@ class Replayer(WindowPart):
 
     def _is_read_as(self, replaying: Replaying, entry: Entry) -> bool:
         """Whether the scan is read with the corrections of an entry, as far as that is possible."""
-        document, wanted = self.session.document, dict(entry.reading)
+        document = self.session.document
+        wanted = {key: text for key, text in entry.reading.items() if key != "unit"}
         if document.reading != self.opener.reading:  # it is about to be read anew
             return False
         now = {key: text for key, text in document.reading.items() if key != "unit"}
