@@ -192,7 +192,10 @@ def saved_session(app: RunningApp, name: str) -> Path:
 def open_and_find(app: RunningApp, session: Path, scan: Path, document: object) -> None:
     """Drop a session whose scan is missing, and name the folder where it is now."""
     app.drop(session)
-    app.told("its scan 'scans/wall' is missing. Choose where it is now")
+    app.told("its scan 'scans/wall' is missing")
+    app.settle()
+    app.act("problems", ("item_click", "$$0/Locate scan..."))
+    app.see(is_browser_open=True)
     app.settle()
     Hands(app).press("Tab")
     app.screen.do("type", "--delay", 15, scan)

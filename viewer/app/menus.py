@@ -33,6 +33,7 @@ _RENDERER = Menu("Renderer", (
 _MENUS = (
     Menu("File", (
         ("open", "open_recent", "scans", "next_scan", "previous_scan"),
+        ("read_table", "read_folder"),
         ("save_session", "save_session_as", "screenshot", "record", "replay", "export"),
         ("quit",),
     )),

@@ -54,6 +54,10 @@ class Offer(str):
         return offer
 
 
+class Refusal(Offer, Problem):
+    """A problem with buttons that help to solve it."""
+
+
 @dataclass(frozen=True)
 class Notice:
     """One message. at: when it came, local time. until: by the clock, when it goes. is_problem: whether it

@@ -399,6 +399,16 @@ def modal(title: str, is_open: bool, size: ImVec2 | None = None) -> Iterator[boo
         imgui.end_popup()
 
 
+def is_taken() -> bool:
+    """Whether Enter takes what the dialog that is being declared shows: no field, list or widget that Tab has
+    led to has the key."""
+    here = imgui.FocusedFlags_.root_and_child_windows | imgui.FocusedFlags_.no_popup_hierarchy
+    was_held = imgui.get_current_context().active_id_previous_frame != 0
+    if was_held or imgui.get_io().nav_visible or not imgui.is_window_focused(here):
+        return False
+    return any(imgui.is_key_pressed(key, repeat=False) for key in (imgui.Key.enter, imgui.Key.keypad_enter))
+
+
 def how_far(task: Task) -> str:
     """The share that is done, where it is known, and for how long the work has gone on."""
     done = "" if task.progress is None else f"{100 * task.progress:.0f} %, "

@@ -19,6 +19,7 @@ from ...scan.timeline import Timeline
 from .. import widgets
 from ..commands import Command
 from ..file_dialog import files_of
+from ..notices import Offer
 from ..part import ViewArea, WindowPart
 from ..session import Session, known_as
 from ..window import Window
@@ -71,6 +72,7 @@ class Browser(WindowPart):
         self._asked = False  # to be opened
         self.is_open = self._is_done = False
         self._asks_for: str | None = None  # what is being opened
+        self._solutions: dict[str, Callable[[], object]] = {}  # buttons below the refusal
         self._view = FolderView(
             _list, self._open, nothing="No scans or sessions in this folder.", filters=True
         )
@@ -106,6 +108,7 @@ class Browser(WindowPart):
         if self._asks_for is None:
             return False
         self._asks_for, self._view.refusal = None, problem
+        self._solutions = dict(problem.choices) if isinstance(problem, Offer) else {}
         return True
 
     def begin_scan(self, timeline: Timeline) -> None:
@@ -142,7 +145,7 @@ class Browser(WindowPart):
                 self._is_done = False
             imgui.end_popup()
         elif not self._asked:
-            self.sessions.homeless, self._asks_for = None, None  # the user gave up
+            self.sessions.take_located, self._asks_for = None, None  # the user gave up
             self._previewer.ask(None)
 
     # --- what the user does -----------------------------------------------------------
@@ -157,8 +160,8 @@ class Browser(WindowPart):
         self._asks_for, self._view.refusal = scan, ""
         if is_session(Path(scan)):
             self.sessions.open(Path(scan))
-        elif (session := self.sessions.homeless) is not None:
-            self.sessions.open_with(session, scan)
+        elif (take := self.sessions.take_located) is not None:
+            take(scan)
         elif is_recording(Path(scan)):
             self.replay(Path(scan))
             self.opened()
@@ -173,6 +176,7 @@ class Browser(WindowPart):
         self._view.take_keys()  # before the field for the path lets go of them
         self._view.draw_path()
         self._view.draw_refusal()
+        self._draw_solutions()
         foot = imgui.get_frame_height_with_spacing() + imgui.get_style().item_spacing.y
         width = imgui.get_content_region_avail().x
         known = max(_KNOWN_SHARE * width, _KNOWN_LEAST * imgui.get_font_size())
@@ -192,6 +196,13 @@ class Browser(WindowPart):
         self._draw_preview()
         imgui.end_child()
         self._draw_foot()
+
+    def _draw_solutions(self) -> None:
+        """Declare the buttons that help with what was refused; they close the dialog."""
+        for name, act in self._solutions.items() if self._view.refusal else ():
+            if imgui.button(name):
+                imgui.close_current_popup()
+                act()
 
     def _draw_filter(self) -> None:
         imgui.set_next_item_width(-1)

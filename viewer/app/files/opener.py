@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 from ...backends import backend
 from ...document.saved_session import SavedSession
-from ...errors import Scan4DError
+from ...errors import InputError, Scan4DError
+from ...files import printable
+from ...scan.listing import is_there
 from ...scan.open import DEMO, open_scan
 from ...scan.pose import Pose
+from ...scan.reading.record import Take
+from ...scan.reading.takes import ALL
 from ...scan.timeline import Timeline
 from ...task import Task, in_background
-from ..notices import Notices, Problem
+from ..notices import Notices, Offer, Problem, Refusal
 from ..part import Parts, WindowPart
 from ..playing.playback import Playback
 from ..session import Session, known_as
@@ -23,8 +29,10 @@ from ..window import Window
 from .opening import Opened, Opening, Way, find_facts, find_stored
 from .same_content import offer_of_change, offer_of_stored
 from .scans import title
+from .table_dialog import is_table
 
 log = logging.getLogger(__name__)
+_MOST_TAKES = 12  # that have a button
 
 
 @dataclass(eq=False)
@@ -53,6 +61,9 @@ class Opener(WindowPart):
     named: Sequence[str]
     tell_later: Callable[[Callable[[], str]], None]
     open_with: Callable[..., None]
+    offer_to_locate: Callable[..., None]
+    ask_for_table: Callable[..., None]
+    correct_reading: Callable[[Mapping[str, str]], None]
     after: Callable[[str], str | None]
     abandon: Callable[[], None]
 
@@ -62,16 +73,21 @@ class Opener(WindowPart):
         self._reported: set[str] = set()  # what could not be read of documents
         self._has_begun = self._looks_further = False  # whether a frame of any scan was shown, or looked for
         self._messages_read = 0
+        self._texts: dict[str, dict[str, str]] = {}  # corrections of scans, as `known_as` has them
 
-    def open(self, scan: str, session: SavedSession | None = None) -> None:
+    def open(
+        self, scan: str, session: SavedSession | None = None, stated: Mapping[str, str] | None = None
+    ) -> None:
         """Open another scan on a worker, instead of one that is being opened; the current one stays
         until a pose of it is there.
 
-        session: to open it with; None: as it was left.
+        session: to open it with; None: as it was left. stated: corrections of how Scan4D reads it, which win
+        over those of its document.
         """
         left = self.session.left(scan)
         find = (lambda: find_stored(scan, self.up)) if left is None else lambda: left
-        stated = self.corrections if scan in self.named and left is None and session is None else None
+        if stated is None and left is None and session is None and scan in self.named:
+            stated = self.corrections
         self._start(scan, Way(find, partial(self._open, scan), session, stated or {}))
 
     def reread(self) -> None:
@@ -100,7 +116,8 @@ class Opener(WindowPart):
         except Scan4DError as error:
             if not self._has_begun and asked is not None:  # else nothing would be shown
                 self.open(self.after(asked) or DEMO)
-            self.refuse(f"Cannot open: {error}")
+            if not self._has_moved(asked):
+                self.refuse(self._refusal(f"Cannot open: {error}", asked))
             return
         if opened is not None:
             scan, begun = opened
@@ -188,12 +205,43 @@ class Opener(WindowPart):
             self._messages_read = len(self.playback.timeline.messages)
             return
         for message in messages:
-            self.notices.tell_of_scan(message.text)
+            takes = self.playback.timeline.reading.takes
+            self.notices.tell_of_scan(self._offer_of_takes(takes) if message.kind == "take" else message.text)
+
+    def _offer_of_takes(self, takes: Sequence[Take]) -> Offer:
+        """The message that the folder of the open scan holds several, with a button for each."""
+        shown = self.playback.timeline.reading["take"].value
+        named = {take.name: f"{take.name} ({take.frames})" for take in takes[:_MOST_TAKES]}
+        named |= {ALL: "All"}
+        choices = {title: partial(self.correct_reading, {"take": name}) for name, title in named.items()}
+        text = f"The folder holds {len(takes)} takes. Scan4D shows {shown}. Choose another one, or all."
+        return Offer(text, choices, "takes")
+
+    def _has_moved(self, scan: str | None) -> bool:
+        """Whether a scan is missing that the user has worked on; then offer to locate it."""
+        if scan is None or is_there(scan):
+            return False
+        try:
+            saved = self.session.left(scan) or find_stored(scan, self.up)
+        except InputError:
+            return False
+        if saved is None or not saved.document.made:
+            return False
+        problem = f"The scan '{printable(scan)}' is missing. Scan4D still has what you made on it."
+        self.offer_to_locate(problem, Path(known_as(scan)).parent, partial(self.open_with, saved))
+        return True
+
+    def _refusal(self, problem: str, scan: str | None) -> str:
+        """A problem with a scan; of a text table it offers to state how Scan4D reads that."""
+        if scan is None or not is_table(scan) or not os.path.isfile(scan):
+            return problem
+        ask = partial(self.ask_for_table, scan)
+        return Refusal(problem, {"Read table...": ask}, "refusal")
 
     def refuse(self, problem: str) -> None:
         """Show why what the user asked for was not opened: in the dialog, where that waits for it."""
         if not any([part.refused(problem) for part in self.parts]):
-            self.notices.tell_of_opening(Problem(problem))
+            self.notices.tell_of_opening(problem if isinstance(problem, Offer) else Problem(problem))
 
     def close(self) -> None:
         """Give up what is being opened."""

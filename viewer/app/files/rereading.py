@@ -12,7 +12,7 @@ from ...scan.units import checked_unit
 from ..part import WindowPart
 from ..playing.playback import Playback
 from ..scene.steering import Steering
-from ..session import Session
+from ..session import Session, known_as
 from .opener import Opener
 
 log = logging.getLogger(__name__)
@@ -29,6 +29,7 @@ class Rereading(WindowPart):
     name = "rereading"
     doing = "Reading the scan anew"
     turn = -5
+    OFFERS = {"correct_reading": "correct_all"}
     session: Session
     playback: Playback
     opener: Opener
@@ -71,6 +72,23 @@ class Rereading(WindowPart):
             fields |= {"fps": None, "times_by_names": False}
         label = KEYS[key].lower()
         self._step = f"Correct the {label}" if text is not None else f"Reset the {label}"
+        self.session.change(self._step, **fields)
+
+    def correct_all(self, corrections: Mapping[str, str], scan: str | None = None) -> None:
+        """Have Scan4D read a scan with these corrections, in one step.
+
+        corrections: key -> text as `--read` takes it. They amend those that hold, and an empty text ends one.
+        scan: to open with them; None: the open one. Raises InputError where one is unusable.
+        """
+        if scan is not None and known_as(scan) != known_as(self.session.scan):
+            self.opener.open(scan, stated={key: text for key, text in corrections.items() if text})
+            return
+        texts = {**self.session.document.reading, **corrections}
+        reading = Corrections.parse({key: text for key, text in texts.items() if text}).texts
+        fields: dict[str, object] = {"reading": dict(reading)}
+        if "times" in corrections:
+            fields |= {"fps": None, "times_by_names": False}
+        self._step = "Correct how the scan is read"
         self.session.change(self._step, **fields)
 
     def advance(self, now: float) -> None:

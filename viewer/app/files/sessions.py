@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from ...document.recording import scan_path
@@ -14,7 +15,7 @@ from ...scan.inputs import refuse_input
 from ...scan.listing import is_there
 from ..commands import Command
 from ..file_dialog import SAVE, FileDialog
-from ..notices import Problem
+from ..notices import Problem, Refusal
 from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
 from ..session import Session, known_as, named_like
@@ -24,17 +25,18 @@ from ..session import Session, known_as, named_like
 class Sessions(WindowPart):
     """Saves and opens session files.
 
-    saving: the dialog that saves. homeless: a session whose scan is not where it says, until the user has
-    chosen that; None without one.
+    saving: the dialog that saves. take_located: takes the scan that the user is asked to locate; None while
+    the user is not asked.
     """
 
     name = "sessions"
     layer = 81
     shows = "The dialog that saves sessions"
-    OFFERS = {"open_with": "open_with"}
+    OFFERS = {"open_with": "open_with", "offer_to_locate": "offer_to_locate"}
     session: Session
     playback: Playback
     note_of_work: Callable[[str], None]
+    note_of_opening: Callable[[str], None]
     refuse: Callable[[str], None]
     open_scan: Callable[[str, SavedSession], None]
     take_up: Callable[[SavedSession], None]
@@ -45,7 +47,7 @@ class Sessions(WindowPart):
     def __post_init__(self) -> None:
         about = "Saves view, look, renderer, bookmarks, distances and landmarks, not the scan itself"
         self.saving: FileDialog = FileDialog(SAVE, "Save session", about, (SUFFIX,), self._save, self.redraw)
-        self.homeless: SavedSession | None = None
+        self.take_located: Callable[[str], object] | None = None
         self._files: dict[str, Path] = {}  # of scans, as `known_as` has them: saved to or opened from
         self._opened: tuple[SavedSession, Path] | None = None  # last, and its file
 
@@ -75,7 +77,7 @@ class Sessions(WindowPart):
         self.note_of_work(f"Saved {file}")
 
     def open(self, path: Path) -> None:
-        """Open the scan of a session file with it; where it is not there, the user is asked to find it."""
+        """Open the scan of a session file with it; where the scan is missing, offer to locate it."""
         try:
             session = SavedSession.load(path)
             scan = scan_path(session.scan, path)
@@ -86,11 +88,23 @@ class Sessions(WindowPart):
         if is_there(scan):
             self.open_with(session, scan)
             return
-        self.homeless = session
-        self.note_of_work(
-            f"{path.name}: its scan '{printable(session.scan)}' is missing. Choose where it is now."
+        self.close_browser()
+        problem = f"{path.name}: its scan '{printable(session.scan)}' is missing."
+        self.offer_to_locate(problem, path.parent, partial(self.open_with, session))
+
+    def offer_to_locate(self, problem: str, folder: Path, take: Callable[[str], object]) -> None:
+        """Report that a scan is missing, and offer the dialog that locates it.
+
+        folder: where to look first, or the nearest one above it that is there. take: gets the scan as the
+        user has located it.
+        """
+        self.note_of_opening(
+            Refusal(problem, {"Locate scan...": partial(self._locate, folder, take)}, "locate")
         )
-        self.ask_for_scan(path.parent)
+
+    def _locate(self, folder: Path, take: Callable[[str], object]) -> None:
+        self.take_located = take
+        self.ask_for_scan(next((one for one in (folder, *folder.parents) if one.is_dir()), working_folder()))
 
     def open_with(self, session: SavedSession, scan: str) -> None:
         """Open a scan with a session; at once where it is the open one.

@@ -13,6 +13,8 @@ from pathlib import Path
 from ...document.anonymous import in_scan_coordinates, middle_of
 from ...document.recording import Entry, Recording, fingerprint_as, scan_path, scan_paths
 from ...errors import InputError
+from ...files import printable
+from ...scan.listing import is_there
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
 from ..commands import Command
@@ -43,9 +45,15 @@ class Replaying:
         self.asked: str | None = None  # the scan that was to be opened
         self.compared: str | None = None  # the scan whose hash was
         self.read_as: Mapping[str, str] | None = None  # the corrections that the scan was to be read with
+        self.located: dict[str, str] = {}  # scans as entries name them -> where the user says that they are
 
     def __str__(self) -> str:
         return f"Replaying {self.path.name}: {self.next} of {len(self.recording.entries)}. Esc to stop."
+
+    def paths(self, scan: str) -> list[str]:
+        """Paths where a scan may be that an entry names."""
+        located = self.located.get(scan)
+        return scan_paths(scan, self.path) if located is None else [located]
 
     def until_next(self, now: float) -> float:
         """Seconds until another picture is due, or is to be looked for while one is awaited."""
@@ -78,6 +86,7 @@ class Replayer(WindowPart):
     open_scan: Callable[[str], None]
     close_browser: Callable[[], None]
     tell_later: Callable[[Callable[[], str]], None]
+    offer_to_locate: Callable[..., None]
     last_recording: Callable[[], Path | None]
     redraw: Callable[[], None]
 
@@ -87,10 +96,14 @@ class Replayer(WindowPart):
     def replay(self, path: Path) -> None:
         """Show a recording again, or what a picture tells of itself."""
         try:
-            self.replaying = Replaying(path)
+            replaying = Replaying(path)
         except InputError as error:
             self.refuse(str(error))
             return
+        self._begin(replaying)
+
+    def _begin(self, replaying: Replaying) -> None:
+        self.replaying = replaying
         self.close_browser()
         self.playback.player.pause()
         self.steering.turntable.stop()
@@ -152,11 +165,14 @@ class Replayer(WindowPart):
             return False
         scan = self.session.scan
         here = known_as(scan)
-        if entry.scan is not None and here not in map(known_as, scan_paths(entry.scan, replaying.path)):
+        if entry.scan is not None and here not in map(known_as, replaying.paths(entry.scan)):
             try:
-                path = scan_path(entry.scan, replaying.path)
+                path = replaying.located.get(entry.scan) or scan_path(entry.scan, replaying.path)
             except InputError as error:
                 self.note(Problem(str(error)))
+                return False
+            if not is_there(path):
+                self._offer_to_locate(replaying, entry.scan)
                 return False
             if replaying.asked != path:  # else it could not be opened, and a message said so
                 replaying.asked = path
@@ -183,6 +199,14 @@ class Replayer(WindowPart):
         unit = {key: text for key, text in document.reading.items() if key == "unit"}
         self.session.change("Replay", merge="replay", reading={**unit, **wanted})
         return False
+
+    def _offer_to_locate(self, replaying: Replaying, scan: str) -> None:
+        def take(path: str) -> None:
+            replaying.located[scan], replaying.asked = path, None
+            self._begin(replaying)
+
+        problem = f"{replaying.path.name}: its scan '{printable(scan)}' is missing."
+        self.offer_to_locate(problem, replaying.path.parent, take)
 
     def _show(self, entry: Entry, pose: Pose) -> None:
         """Show what an entry of a recording does. pose: of the scan, which is open."""

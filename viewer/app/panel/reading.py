@@ -3,7 +3,7 @@ corrects each of them here."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -13,7 +13,9 @@ from ...errors import InputError
 from ...scan.reading.corrections import CORRECTED
 from ...scan.reading.record import Decision, Reading
 from .. import widgets
+from ..files.frames_dialog import FramesDialog
 from ..files.rereading import Rereading
+from ..files.table_dialog import TableDialog
 from ..part import Section, WindowPart
 from ..ui import Ui
 
@@ -28,6 +30,8 @@ class ReadingSection(WindowPart):
     name = "reading_section"
     SECTION = Section("How this was read", 12, is_open=False)
     rereading: Rereading
+    table_dialog: TableDialog
+    frames_dialog: FramesDialog
 
     def __post_init__(self) -> None:
         self._field = widgets.NameField()  # its subject is the key whose value the user types
@@ -53,6 +57,20 @@ class ReadingSection(WindowPart):
         for name, text, help in _others(record):
             widgets.fact(name, text)
             widgets.tooltip(help)
+        self._draw_dialogs(ui)
+
+    def _draw_dialogs(self, ui: Ui) -> None:
+        """Declare a button for each dialog that suits the scan."""
+        buttons: dict[str, Callable[[], object]] = {}
+        if self.table_dialog.table is not None:
+            buttons["Table..."] = self.table_dialog.ask
+        if self.frames_dialog.files is not None:
+            buttons["Folder..."] = self.frames_dialog.ask
+        if buttons:
+            row = ui.row(*buttons)
+            for act in buttons.values():
+                if row.button():
+                    act()
 
     def _draw(self, decision: Decision, record: Reading) -> None:
         """Declare one decision: its name and its source on a line, and below them its value as a list."""

@@ -128,7 +128,9 @@ CORRECTED = {
         _axes, "LPS, RAS, unknown, or three signed axes such as '+x -z +y'", ("LPS", "RAS", "unknown")
     ),
     "unit": Key(checked_unit, "a short word such as mm", ("mm", "cm", "m")),
-    "frames": Key(str, "a pattern such as '*.ply', or rows, image or cloud for an array"),
+    "frames": Key(
+        str, "a pattern such as '*.ply', a list such as 'b.ply;a.ply', or rows, image or cloud for an array"
+    ),
     "take": Key(str, "a name, or all", ("all",)),
     "times": Key(_times, "names, index, fps:50, column:NAME, or a file", ("names", "index")),
 }

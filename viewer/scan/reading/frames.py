@@ -17,6 +17,7 @@ KEY = "frames"
 _LEAST = 3  # frames of one pattern, beside which other files are no frames
 _MOST_REFERENCES = 2
 _ALL = "*"
+LIST = ";"  # between the files that a correction lists, in the order in which they play
 
 _WORDS = r"copy|copie|kopie|copia|cópia|kopia|kopija|duplicate|コピー|副本"
 _COPIES = tuple(
@@ -73,6 +74,8 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
     names: at least one; relative to a common folder. Raises InputError where no file has the user's pattern.
     """
     stated = corrections.get(KEY)
+    if stated is not None and lists_files(corrections):
+        return _listed_files(names, stated)
     if stated is not None and any(sign in stated for sign in "*?[."):
         matching = [name for name in names if fnmatchcase(os.path.basename(name), stated)]
         if not matching:
@@ -94,6 +97,23 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
         return FrameFiles(used, Decision(KEY, _counted(used), "folder"), ())
     why = f"Scan4D leaves aside {', '.join(row.file for row in aside[:3])}, by the names"
     return FrameFiles(used, Decision(KEY, _counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
+
+
+def lists_files(corrections: Corrections) -> bool:
+    """Whether the user lists the frames, in the order in which they play: "f2.ply;f1.ply" or "f2.ply;"."""
+    return LIST in corrections.get(KEY, "")
+
+
+def _listed_files(names: Sequence[str], stated: str) -> FrameFiles:
+    """The frames that a list names. Raises InputError where one of them is not there."""
+    listed = list(dict.fromkeys(filter(None, map(str.strip, stated.split(LIST)))))
+    for name in listed:
+        if name not in names:
+            raise InputError(f"there is no file '{shortened(name)}'", hint="Correct --read frames")
+    if not listed:
+        raise InputError("the list of frames is empty", hint="Correct --read frames")
+    aside = tuple(Aside(name, "not chosen") for name in in_order([*{*names} - {*listed}]))
+    return FrameFiles(listed, Decision(KEY, _counted(listed) or listed[0], "user", "--read"), aside)
 
 
 def _counted(names: Sequence[str]) -> str | None:

@@ -54,7 +54,7 @@ def head_of(lines: Iterable[str], corrections: Corrections = NOTHING_CORRECTED) 
     """The head of a table, from its first lines. Raises InputError where there are no rows of numbers."""
     above = _lines_above(lines, corrections)
     dialect = dialect_of(
-        (line for _, line in above.numeric),
+        above.numeric_lines,
         corrections.get("separator"),
         corrections.get("decimal"),
     )
@@ -66,6 +66,11 @@ class _Above(NamedTuple):
 
     numeric: list[tuple[int, str]]
     other: deque[tuple[int, str]]
+
+    @property
+    def numeric_lines(self) -> list[str]:
+        """Those with digits, without their numbers."""
+        return [line for _, line in self.numeric]
 
 
 def _lines_above(lines: Iterable[str], corrections: Corrections) -> _Above:
@@ -261,7 +266,7 @@ def _not_names(number: int, line: str, words: Sequence[str]) -> str:
     twice = next((word for at, word in enumerate(lower) if word in lower[:at]), None)
     if {"x", "y", "z"} & {*lower} and twice:
         return f"line {number} names '{shortened(twice)}' twice, and lacks x, y or z"
-    return f"line {number} is neither numbers nor names with x, y, z: {line[:60]!r}"
+    return f"line {number} is neither numbers nor names with x, y, z: {line.strip()[:60]!r}"
 
 
 # --- what the dialog of tables shows ------------------------------------------------------------
@@ -307,7 +312,7 @@ def preview(path: Path, corrections: Corrections = NOTHING_CORRECTED) -> TablePr
         roles = _roles(head, path.suffix.lower(), corrections)
         problem = ""
     except InputError as error:
-        head = TableHead(corrections.get("skip", 0), _stated_dialect(corrections), (), None)
+        head = TableHead(corrections.get("skip", 0), _likely_dialect(lines, corrections), (), None)
         roles, problem = (), str(error)
     if not problem and head.instead:
         problem = f"looks like {head.instead}, not like points"
@@ -318,8 +323,13 @@ def preview(path: Path, corrections: Corrections = NOTHING_CORRECTED) -> TablePr
     )
 
 
-def _stated_dialect(corrections: Corrections) -> Dialect:
-    return Dialect(corrections.get("separator", PLAIN.separator), corrections.get("decimal", PLAIN.decimal))
+def _likely_dialect(lines: Sequence[str], corrections: Corrections) -> Dialect:
+    """How the lines of a table are written that cannot be read."""
+    stated = corrections.get("separator"), corrections.get("decimal")
+    try:
+        return dialect_of(_lines_above((f"{line}\n" for line in lines), corrections).numeric_lines, *stated)
+    except InputError:
+        return Dialect(stated[0] or PLAIN.separator, stated[1] or PLAIN.decimal)
 
 
 def _roles(head: TableHead, suffix: str, corrections: Corrections) -> tuple[str, ...]:

@@ -83,10 +83,13 @@ def _whole_words(start: str) -> str:
 def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -> Takes:
     """The take that opens: the one that the user names, else the first.
 
-    names: of the frames, at least one. Raises InputError where there is no such take.
+    names: of the frames, at least one. Where the user lists the frames, these are one scan, in the order of
+    the list. Raises InputError where there is no such take.
     """
-    found = takes_in(names)
     wanted = corrections.get(KEY)
+    if frames.lists_files(corrections) and wanted in (None, ALL):
+        return Takes(list(names), Decision(KEY, None, "folder"), (), ())
+    found = takes_in(names)
     if not found:
         if wanted not in (None, ALL):
             hint = "Leave out --take: the files are frames of one scan"

@@ -1,0 +1,162 @@
+"""The dialogs of tables and of folders in the window, by the mouse and by the keyboard alone."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from virtual_screen import RunningApp, Screen, running_app
+
+TABLE, FRAMES = "Read table", "Choose frames"
+_MENU_ROW = 3  # of the two commands, the one that can be chosen
+
+
+def open_by_keys(app: RunningApp) -> None:
+    """Choose the dialog that suits the open scan in the menu File."""
+    app.press("alt+f", *["Down"] * _MENU_ROW, "Return")
+    app.see(lists=1)
+    app.settle()
+
+
+@pytest.fixture
+def takes(tmp_path: Path) -> Path:
+    """Two takes, with 300 and 200 points a frame."""
+    folder = tmp_path / "takes"
+    folder.mkdir()
+    for take, count, points in (("anna", 3, 300), ("bert", 2, 200)):
+        for number in range(count):
+            np.save(folder / f"{take}_{number}.npy", np.random.default_rng(number).random((points, 3)))
+    return folder
+
+
+def numbered(path: Path) -> Path:
+    """A table whose first column counts the points."""
+    path.write_text("".join(f"{i} {i % 9}.5 {i // 9}.25 {i % 4}\n" for i in range(1, 81)))
+    return path
+
+
+def test_a_german_table_opens_at_once(screen: Screen, tmp_path: Path) -> None:
+    path = tmp_path / "messung.csv"
+    rows = "".join(f"{i % 9},5;{i // 9},25;{i % 4},0\n" for i in range(80))
+    path.write_text(f"Messung vom 3. Mai\nx;y;z\n{rows}")
+    with running_app(screen, tmp_path, path) as app:
+        assert app.settle().points == 80
+        assert not [note for note in app.notes if "Cannot open" in note]
+    assert "Traceback" not in app.log()
+
+
+def test_a_button_opens_another_take(screen: Screen, tmp_path: Path, takes: Path) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.told(r"holds 2 takes\. Scan4D shows anna")
+        assert app.settle().points == 300
+        app.act("problems", ("item_click", "$$0/bert (2)"))
+        app.see(points=200)
+        assert not [note for note in app.settle().shown_notes if "takes" in note]
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_all_takes_are_one_scan_and_the_dialog_goes_back_to_one(
+    screen: Screen, tmp_path: Path, takes: Path
+) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.press("Right")  # the frame stays
+        app.act("problems", ("item_click", "$$0/All"))
+        app.settle()
+        app.press("End")
+        app.see(points=200, frame=4)
+        app.press("Escape")
+        open_by_keys(app)
+        app.choose(FRAMES, "##take", "###bert")
+        app.act(FRAMES, ("item_click", "Open"))
+        app.see(points=200, lists=0)
+        app.press("Home", "End")
+        assert app.settle().frame == 1
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_files_are_chosen_by_the_mouse(screen: Screen, tmp_path: Path, takes: Path) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.press("Escape")
+        open_by_keys(app)
+        app.act(FRAMES, ("item_click", "**/###anna_0.npy"), ("item_click", "**/###bert_1.npy"))
+        app.act(FRAMES, ("item_click", "Open"))
+        app.see(lists=0)
+        app.settle()
+        app.press("End")
+        app.see(points=200, frame=2)
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_the_keyboard_alone_leaves_a_take_and_opens(screen: Screen, tmp_path: Path, takes: Path) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.press("Escape")
+        open_by_keys(app)
+        app.press("Tab", "Tab", "Tab")  # from Open past Reset and Cancel to the take
+        app.press("space", "Down", "Return")
+        app.press("shift+Tab", "shift+Tab", "shift+Tab", "Return")
+        app.see(points=200, lists=0)
+        open_by_keys(app)
+        app.press("Escape")
+        app.see(lists=0, points=200)
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_a_role_is_given_by_the_mouse_and_applies(screen: Screen, tmp_path: Path) -> None:
+    with running_app(screen, tmp_path, numbered(tmp_path / "points.xyz")) as app:
+        wide = app.settle().camera["eye"]
+        open_by_keys(app)
+        app.choose(TABLE, "rows/##role 0", "###x")
+        app.settle()
+        app.act(TABLE, ("item_click", "Open"))
+        app.see(lists=0)
+        app.settle()
+        app.press("f")
+        assert app.settle().camera["eye"] != wide
+        assert app.state.points == 80
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_a_refused_table_offers_its_dialog(screen: Screen, tmp_path: Path) -> None:
+    path = tmp_path / "odd.csv"
+    path.write_text("u,v,w\n" + "".join(f"{i % 9},{i // 9},{i % 4}\n" for i in range(80)))
+    with running_app(screen, tmp_path, path) as app:
+        app.told(r"Cannot open: \S+odd\.csv")
+        app.act("problems", ("item_click", "$$0/Read table..."))
+        app.see(lists=1)
+        app.settle()
+        for column, role in enumerate("xyz"):
+            app.choose(TABLE, f"rows/##role {column}", f"###{role}")
+            app.settle()
+        app.act(TABLE, ("item_click", "Open"))
+        app.see(points=80, lists=0)
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_a_recording_whose_scan_has_moved_asks_where_it_is(
+    screen: Screen, tmp_path: Path, takes: Path
+) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.press("Escape", "p")
+        picture = app.told(r"Saved (.+)")[1]
+    shutil.move(takes, tmp_path / "moved")
+    with running_app(screen, tmp_path, "demo") as app:
+        app.drop(picture)
+        app.told(r"its scan .\S*takes. is missing")
+        app.settle()
+        app.act("problems", ("item_click", "$$0/Locate scan..."))
+        app.see(is_browser_open=True)
+        app.settle()
+        app.press("Tab")
+        app.screen.do("type", "--delay", 15, tmp_path / "moved")
+        app.settle()
+        app.press("Return", "Return")  # into the folder, then all of it
+        app.see(scan=str(tmp_path / "moved"), points=300, is_browser_open=False)
+    assert "Traceback" not in app.log()

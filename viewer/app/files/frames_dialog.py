@@ -1,0 +1,316 @@
+"""The dialog of folders: which files are frames, how they split into takes, their order, and their times."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from imgui_bundle import ImVec2, imgui
+from imgui_bundle import icons_fontawesome_6 as icons
+
+from ...errors import InputError
+from ...files import printable
+from ...scan.reading.corrections import Corrections
+from ...scan.reading.frames import LIST
+from ...scan.reading.takes import ALL, FileRow, split
+from ...scan.sources import FileSequence
+from ...scan.timeline import Timeline
+from .. import widgets
+from ..commands import Command
+from ..part import ViewArea, WindowPart
+from ..playing.playback import Playback
+
+TITLE = "Choose frames"
+AUTO = ""  # times as Scan4D finds them
+RATE, FILE = "fps", "file"
+TIMES = {
+    AUTO: "automatic",
+    "names": "from the file names",
+    "index": "25 frames/s",
+    RATE: "a rate",
+    FILE: "a file",
+}
+_SIZE = ImVec2(46.0, 34.0)  # in heights of the font
+_COLUMNS = (("File", 0.0), ("Take", 6.0), ("Time", 6.0), ("Why not", 10.0), ("Order", 4.5))
+
+
+class FrameChoices:
+    """Choices of the user about the files of a folder. No widgets.
+
+    folder: that holds the files. take: the name of the take that opens, "all", or empty where there is one.
+    rows: all files, in the order in which they play. used: names of the files that play. problem: why the
+    choices are unusable; empty if usable.
+    """
+
+    KEYS = ("take", "frames", "times")
+
+    def __init__(self, folder: Path, names: list[str], texts: Mapping[str, str]) -> None:
+        """names: of the files of one kind, relative to the folder. texts: corrections that hold now."""
+        self.folder, self._names = folder, names
+        self._before = {key: text for key, text in texts.items() if key in self.KEYS}
+        self._texts = dict(self._before)
+        self.problem = ""
+        self._takes = split(folder, names).takes
+        self._take_of = {row.name: row.take for row in split(folder, names).files}
+        self.rows: list[FileRow] = []
+        self.used: set[str] = set()
+        self._look()
+        listed = [name for name in self._texts.get("frames", "").split(LIST) if name]
+        if LIST in self._texts.get("frames", ""):
+            self.rows.sort(key=lambda row: listed.index(row.name) if row.name in listed else len(listed))
+
+    def _look(self) -> None:
+        """Find the rows anew. Choices that are unusable leave them as they are."""
+        try:
+            found = split(self.folder, self._names, Corrections.parse(self._texts)).files
+        except InputError as error:
+            self.problem = str(error)
+            return
+        self.problem = ""
+        rows = {row.name: row._replace(take=self._take_of[row.name]) for row in found}
+        if "frames" in self._texts and self.rows:
+            rows = {row.name: rows[row.name] for row in self.rows}
+        self.rows = list(rows.values())
+        self.used = {row.name for row in self.rows if row.is_used}
+
+    @property
+    def takes(self) -> dict[str, str]:
+        """Name -> title of each take, and of all together; empty where the files are of one."""
+        if not self._takes:
+            return {}
+        named = {take.name: f"{take.name} ({take.frames})" for take in self._takes}
+        return named | {ALL: "all, as one scan"}
+
+    @property
+    def take(self) -> str:
+        """The take that is used; empty where the files are of one, or the user has chosen them one by one."""
+        if not self._takes or "frames" in self._texts:
+            return ""
+        return self._texts.get("take") or self._takes[0].name
+
+    @property
+    def times(self) -> str:
+        """The kind of times, one of `TIMES`."""
+        text = self._texts.get("times", AUTO)
+        if text in ("names", "index", AUTO):
+            return text
+        return RATE if text.startswith("fps:") else FILE
+
+    @property
+    def rate(self) -> float:
+        """The stated rate, frame numbers a second; 25 without one."""
+        text = self._texts.get("times", "")
+        return float(text.removeprefix("fps:")) if self.times == RATE else 25.0
+
+    @property
+    def times_file(self) -> str:
+        """The stated file of times."""
+        return self._texts.get("times", "") if self.times == FILE else "times.csv"
+
+    def state_take(self, take: str) -> None:
+        """Use the files of a take, in their natural order."""
+        self._texts.pop("frames", None)
+        self._state("take", take)
+
+    def state_times(self, text: str) -> None:
+        """Correct the times, as `--read times` takes them; empty: as Scan4D finds them."""
+        self._state("times", text)
+
+    def use(self, name: str, is_used: bool) -> None:
+        """Use a file as a frame, or leave it aside."""
+        self.used = self.used | {name} if is_used else self.used - {name}
+        self._list()
+
+    def move(self, at: int, by: int) -> None:
+        """Move a row up or down."""
+        to = at + by
+        if 0 <= to < len(self.rows):
+            self.rows[at], self.rows[to] = self.rows[to], self.rows[at]
+            self._list()
+
+    def _list(self) -> None:
+        names = [row.name for row in self.rows if row.name in self.used]
+        self._texts.pop("take", None)
+        if names:
+            self._state("frames", LIST.join(names) + LIST)
+        else:
+            self.problem = "Choose at least one file"
+
+    def reset(self) -> None:
+        """Leave all decisions to Scan4D."""
+        self._texts = {}
+        self._look()
+
+    def _state(self, key: str, text: str) -> None:
+        self._texts.pop(key, None)
+        if text:
+            self._texts[key] = text
+        self._look()
+
+    @property
+    def corrections(self) -> dict[str, str]:
+        """Corrections by key; an empty text ends a correction that held before."""
+        return {**dict.fromkeys(self._before, ""), **self._texts}
+
+
+def files_of_scan(timeline: Timeline) -> tuple[Path, list[str]] | None:
+    """The folder of a sequence of files, and the names of all files of its kind, also those left aside; None
+    where the scan is no such sequence."""
+    if not isinstance(timeline.source, FileSequence) or not timeline.files:
+        return None
+    frames = [file for file in timeline.files if file.suffix.lower() == timeline.files[0].suffix.lower()]
+    folder, suffix = frames[0].parent, frames[0].suffix.lower()
+    if any(file.parent != folder for file in frames):
+        return None
+    aside = [one.file for one in timeline.reading.aside if Path(one.file).suffix.lower() == suffix]
+    names = list(dict.fromkeys([*(file.name for file in frames), *aside]))
+    return (folder, names) if len(names) > 1 else None
+
+
+@dataclass(eq=False)
+class FramesDialog(WindowPart):
+    """The dialog. choices: about the folder that it shows, None while it is closed."""
+
+    name = "frames_dialog"
+    layer = 82
+    shows = "The dialog of folders"
+    OFFERS = {"ask_for_frames": "ask"}
+    CONDITIONS = {"sequence of files": lambda dialog: dialog.files is not None}
+    playback: Playback
+    correct_reading: Callable[..., None]
+
+    def __post_init__(self) -> None:
+        self.choices: FrameChoices | None = None
+        self._of: Timeline | None = None  # that these are the files of
+        self._files: tuple[Path, list[str]] | None = None
+
+    @property
+    def files(self) -> tuple[Path, list[str]] | None:
+        """The folder and the names of the open scan's files; None where it is no sequence of files."""
+        if self._of is not self.playback.timeline:
+            self._of = self.playback.timeline
+            self._files = files_of_scan(self._of)
+        return self._files
+
+    def ask(self) -> None:
+        """Open the dialog on the files of the open scan."""
+        if self.files is not None:
+            self.choices = FrameChoices(*self.files, self.playback.timeline.decided.corrections.texts)
+
+    def dialog(self, view: ViewArea) -> None:
+        """Declare it while it is open."""
+        em, display = imgui.get_font_size(), imgui.get_io().display_size
+        size = ImVec2(min(_SIZE.x * em, 0.94 * display.x), min(_SIZE.y * em, 0.9 * display.y))
+        with widgets.modal(TITLE, self.choices is not None, size) as is_drawn:
+            if is_drawn and self.choices is not None:
+                _draw_choices(self.choices)
+                self._draw_foot(self.choices)
+                if self.choices is None:
+                    imgui.close_current_popup()
+
+    def _draw_foot(self, choices: FrameChoices) -> None:
+        """Declare the problem and the buttons."""
+        if choices.problem:
+            imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(choices.problem)}")
+        else:
+            imgui.text_disabled(f"{len(choices.used)} of {len(choices.rows)} files are frames of the scan.")
+        imgui.begin_disabled(bool(choices.problem))
+        if imgui.is_window_appearing():
+            imgui.set_keyboard_focus_here()
+        opens = imgui.button("Open")
+        imgui.end_disabled()
+        opens = (widgets.is_taken() and not choices.problem) or opens
+        imgui.same_line()
+        if imgui.button("Reset"):
+            choices.reset()
+        widgets.tooltip("Leave all choices to Scan4D")
+        imgui.same_line()
+        leaves = imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape)
+        if opens:
+            self.choices = None
+            self.correct_reading(choices.corrections)
+        elif leaves:
+            self.choices = None
+
+    COMMANDS = (Command("read_folder", "Choose frames...", ask, when="sequence of files"),)
+
+
+def _draw_choices(choices: FrameChoices) -> None:
+    """Declare the take, the times, and the files."""
+    imgui.text_wrapped(printable(str(choices.folder)))
+    if choices.takes:
+        widgets.label("Take", "The folder holds several scans, whose frames are numbered each by itself")
+        take = widgets.combo("take", choices.take, list(choices.takes), {"": "chosen files", **choices.takes})
+        if take != choices.take:
+            choices.state_take(take)
+    _draw_times(choices)
+    extra = 0.0
+    if choices.problem:
+        room = imgui.get_content_region_avail().x
+        extra = imgui.calc_text_size(f"     {choices.problem}", wrap_width=room).y
+    foot = extra + imgui.get_text_line_height_with_spacing() + imgui.get_frame_height_with_spacing()
+    _draw_files(choices, -foot)
+
+
+def _draw_times(choices: FrameChoices) -> None:
+    """Declare the kind of times, and the field that goes with it."""
+    widgets.label("Times", "When each frame happens")
+    kind = widgets.combo("times", choices.times, list(TIMES), TIMES)
+    if kind != choices.times:
+        texts = {RATE: f"fps:{choices.rate:g}", FILE: choices.times_file}
+        choices.state_times(texts.get(kind, kind))
+    if choices.times == RATE:
+        widgets.label("Frames per second")
+        changed, rate = imgui.input_float("##rate", choices.rate, 1.0, 10.0, "%.6g")
+        if changed and rate > 0:
+            choices.state_times(f"fps:{rate:.6g}")
+    elif choices.times == FILE:
+        widgets.label("File of times", "A table in this folder: a file name or an index, and seconds")
+        entered, name = widgets.edit_path("##file", choices.times_file)
+        if entered and name.strip():
+            choices.state_times(name)
+
+
+def _draw_files(choices: FrameChoices, height: float) -> None:
+    """Declare all files. height: negative, from the foot."""
+    flags = imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_outer | imgui.TableFlags_.borders_inner_h
+    if not imgui.begin_table("files", len(_COLUMNS), flags, ImVec2(0, height)):
+        return
+    em = imgui.get_font_size()
+    for title, width in _COLUMNS:
+        kind = imgui.TableColumnFlags_.width_fixed if width else imgui.TableColumnFlags_.width_stretch
+        imgui.table_setup_column(title, kind, width * em)
+    imgui.table_setup_scroll_freeze(0, 1)
+    imgui.table_headers_row()
+    clipper = imgui.ListClipper()
+    clipper.begin(len(choices.rows))
+    while clipper.step():
+        for at in range(clipper.display_start, clipper.display_end):
+            imgui.push_id(at)
+            _draw_file(choices, at)
+            imgui.pop_id()
+    imgui.end_table()
+
+
+def _draw_file(choices: FrameChoices, at: int) -> None:
+    """Declare the row of one file."""
+    row = choices.rows[at]
+    is_used = row.name in choices.used
+    imgui.table_next_row()
+    imgui.table_next_column()
+    toggled, wanted = imgui.checkbox(widgets.labelled(printable(row.name), row.name), is_used)
+    if toggled:
+        choices.use(row.name, wanted)
+    imgui.table_next_column()
+    imgui.text_unformatted(printable(row.take))
+    imgui.table_next_column()
+    imgui.text_unformatted("" if row.time is None or not is_used else f"{row.time:.6g} s")
+    imgui.table_next_column()
+    imgui.text_unformatted("" if is_used else printable(row.why))
+    imgui.table_next_column()
+    if widgets.flat_button(icons.ICON_FA_ARROW_UP, "Earlier"):
+        choices.move(at, -1)
+    imgui.same_line()
+    if widgets.flat_button(icons.ICON_FA_ARROW_DOWN, "Later"):
+        choices.move(at, 1)
