@@ -54,6 +54,8 @@ def test_a_button_opens_another_take(screen: Screen, tmp_path: Path, takes: Path
         app.act("problems", ("item_click", "$$0/bert (2)"))
         app.see(points=200)
         assert not [note for note in app.settle().shown_notes if "takes" in note]
+        app.press("ctrl+z")
+        app.see(points=300)
     assert "Traceback" not in app.log()
 
 

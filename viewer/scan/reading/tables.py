@@ -69,7 +69,7 @@ class _Above(NamedTuple):
 
     @property
     def numeric_lines(self) -> list[str]:
-        """Those with digits, without their numbers."""
+        """The lines with digits."""
         return [line for _, line in self.numeric]
 
 
