@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import RunningApp, Screen, running_app
+from virtual_screen import PANEL, RunningApp, Screen, running_app
 
 TABLE, FRAMES = "Read table", "Choose frames"
 _MENU_ROW = 3  # of the two commands, the one that can be chosen
@@ -161,4 +161,26 @@ def test_a_recording_whose_scan_has_moved_asks_where_it_is(
         app.settle()
         app.press("Return", "Return")  # into the folder, then all of it
         app.see(scan=str(tmp_path / "moved"), points=300, is_browser_open=False)
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_a_folder_of_another_camera_is_right_after_four_actions(screen: Screen, tmp_path: Path) -> None:
+    """A folder of TUM, 320 x 180, of a wall at 1 m: its own camera is for 640 x 480."""
+    from PIL import Image
+
+    folder = tmp_path / "tum"
+    (folder / "depth").mkdir(parents=True)
+    Image.fromarray(np.full((180, 320), 5000, np.uint16)).save(folder / "depth" / "0.png")
+    (folder / "depth.txt").write_text("0.0 depth/0.png\n")
+    with running_app(screen, tmp_path, folder) as app:
+        assert app.settle().record["camera"]["source"] == "assumed"
+        app.act(PANEL, ("item_open", "How this was read"))
+        app.choose(PANEL, "How this was read/camera/##value", "Other...")  # two actions
+        app.settle()
+        app.screen.do("key", "ctrl+a")
+        app.screen.do("type", "--delay", "30", "--", "290,290,159.5,89.5")
+        app.screen.do("key", "Return")
+        app.see(lambda state: state.record["camera"]["source"] == "user")
+        assert app.settle().extent[:2] == pytest.approx([319 / 290, 179 / 290], rel=0.02)
     assert "Traceback" not in app.log()
