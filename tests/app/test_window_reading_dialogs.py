@@ -173,6 +173,7 @@ def test_a_folder_of_another_camera_is_right_after_four_actions(screen: Screen, 
     (folder / "depth").mkdir(parents=True)
     Image.fromarray(np.full((180, 320), 5000, np.uint16)).save(folder / "depth" / "0.png")
     (folder / "depth.txt").write_text("0.0 depth/0.png\n")
+    (folder / "groundtruth.txt").write_text("0.0 0 0 0 0 0 0 1\n")
     with running_app(screen, tmp_path, folder) as app:
         assert app.settle().record["camera"]["source"] == "assumed"
         app.act(PANEL, ("item_open", "How this was read"))
