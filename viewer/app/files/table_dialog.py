@@ -28,7 +28,6 @@ SEPARATORS = {"blank": "blanks", "tab": "tabs", "comma": "commas", "semicolon": 
 DECIMALS = {".": "point (1.5)", ",": "comma (1,5)"}
 _ROLE_TITLES = {
     "-": "not read",
-    "number": "point number",
     "r": "red",
     "g": "green",
     "b": "blue",
