@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual_screen import PANEL, RunningApp, Screen, running_app
+from virtual_screen import PANEL, RunningApp, Screen, running_app, wait_until_stored
 
 TABLE, FRAMES = "Read table", "Choose frames"
 _MENU_ROW = 3  # of the two commands, the one that can be chosen
@@ -184,4 +184,29 @@ def test_a_folder_of_another_camera_is_right_after_four_actions(screen: Screen, 
         app.screen.do("key", "Return")
         app.see(lambda state: state.record["camera"]["source"] == "user")
         assert app.settle().extent[:2] == pytest.approx([319 / 290, 179 / 290], rel=0.02)
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_a_missing_scan_with_bookmarks_is_located(screen: Screen, tmp_path: Path, takes: Path) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.press("Escape", "ctrl+b")
+        wait_until_stored(tmp_path, takes, app.settle())
+    (tmp_path / "moved").mkdir()
+    shutil.move(takes, tmp_path / "moved" / "takes")
+    with running_app(screen, tmp_path, "demo") as app:
+        app.press("ctrl+o", "Tab")
+        app.screen.do("type", "--delay", 15, takes)
+        app.settle()
+        app.press("Return")
+        app.told("The scan .* is missing")
+        app.settle()
+        app.act("problems", ("item_click", "$$0/Locate scan..."))
+        app.see(is_browser_open=True)
+        app.settle()
+        app.press("Tab")
+        app.screen.do("type", "--delay", 15, tmp_path / "moved" / "takes")
+        app.settle()
+        app.press("Return", "Return")
+        app.see(lambda state: state.document["bookmarks"], scan=str(tmp_path / "moved" / "takes"))
     assert "Traceback" not in app.log()

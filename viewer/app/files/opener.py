@@ -116,8 +116,7 @@ class Opener(WindowPart):
         except Scan4DError as error:
             if not self._has_begun and asked is not None:  # else nothing would be shown
                 self.open(self.after(asked) or DEMO)
-            if not self._has_moved(asked):
-                self.refuse(self._refusal(f"Cannot open: {error}", asked))
+            self.refuse(self._refusal(f"Cannot open: {error}", asked), asked)
             return
         if opened is not None:
             scan, begun = opened
@@ -217,9 +216,9 @@ class Opener(WindowPart):
         text = f"The folder holds {len(takes)} takes. Scan4D shows {shown}. Choose another one, or all."
         return Offer(text, choices, "takes")
 
-    def _has_moved(self, scan: str | None) -> bool:
+    def _has_moved(self, scan: str) -> bool:
         """Whether a scan is missing that the user has worked on; then offer to locate it."""
-        if scan is None or is_there(scan):
+        if is_there(scan):
             return False
         try:
             saved = self.session.left(scan) or find_stored(scan, self.up)
@@ -238,8 +237,13 @@ class Opener(WindowPart):
         ask = partial(self.ask_for_table, scan)
         return Refusal(problem, {"Read table...": ask}, "refusal")
 
-    def refuse(self, problem: str) -> None:
-        """Show why what the user asked for was not opened: in the dialog, where that waits for it."""
+    def refuse(self, problem: str, scan: object = None) -> None:
+        """Show why what the user asked for was not opened: in the dialog, where that waits for it.
+
+        scan: that was to be opened; where it has moved, the message offers to locate it.
+        """
+        if scan is not None and self._has_moved(str(scan)):
+            return
         if not any([part.refused(problem) for part in self.parts]):
             self.notices.tell_of_opening(problem if isinstance(problem, Offer) else Problem(problem))
 

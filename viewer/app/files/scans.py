@@ -46,7 +46,7 @@ class Scans(WindowPart):
     OFFERS = {"list_scans": "open", "after": "after"}
     session: Session
     note_of_opening: Callable[[str], None]
-    refuse: Callable[[str], None]
+    refuse: Callable[..., None]
     open_scan: Callable[[str], None]
     named: Sequence[str]
     recent: Recent = remembered(())
@@ -70,7 +70,7 @@ class Scans(WindowPart):
             others = f" {len(problems) - 1} other scans cannot be opened either." if len(problems) > 1 else ""
             text = f"Cannot open: {problems[0]}.{others}"
             if is_all:
-                self.refuse(text)
+                self.refuse(text, problems[0].where)
             else:
                 self.note_of_opening(Problem(text))
 

@@ -88,7 +88,6 @@ class Sessions(WindowPart):
         if is_there(scan):
             self.open_with(session, scan)
             return
-        self.close_browser()
         problem = f"{path.name}: its scan '{printable(session.scan)}' is missing."
         self.offer_to_locate(problem, path.parent, partial(self.open_with, session))
 
@@ -98,6 +97,7 @@ class Sessions(WindowPart):
         folder: where to look first, or the nearest one above it that is there. take: gets the scan as the
         user has located it.
         """
+        self.close_browser()
         self.note_of_opening(
             Refusal(problem, {"Locate scan...": partial(self._locate, folder, take)}, "locate")
         )
