@@ -38,7 +38,7 @@ def click(app: RunningApp, x: float, y: float) -> None:
 
 
 def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float]]:
-    """Place landmarks, measure a distance and a path of the last two, draw all ways, go through all that
+    """Place landmarks, measure a distance and a path of the last two, draw all paths, go through all that
     curves can show; the values of both."""
     app.press("k")
     for x, y in PLACES:
@@ -49,7 +49,7 @@ def measured_with_all_there_is(app: RunningApp) -> tuple[list[float], list[float
     app.act(PANEL, ("item_click", "Add a measure/Add measure"))
     for number in range(len(PLACES)):
         for column in ("traced", "anchors"):
-            app.act(PANEL, ("item_click", f"Landmark paths (trajectories)/ways/$${number}/##{column}"))
+            app.act(PANEL, ("item_click", f"Landmark paths (trajectories)/paths/$${number}/##{column}"))
     app.settle()
     for combo, words in (
         ("mode", ("against", "repeats", "time")),
