@@ -1,6 +1,6 @@
 // The best visit of each cell, by an order-preserving uint key. PASS 0 keeps the least key, PASS 1 the lowest
 // item among those that have it. Two 32-bit passes: 64-bit atomics are not everywhere. Where they are, WIDE does both at
-// once. READS_FIRST: what is no better than what a cell has sends no atomic, which other invocations would wait for.
+// once: what is no better than what a cell has sends no atomic.
 // LISTS: the cells that were hit are listed, in slots that each item has for its visits: they need no counter that all
 // share. A cell is listed more than once where several items have its key.
 #if LISTED
@@ -24,14 +24,8 @@ uint next_slot = item() * slots;
 void visit(uint cell, uint key, uint item_id) {
 #ifdef WIDE
     uint64_t both = uint64_t(key) << 32 | uint64_t(item_id);
-#if READS_FIRST
-    if (wide[cell] > both)
-#endif
-    atomicMin(wide[cell], both);
+    if (wide[cell] > both) atomicMin(wide[cell], both);
 #elif PASS == 0
-#if READS_FIRST
-    if (keys[cell] > key)
-#endif
     atomicMin(keys[cell], key);
 #else
 #if LISTS

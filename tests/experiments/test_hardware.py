@@ -9,7 +9,7 @@ import sys
 
 import numpy as np
 import pytest
-from experiments.speed.hardware import CASES, Drawn, counted_reads, shape, view
+from experiments.speed.hardware import CASES, TABLES, Drawn, counted_reads, shape, view
 from experiments.speed.sketches import Sketch
 from experiments.suite import ROOT
 
@@ -52,6 +52,15 @@ def test_a_first_picture_is_drawn_in_a_process_of_its_own() -> None:
     (row,) = rows_without("hardware", "--sizes", "2000", "--table", "cold", "--rows", "cold points")
     assert row["nothing stored, ms"] > 0
     assert row["stored, ms"] > 0
+
+
+def test_a_table_has_what_was_measured_and_nothing_where_that_failed() -> None:
+    drawn = {"row": "points", "points": 1000, "done, ms": 0.5, "maps": 2}
+    failed = {"row": "CUDA", "points": 1000, "left out": "why"}
+    *_, first, second = TABLES[0].text([{"orbit": [drawn, failed]}]).splitlines()
+    count = "1\N{NARROW NO-BREAK SPACE}000"
+    assert [cell.strip() for cell in first.split("|")[1:4]] == ["`points`", count, "0.500"]
+    assert [cell.strip() for cell in second.split("|")[1:-1]] == ["`CUDA`", count, *[""] * 9]
 
 
 @pytest.mark.parametrize("name", ["series", "turning"])

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 from experiments.command import experiment, found, main
-from experiments.script import Script
+from experiments.script import Script, described_text
 from experiments.suite import DOCS, ROOT, Suite, stored_runs, write_run
 from tables_of import tables_of
 
 from viewer.bench.report.results import write_row
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
 
 SUITES = [
@@ -37,6 +38,26 @@ def test_the_tables_of_pages_are_those_of_the_stored_runs(name: str, bless: bool
     assert page.read_text(encoding="utf-8") == suite(name).filled(runs)
 
 
+@pytest.mark.parametrize("name", ["hardware"])
+def test_described_tables_are_those_of_the_stored_runs(name: str, bless: bool) -> None:
+    script = experiment(name)
+    assert isinstance(script, Script)
+    (page,) = DOCS.rglob(script.described_page)
+    if bless:
+        page.write_text(described_text(name, script), encoding="utf-8")
+    assert page.read_text(encoding="utf-8") == described_text(name, script)
+
+
+def test_a_run_on_a_graphics_card_alone_is_stored(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, renderer: Renderer
+) -> None:
+    if not renderer.gpu.software:
+        pytest.skip("this is a graphics card")
+    assert main(["hardware", "--sizes", "1000", "--store", str(tmp_path)]) == 2
+    assert "is no graphics card" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
 def test_each_place_of_a_table_has_what_makes_it() -> None:
     """A suite or a script; and none of them makes one without a place."""
     made = [(suite(name).page, table.name) for name in SUITES for table in suite(name).tables]
@@ -44,6 +65,8 @@ def test_each_place_of_a_table_has_what_makes_it() -> None:
         script = None if name in SUITES or path.parent.name == "window" else experiment(name)
         if isinstance(script, Script) and script.page:
             made += [(script.page, table.__name__) for table in script.tables]
+        if isinstance(script, Script):
+            made += [(script.described_page, table.name) for table in script.described]
     places = [
         (page.name, key)
         for page in DOCS.rglob("*.md")

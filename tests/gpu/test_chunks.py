@@ -119,6 +119,16 @@ def test_a_pose_that_is_shown_once_is_not_put_in_order(
         assert renderer.resident(pose).cached(chunks.Chunks)._finding is None
 
 
+def test_graphics_cards_need_more_points_for_chunks(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They look at a few million points in less time than Python takes for a list of chunks."""
+    monkeypatch.setattr(renderer.gpu, "software", False)
+    on_cards = chunks.least_points(renderer.gpu)
+    monkeypatch.setattr(renderer.gpu, "software", True)
+    assert on_cards > 4e6 > chunks.least_points(renderer.gpu)
+
+
 def test_orders_hold_each_point_once_and_boxes_hold_theirs() -> None:
     cloud = sphere("chance")
     file, coarse = in_file_order(cloud), in_coarse_order(cloud)

@@ -83,24 +83,13 @@ def test_pictures_are_the_same_by_either_atomics(
     assert all((a == b).all() for a, b in zip(pictures(renderer, name), two, strict=True))
 
 
-@pytest.mark.parametrize("name", POINTS)
-def test_reading_before_an_atomic_changes_no_picture(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    shown = []
-    for reads_first in (False, True):
-        monkeypatch.setattr(renderer.gpu, "reads_first", reads_first)
-        shown.append(pictures(renderer, name))
-    assert all((a == b).all() for a, b in zip(*shown, strict=True))
-
-
 def test_the_reference_compiler_takes_64_bit_atomics(tmp_path: Path) -> None:
     validator = shutil.which("glslangValidator")
     if validator is None:
         pytest.skip("no glslangValidator; Debian has it in glslang-tools")
     squares = {
         **dict.fromkeys(("SINGLE", "SAMPLED", "FILTERED", "CHUNKED", "KEPT", "STRIDED", "LISTED"), 0),
-        **{"ITEMS": "item_count", "READS_FIRST": 1, "PASS": 0, "LISTS": 0, "WIDE": 1},
+        **{"ITEMS": "item_count", "PASS": 0, "LISTS": 0, "WIDE": 1},
     }
     parts = {"target": "scatter/best.glsl", "cells": "points/cells.glsl"}
     for given in (squares, {**squares, "CHUNKED": 1, "CHUNK": 64, "LISTED": 1, "ITEMS": "list_count"}):

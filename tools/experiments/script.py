@@ -11,8 +11,9 @@ from typing import Any
 
 from experiments.pictures import renderer
 from experiments.suite import DOCS, write_run
-from experiments.tables import Column, Row, markdown, put_tables, shown
+from experiments.tables import Column, Row, Table, markdown, put_tables, shown
 from viewer.bench.run import Bench, BenchSettings, slug
+from viewer.errors import InputError
 from viewer.files import whole_file
 
 _WIDTH = 12  # letters of a printed column, at least
@@ -28,11 +29,16 @@ class Script:
 
     tables: functions of the options that yield rows, as cells by title; their names are those of the tables.
     Each may raise Failed in the end. options: the default of each; a list takes several values, a pair of
-    numbers is a size, None stands for a path. page: of docs/, whose tables the run replaces; empty: none."""
+    numbers is a size, None stands for a path. page: of docs/, whose tables the run replaces; empty: none.
+    described: tables of `described_page`, made of the runs in docs/data/ as those of a suite. needs_card:
+    whether a run is stored on graphics cards alone."""
 
     tables: Sequence[Callable[[Namespace], Iterator[Row]]]
     options: Mapping[str, Any] = field(default_factory=dict)
     page: str = ""
+    described: Sequence[Table] = ()
+    described_page: str = ""
+    needs_card: bool = False
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Add the options, and the names of tables where there are several."""
@@ -56,6 +62,10 @@ class Script:
 
     def run(self, name: str, args: Namespace) -> None:
         """Measure and print; put the tables into the page, store them where `--store` says. Raises Failed."""
+        if args.store and self.needs_card and renderer().gpu.software:
+            raise InputError(
+                f"{renderer().gpu.device} is no graphics card", "--store", "Leave it out to print the rows"
+            )
         failures, made = [], {}
         for table in self.tables:
             if table.__name__ in args.tables:
@@ -81,6 +91,15 @@ class Script:
         text = put_tables(page.read_text(encoding="utf-8"), {name: made})
         with whole_file(page) as temporary:
             temporary.write_text(text, encoding="utf-8")
+
+
+def described_text(name: str, script: Script) -> str:
+    """The described page with the tables of the stored runs of a script."""
+    files = sorted((DOCS / "data").glob(f"{name}-*.json"))
+    runs = [json.loads(path.read_text(encoding="utf-8")) for path in files]
+    (page,) = DOCS.rglob(script.described_page)
+    made = {table.name: table.text(runs) for table in script.described}
+    return put_tables(page.read_text(encoding="utf-8"), made)
 
 
 def _store(folder: Path, name: str, args: Namespace, made: Mapping[str, list[Row]]) -> None:

@@ -74,8 +74,7 @@ class Built:
 class Gpu:
     """A context with its shader programs and timers.
 
-    wide_atomics: whether passes use 64-bit atomics (`WIDE_EXTENSIONS`). reads_first: whether they read a
-    cell before an atomic on it, which graphics cards gain from. clears_by_shader: see `clear`.
+    wide_atomics: whether passes use 64-bit atomics (`WIDE_EXTENSIONS`). clears_by_shader: see `clear`.
 
     Make one with `headless()`, or give it the context of a window. Raises NoOpenGLError
     where the context lacks what the project needs.
@@ -102,7 +101,6 @@ class Gpu:
         self.timers = Timers(ctx, self.software)
         self.staging = Staging(ctx, self.software)
         self.wide_atomics = False  # until they are measured to be faster and exact on a card
-        self.reads_first = not self.software
         self._spare_binding = gl.storage_bindings() - 1
         self.clears_by_shader = not self.software and self._spare_binding > max(Storage)
         self.max_storage_bytes = gl.max_storage_block_bytes()

@@ -46,7 +46,7 @@ class Visits:
         parts = {"target": target, "cells": self.cells}
         listed = int(self.listed is not None)
         items = ("item_count", "list_count")[listed]
-        given = {"ITEMS": items, "LISTED": listed, "READS_FIRST": int(gpu.reads_first)}
+        given = {"ITEMS": items, "LISTED": listed}
         given |= {**defines, **self.defines}
         program = gpu.compute("scatter/scatter.comp", given, parts, self.params)
         bind(program)

@@ -19,9 +19,9 @@ in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
-copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32,
-64, 32-read and 64-read (whether a cell is read before). --order file draws all points without
-chunks. --hidden always or never looks for hidden chunks of points on graphics cards.
+copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32 and
+64. --order file draws all points without chunks. --hidden always or never looks for hidden chunks of
+points on graphics cards.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ import numpy as np
 from experiments.pictures import renderer
 from experiments.script import Script
 from experiments.speed.sketches import CudaScatter, GlPoints, Sketch, elapsed_ms, has_cuda
-from experiments.tables import Row
+from experiments.tables import Column, Row, Table, at, code
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
@@ -306,8 +306,7 @@ def _choose(options: Namespace) -> None:
     if options.clearing:
         gpu.clears_by_shader = options.clearing == "shader"
     if options.atomics:
-        gpu.wide_atomics = options.atomics.startswith("64")
-        gpu.reads_first = options.atomics.endswith("read")
+        gpu.wide_atomics = options.atomics == "64"
     if options.order == "file":
         chunks.LEAST = 1 << 40
     if options.hidden:
@@ -565,6 +564,25 @@ def _first_picture(name: str, points: int, size: tuple[int, int]) -> dict[str, f
     return {"context": context, "picture": picture, "second": second}
 
 
+_EMPTY = "No run is stored yet."
+_TIMES = ("done, ms", "picture, ms", "CPU, ms")
+_COUNTS = ("maps", "reads", "moved")
+
+
+def _columns(*titles: str) -> list[Column]:
+    return [code("row"), Column("points"), *(Column(title, at(title)) for title in titles)]
+
+
+TABLES = [
+    Table(
+        "hardware_orbit",
+        _columns(*_TIMES, "GPU, ms", "first, ms", "longest, ms", *_COUNTS),
+        "orbit",
+        empty=_EMPTY,
+    ),
+    Table("hardware_new_pose", _columns(*_TIMES, "upload, ms", "derive, ms"), "new_pose", empty=_EMPTY),
+    Table("hardware_cold", _columns("nothing stored, ms", "stored, ms", "context, ms"), "cold", empty=_EMPTY),
+]
 EXPERIMENT = Script(
     [orbit, new_pose, cold],
     {
@@ -580,6 +598,9 @@ EXPERIMENT = Script(
         "order": "",
         "hidden": "",
     },
+    described=TABLES,
+    described_page="speed.md",
+    needs_card=True,
 )
 
 if __name__ == "__main__":
