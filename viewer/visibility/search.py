@@ -16,6 +16,7 @@ from ..gpu.context import Gpu, headless
 from ..gpu.pose import GpuPose
 from ..picture.frame_view import FrameView
 from ..picture.surface import Surface
+from ..scan.noise import noise_of
 from ..scan.points import PointCloud, checked_viewpoint
 from ..scan.pose import Pose
 from ..view import View
@@ -24,7 +25,6 @@ from .candidates import Candidates, RowSample
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
 from .covering import CLEAR, CLEAR_OF_NOISE, Covering, SpacedPoints
 from .exact import SeenPoints, as_cloud, flipping
-from .noise import noise_of
 from .sectors import Sectors
 from .spacing import Spacings, copies_in, steady_points
 

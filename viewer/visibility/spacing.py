@@ -11,10 +11,10 @@ from ..gpu.compact import IndexList
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits
+from ..scan.noise import noise_of, steady_positions
 from ..scan.points import NOTHING, PointCloud
 from ..scan.spacing import typical_spacing
 from .calibration import body_of, copies
-from .noise import noise_of, steady_positions
 
 ENOUGH = 6  # points in a ball that tell how far apart they lie
 _BALL = 2.0  # its radius, in usual distances between points; it is doubled where there are too few

@@ -17,9 +17,9 @@ from ...mesh.patch import Patch
 from ...mesh.smoothing import Points, moved_to_quadrics, noise_over_faces, smoothing_radius
 from ...scan.estimate import cloud_normals
 from ...scan.faces import Triangles
+from ...scan.noise import noise_of
 from ...scan.pose import Pose
 from ...scan.range_view import merged_normals
-from ...visibility.noise import noise_of
 from .outlines import Prism
 from .regions import NO_PLANE, Refused, Region, region_within
 

@@ -1,9 +1,9 @@
 """Noise: how far points lie off the surface that they are samples of, and points without it.
 
-It is told by the nearest neighbours of some points, of which so many are taken that they reach several times
-as far as noise does: their distances to a quadric, since a plane would take bends of the surface for noise.
-Points are then moved to planes through those around, weighted by a B-spline (moving least squares, Alexa
-2003).
+The nearest neighbours of some points tell the noise: their distances to a quadric, since a plane would take
+bends of the surface for noise. So many neighbours are used that they reach several times as far as the noise.
+`steady_positions` moves points to planes through those around, weighted by a B-spline (moving least squares,
+Alexa 2003).
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..scan.points import NOTHING, PointCloud
-from ..scan.spacing import nearest_rows
-from .calibration import body_of, copies
+from .points import PointCloud
+from .spacing import nearest_rows
 
 _LOOKED_AT = 8_000_000  # distances from point to point that tell of noise
 _POSITIONS = (8, 64)  # at least and at most, where it is looked for
@@ -32,8 +31,11 @@ _MOST_CELLS = 1 << 20  # to each side of the middle; what lies farther off stays
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of a cloud. deviation: the standard deviation of points off their surface; spacing: the distance
-    between neighbours. Scan units."""
+    """Noise of a cloud.
+
+    deviation: standard deviation of the distances of points from their surface. spacing: distance between
+    neighbours. Both in scan units.
+    """
 
     deviation: float
     spacing: float
@@ -44,29 +46,45 @@ class Noise:
         return self.deviation > _DETAIL * self.spacing
 
 
+_NONE = Noise(0.0, 0.0)
+
+
 def noise_of(cloud: PointCloud) -> Noise:
-    """The noise of a cloud, the median at some positions; none where there are few points. Found once."""
+    """The noise of a cloud: the median at some positions, found once. Few points have none."""
     return cloud.remember(_noise)
 
 
 def _noise(cloud: PointCloud) -> Noise:
-    noise = Noise(0.0, 0.0)
+    noise = _NONE
     if not len(cloud):
         return noise
-    if body_of(cloud).count < len(cloud):
-        cloud = PointCloud(positions=cloud.positions[copies(cloud) == NOTHING], origin=cloud.origin)
-    count = min(max(_LOOKED_AT // len(cloud), _POSITIONS[0]), _POSITIONS[1])
-    rows = np.linspace(0, len(cloud) - 1, count).astype(int).tolist()
+    rows = _sample_rows(cloud)
     for nearest in _NEAREST:
         if 2 * nearest > len(cloud):
             break
         near = [cloud.positions[nearest_rows(cloud, row, nearest)] for row in rows]
+        if nearest == _NEAREST[0] and any(len(np.unique(points, axis=0)) < nearest for points in near):
+            return _noise_of_distinct(cloud)
         shares, reaches = np.array([_off_quadric(points.astype(np.float64)) for points in near]).T
         spacing = float(np.median(reaches)) * float(np.sqrt(np.pi / nearest))
         noise = Noise(float(np.median(shares * reaches)), spacing)
         if np.median(shares) < _NEAR:
             break
     return noise
+
+
+def _noise_of_distinct(cloud: PointCloud) -> Noise:
+    """The noise of the positions of a cloud, each of them once: copies of a point would hide it."""
+    distinct = np.unique(cloud.positions, axis=0)
+    return (
+        _noise(PointCloud(positions=distinct, origin=cloud.origin)) if len(distinct) < len(cloud) else _NONE
+    )
+
+
+def _sample_rows(cloud: PointCloud) -> list[int]:
+    """The rows at which neighbours are looked at."""
+    count = min(max(_LOOKED_AT // len(cloud), _POSITIONS[0]), _POSITIONS[1])
+    return np.linspace(0, len(cloud) - 1, count).astype(int).tolist()
 
 
 def _off_quadric(points: NDArray[np.float64]) -> tuple[float, float]:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..scan.plane_kernels import fit_plane
+from .plane_kernels import fit_plane
 
 _BITS = 21  # of each coordinate in a code
 
