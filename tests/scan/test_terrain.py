@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import InputError
-from viewer.scan.terrain import Ground, are_degrees, metres_of_a_degree, terrain_view
+from viewer.scan.terrain import Ground, metres_of_a_degree, terrain_view
 
 UTM = Ground(left=376_000.0, first=3_808_000.0, right=30.0, down=-20.0, degrees=False, unit="m")
 HEIGHTS = np.arange(12, dtype=np.int16).reshape(3, 4) * 10
@@ -61,19 +61,6 @@ def test_degrees_become_lengths_around_the_middle() -> None:
     assert np.ptp(y) == pytest.approx(0.002 * north, rel=1e-9)
     assert (x.mean(), y.mean()) == pytest.approx((0, 0), abs=1e-9)
     assert z.tolist() == HEIGHTS.ravel().tolist()
-
-
-@pytest.mark.parametrize(
-    ("numbers", "found"),
-    [
-        ((-84.4, 36.7, 0.33, -0.29, 840.0), True),
-        ((0.0, 0.0, 30.0, -30.0, 5.0), False),  # a room
-        ((376_000.0, 3_808_000.0, 36_000.0, -19_000.0, 2000.0), False),
-        ((0.0, 89.9, 0.3, 0.3, 840.0), False),  # beyond the pole
-    ],
-)
-def test_degrees_are_told_from_lengths(numbers: tuple[float, ...], found: bool) -> None:
-    assert are_degrees(*numbers) == found
 
 
 @pytest.mark.parametrize(

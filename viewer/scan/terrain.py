@@ -38,14 +38,6 @@ class Ground:
         return slice(None, None, -1 if self.down > 0 else 1), slice(None, None, -1 if self.right < 0 else 1)
 
 
-def are_degrees(left: float, first: float, right: float, down: float, span: float) -> bool:
-    """Whether a grid's ground is longitude and latitude, where nothing tells: from left and first, its width
-    and height are such numbers, and the heights span more than them, which makes cliffs of anything else."""
-    x, y = (left, left + right), (first, first + down)
-    inside = max(map(abs, x)) <= 360 and max(map(abs, y)) <= 90
-    return inside and span > max(abs(right), abs(down))
-
-
 def metres_of_a_degree(latitude: float) -> tuple[float, float]:
     """Metres of a degree of longitude and of latitude, there, on the WGS84 ellipsoid.
 

@@ -56,6 +56,10 @@ def test_pictures_stand_upright(tmp_path: Path, gravity: tuple[float, float], tu
     with open_scan(tmp_path) as scan:
         (view,) = scan.pose(0).views
         assert len(scan.files) == 3
+        camera = scan.reading["camera"]
+    assert (camera.source, camera.where) == ("neighbour", "camera_intrinsics.json")
+    assert (f"by {90 * turns} degrees" in camera.why) == (turns > 0)
+    assert json.loads(json.dumps(camera.to_json()))["value"]["fx"] == pytest.approx(view.fx)
     flat = seen_points([[1, 2, 0], [3, 4, 5]], CAMERA)
     for _ in range(turns):  # what was up goes to the right, what was left goes up
         flat = flat[:, [1, 0, 2]] * (1, -1, 1)

@@ -33,11 +33,12 @@ from ..grids import is_seen_from_behind, view_of_camera, view_of_grid
 from ..image_poses import IMAGE_AXES, UPRIGHT, from_camera_to_world, from_world_to_camera
 from ..points import UNKNOWN_UNIT
 from ..range_view import DepthKind, RangeView, mask_of
-from ..reading.camera import CENTER, decide_view
+from ..reading.camera import CENTER, decide_view, note_fitted
 from ..reading.colors import settled_scale
 from ..reading.depths import measured_depths
+from ..reading.ground import DEGREES, decide_ground
 from ..reading.sequence import Decided
-from ..terrain import METRE, Ground, are_degrees, terrain_view
+from ..terrain import METRE, Ground, terrain_view
 from ..units import usable_unit
 from ._stored import StoredArray
 
@@ -137,6 +138,7 @@ def _of_grid(grid: NDArray, arrays: _Arrays, decided: Decided) -> tuple[RangeVie
     unit, stated = _unit(arrays) or UNKNOWN_UNIT, _world_to_camera(arrays)
     view = view_of_camera(grid, UPRIGHT if stated is None else stated, "camera", unit)
     if view is not None:
+        note_fitted(view, decided)
         return view, _AS_THEY_ARE
     to_grid = np.eye(4) if stated is None else IMAGE_AXES @ stated
     view = view_of_grid(grid, to_grid, "scanner", unit)
@@ -156,7 +158,10 @@ def _of_terrain(heights: NDArray, arrays: _Arrays, decided: Decided) -> tuple[Ra
         raise InputError("has heights but no ground coordinates", hint="Add dx and dy, or xmin to ymax")
     there = np.isfinite(heights)
     span = float(np.ptp(heights[there])) if there.any() else 0.0
-    degrees = are_degrees(left, first, right * columns, down * rows, span)
+    size = right * columns, down * rows
+    found = decide_ground(None, (left, first), size, span, decided.corrections)
+    decided.note(found)
+    degrees = found.value == DEGREES
     unit = _unit(arrays) or (METRE if degrees else UNKNOWN_UNIT)
     ground = Ground(left=left, first=first, right=right, down=down, degrees=degrees, unit=unit)
     return terrain_view(heights, there, ground, "terrain"), ground.turned

@@ -39,6 +39,8 @@ from ..grids import view_of_camera
 from ..image_poses import from_camera_to_world, rotation_of
 from ..points import UNKNOWN_UNIT, PointCloud
 from ..range_view import RangeView
+from ..reading.camera import note_fitted
+from ..reading.sequence import Decided
 from ._columns import (
     Columns,
     columns_from_cloud,
@@ -93,7 +95,7 @@ class _Header:
         return np.dtype([(str(i), f"<{f.type}", (f.count,)) for i, f in enumerate(self.fields)])
 
 
-def contents(path: Path, frame: int = 0) -> PointContents | tuple[RangeView, ...]:
+def contents(path: Path, frame: int, decided: Decided) -> PointContents | tuple[RangeView, ...]:
     """All points of a PCD file and its remarks, or the range view that they are. Raises InputError."""
     with opened(path) as stream:
         header = _read_header(stream.read(_HEADER_LIMIT))
@@ -105,6 +107,7 @@ def contents(path: Path, frame: int = 0) -> PointContents | tuple[RangeView, ...
         if header.grid and {name.lower() for name in columns} <= _OF_VIEWS:
             admit(size_of(stream), header.points * (header.dtype.itemsize + _VIEW_BYTES) + _WORK)
             if (view := _camera_view(columns, header.grid, header.viewpoint)) is not None:
+                note_fitted(view, decided)
                 return (view,)
         held = size_of(stream) if packed else None
         stated = Stated(viewpoint=_sensor_pose(header.viewpoint))

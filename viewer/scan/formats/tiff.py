@@ -19,8 +19,9 @@ from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView
 from ..reading.camera import decide_view
 from ..reading.depths import measured_depths
+from ..reading.ground import DEGREES, LENGTHS, decide_ground
 from ..reading.sequence import Decided
-from ..terrain import METRE, Ground, are_degrees, terrain_view
+from ..terrain import METRE, Ground, terrain_view
 from ..units import conversion
 from ._pictures import numbers_of_picture, opened_picture
 
@@ -34,21 +35,21 @@ _UNITS = {9001: "m", 9002: "ft", 9003: "ft"}  # the foot of surveys is two milli
 _KEY_WORDS = 4  # of an entry in the directory of keys, and of its header
 
 
-def read_unit(path: Path) -> str | None:
+def read_unit(path: Path, decided: Decided) -> str | None:
     """The unit of the heights of a terrain, or None."""
     with opened_picture(path, ("TIFF",)) as image:
         tags = dict(image.tag_v2)  # type: ignore[attr-defined]
     if not _has_ground(tags) or _MODEL_TYPE in _geo_keys(tags):
         return _units(tags)[1] if _has_ground(tags) else None
-    return read(path)[0].unit  # heights tell whether the ground is in degrees
+    return read(path, 0, decided)[0].unit  # heights tell whether the ground is in degrees
 
 
-def read(path: Path, frame: int = 0, decided: Decided | None = None) -> tuple[RangeView, ...]:
+def read(path: Path, frame: int, decided: Decided) -> tuple[RangeView, ...]:
     """The terrain or the depth as one view. Raises InputError for pictures in colour, too."""
     with opened_picture(path, ("TIFF",)) as image:
         tags = dict(image.tag_v2)  # type: ignore[attr-defined]
         numbers = numbers_of_picture(image)
-    return (_terrain(numbers, tags) if _has_ground(tags) else _depth(numbers, decided or Decided()),)
+    return (_terrain(numbers, tags, decided) if _has_ground(tags) else _depth(numbers, decided),)
 
 
 def _depth(numbers: NDArray, decided: Decided) -> RangeView:
@@ -66,18 +67,24 @@ def _has_ground(tags: dict[int, Any]) -> bool:
     return _TRANSFORMATION in tags or (_SCALE in tags and _TIE in tags)
 
 
-def _terrain(heights: NDArray, tags: dict[int, Any]) -> RangeView:
+def _terrain(heights: NDArray, tags: dict[int, Any], decided: Decided) -> RangeView:
     there = np.isfinite(heights)
     if (missing := _no_data(tags)) is not None:
         with np.errstate(over="ignore"):
             there &= heights != np.float64(missing).astype(heights.dtype)
     ground = _ground(tags)
-    if _MODEL_TYPE not in _geo_keys(tags):
-        rows, columns = heights.shape
-        span = float(np.ptp(heights[there])) if there.any() else 0.0
-        width, height = ground.right * columns, ground.down * rows
-        if are_degrees(ground.left, ground.first, width, height, span):
-            ground = replace(ground, degrees=True, unit=_units(tags)[1] or METRE)
+    rows, columns = heights.shape
+    span = float(np.ptp(heights[there])) if there.any() else 0.0
+    stated = None
+    if _MODEL_TYPE in _geo_keys(tags):
+        stated = DEGREES if ground.degrees else LENGTHS
+    size = ground.right * columns, ground.down * rows
+    found = decide_ground(stated, (ground.left, ground.first), size, span, decided.corrections)
+    decided.note(found)
+    if found.value == DEGREES:
+        ground = replace(ground, degrees=True, unit=_units(tags)[1] or METRE)
+    else:
+        ground = replace(ground, degrees=False)
     return terrain_view(heights, there, ground, "terrain")
 
 

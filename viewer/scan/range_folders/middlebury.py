@@ -15,7 +15,9 @@ from ...errors import InputError, shortened
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
-from ._pictures import read_color
+from ..reading.camera import CENTER, decide_view
+from ..reading.sequence import Decided
+from ._pictures import read_color, size_of_image
 from ._source import RangeFrames
 from ._texts import object_of
 
@@ -26,10 +28,9 @@ _NUMBERS = (
     "focal_length_px", "principal_point_left_x_px", "principal_point_y_px", "principal_point_dx_px",
     "baseline_mm",
 )  # fmt: skip
-_CENTER = 0.5  # of a pixel: in the calibration that of the first one is at 0, 0
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """The left view; None where there is no disparity with such a calibration."""
     pairs = [name.removesuffix(_DISPARITY) for name in names if name.endswith(_DISPARITY)]
     if len(pairs) != 1 or _CALIBRATION not in names:
@@ -41,7 +42,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     files = (disparity, folder / _CALIBRATION, *([color] if color else []))
 
     def read(_: int) -> Iterator[RangeView]:
-        yield _view(disparity, color, numbers)
+        yield _view(disparity, color, numbers, decided)
 
     return RangeFrames(folder.resolve().name, (disparity.name,), read, files, "mm")
 
@@ -51,7 +52,7 @@ def lacks(names: Sequence[str]) -> str:
     return f"its disparity, NAME{_DISPARITY}, is missing" if _CALIBRATION in names else ""
 
 
-def _view(file: Path, left: Path | None, numbers: Sequence[float]) -> RangeView:
+def _view(file: Path, left: Path | None, numbers: Sequence[float], decided: Decided) -> RangeView:
     (disparity,) = read_arrays(file, "disparity")
     color = None if left is None else read_color(left)
     focal, cx, cy, apart, baseline = numbers
@@ -59,14 +60,12 @@ def _view(file: Path, left: Path | None, numbers: Sequence[float]) -> RangeView:
     known = np.isfinite(between) & (between > 0)
     depth = np.full(disparity.shape, np.nan, np.float32)
     depth[known] = baseline * focal / between[known]
+    pinhole = {"fx": focal, "fy": focal, "cx": cx + CENTER, "cy": cy + CENTER}
     return RangeView(
         depth=depth,
         mask=known,
         color=color,
-        fx=focal,
-        fy=focal,
-        cx=cx + _CENTER,
-        cy=cy + _CENTER,
+        **decide_view(pinhole, size_of_image(depth), decided, _CALIBRATION, source="neighbour"),
         world_to_camera=UPRIGHT,
         name="left",
         unit="mm",

@@ -19,6 +19,8 @@ from ...srgb import bytes_from_linear
 from ..formats.npz import read_arrays
 from ..image_poses import UPRIGHT
 from ..range_view import RangeView
+from ..reading.camera import CENTER, decide_view
+from ..reading.sequence import Decided
 from ..times import natural_key
 from ._source import RangeFrames
 from ._texts import json_of, object_of
@@ -27,11 +29,10 @@ TITLE = "TrueDepth frames"
 
 _CAMERA, _MOTION, _FRAME = "camera_intrinsics.json", "motion-data.json", "frame-"
 _MATRIX, _WIDTH = "intrinsic_matrix", "intrinsic_matrix_reference_dimensions_width"
-_CENTER = 0.5  # of a pixel: in the matrix that of the first one is at 0, 0
 _SRGB = bytes_from_linear(np.arange(256) / 255)  # of a stored colour
 
 
-def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
+def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | None:
     """A frame for each file; None where there is no such calibration."""
     frames = [name for name in names if name.startswith(_FRAME) and name.endswith(".npz")]
     if not frames or _CAMERA not in names:
@@ -43,7 +44,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     return RangeFrames(
         name=folder.resolve().name,
         labels=tuple(frames),
-        read=lambda index: iter([_view(files[index], camera, turns)]),
+        read=lambda index: iter([_view(files[index], camera, turns, decided.at(index))]),
         files=(*files, *(folder / name for name in (_CAMERA, _MOTION) if name in names)),
         unit="m",
         recorded=lambda: _times(files),
@@ -55,25 +56,24 @@ def lacks(names: Sequence[str]) -> str:
     return f"its frames, {_FRAME}N.npz, are missing" if _CAMERA in names else ""
 
 
-def _view(file: Path, camera: NDArray[np.float64], turns: int) -> RangeView:
+def _view(file: Path, camera: NDArray[np.float64], turns: int, decided: Decided) -> RangeView:
     """The view of a frame, turned clockwise by so many quarters."""
     depth, color = read_arrays(file, "depth", "color")
     if color.dtype != np.uint8:
         raise InputError(f"array 'color' is of type {color.dtype}, expected uint8", file)
     if depth.ndim != 2:
         raise InputError(f"array 'depth' has shape {depth.shape}, expected (H, W)", file)
-    fx, fy, cx, cy = camera * depth.shape[1] + (0, 0, _CENTER, _CENTER)
+    fx, fy, cx, cy = camera * depth.shape[1] + (0, 0, CENTER, CENTER)
     for _ in range(turns):
         fx, fy, cx, cy = fy, fx, depth.shape[0] - cy, cx
         depth, color = np.rot90(depth, -1), np.rot90(color, -1)
+    pinhole = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
+    why = f"Scan4D turns the pictures by {90 * turns} degrees, as {_MOTION} states gravity" if turns else ""
     return RangeView(
         depth=np.ascontiguousarray(depth),
         mask=np.isfinite(depth),
         color=_SRGB[color],
-        fx=fx,
-        fy=fy,
-        cx=cx,
-        cy=cy,
+        **decide_view(pinhole, depth.shape[::-1], decided, _CAMERA, why, "neighbour"),
         world_to_camera=UPRIGHT,
         name="truedepth",
         unit="m",

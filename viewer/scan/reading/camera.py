@@ -14,7 +14,7 @@ from typing import Any
 
 from ...errors import InputError
 from ..contents import StatedCamera
-from ..range_view import DepthKind, assumed_pinhole
+from ..range_view import DepthKind, RangeView, assumed_pinhole
 from .record import Decision, Source
 from .sequence import Decided
 
@@ -121,12 +121,18 @@ def decide_camera(
 
 
 def decide_view(
-    stated: Mapping[str, Any] | None, size: Size, decided: Decided, where: str = ""
+    stated: Mapping[str, Any] | None,
+    size: Size,
+    decided: Decided,
+    where: str = "",
+    why: str = "",
+    source: Source = "file",
 ) -> dict[str, Any]:
     """The camera of a picture in a file that states it or not; the decision goes into the record.
 
     stated: fields of a `RangeView` (fx, fy, cx, cy and perhaps kind and distortion), None where the file is
-    silent. Returns such fields. Raises InputError where the user's camera cannot be the picture's.
+    silent. why: a sentence for the record. Returns such fields. Raises InputError where the user's camera
+    cannot be the picture's.
     """
     camera = decided.corrections.get("camera")
     if isinstance(camera, str):
@@ -136,12 +142,18 @@ def decide_view(
         found = decide_camera(sources, size)
         decided.note(found.decisions[0])
         return found.camera.of_view
-    value = {name: stated[name] for name in ("fx", "fy")} | {
-        name: stated[name] - CENTER for name in ("cx", "cy")
-    }
+    value: dict[str, Any] = {name: float(stated[name]) for name in ("fx", "fy")}
+    value |= {name: float(stated[name]) - CENTER for name in ("cx", "cy")}
     value |= {"distortion": list(stated.get("distortion", ())), "kind": stated.get("kind", "z")}
-    decided.note(Decision("camera", value, "file", where, changes_numbers=True))
+    decided.note(Decision("camera", value, source, where, why, changes_numbers=True))
     return dict(stated)
+
+
+def note_fitted(view: RangeView, decided: Decided) -> None:
+    """Put the camera of an organised grid into the record: its points show which pixels see them."""
+    why = "The camera is the pinhole that fits the organised points best"
+    value = {"fx": view.fx, "fy": view.fy, "cx": view.cx - CENTER, "cy": view.cy - CENTER, "kind": view.kind}
+    decided.note(Decision("camera", value | {"distortion": []}, "file", "the organised points", why))
 
 
 def scaled(camera: StatedCamera, size: Size) -> StatedCamera:

@@ -127,6 +127,7 @@ CORRECTED = {
     "axes": Key(
         _axes, "LPS, RAS, unknown, or three signed axes such as '+x -z +y'", ("LPS", "RAS", "unknown")
     ),
+    "ground": _words("degrees or lengths", "degrees", "lengths"),
     "unit": Key(checked_unit, "a short word such as mm", ("mm", "cm", "m")),
     "frames": Key(
         str, "a pattern such as '*.ply', a list such as 'b.ply;a.ply', or rows, image or cloud for an array"
@@ -140,7 +141,8 @@ CORRECTED = {
 class Corrections(Mapping[str, Any]):
     """Corrections of a user: key -> parsed value.
 
-    columns:       tuple of roles        separator, encoding, colors, normals, texture, splats, axes: str
+    columns:       tuple of roles        separator, encoding, colors, normals, texture, splats, axes,
+                   ground: str
     decimal:       "." or ","            skip: int              depth-scale: float
     missing:       "none", a float, or (x, y, z)
     camera:        tuple (fx, fy, cx, cy, *lens), in pixels with the centre of the first one at (0, 0); or a

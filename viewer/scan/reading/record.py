@@ -28,6 +28,7 @@ KEYS = {
     "missing": "Not measured",
     "unit": "Unit",
     "axes": "Axes",
+    "ground": "Ground",
     "camera": "Camera",
     "depth-scale": "Depth scale",
     "depth-channel": "Depth channel",
