@@ -16,7 +16,7 @@ from source_code import modules, syntax_of
 from viewer.analysis.landmarks.files import read_landmarks, write_landmarks
 from viewer.analysis.landmarks.landmark_set import LandmarkSet
 from viewer.csv_text import save_rows, text_of_cell, to_text
-from viewer.scan.reading.times import read_times_csv
+from viewer.scan.reading.times_table import read_times_csv
 
 FORMULAS = ("=1+1", "+1+1", "-1-cmd", "@SUM(A1)", "\t=1", "\r=1", "\n=1", "=cmd|' /C calc'!A0", "-", "+")
 WIDE_FORMULAS = ("\uff1d1+1", "\uff0b1", "\uff0d1", "\uff20SUM(A1)", "'\uff1d1")
@@ -81,7 +81,7 @@ def test_names_of_frames_come_back(tmp_path: Path) -> None:
     names = ["=1+1.ply", "=1+2.ply"]
     save_rows(tmp_path / "times.csv", [("file", "time"), *((name, n / 2) for n, name in enumerate(names))])
     assert "\n=" not in (tmp_path / "times.csv").read_text()
-    np.testing.assert_array_equal(read_times_csv(tmp_path / "times.csv", names), [0, 0.5])
+    np.testing.assert_array_equal(read_times_csv(tmp_path / "times.csv", names).seconds, [0, 0.5])
 
 
 def test_one_function_writes_all_tables() -> None:

@@ -10,14 +10,15 @@ from pathlib import Path
 from ..errors import InputError
 from .sources import FACES_FILE
 from .timeline import Timeline
-from .times import TIMES_FILE
+from .times import OTHER_TIMES_FILES, TIMES_FILE
 
 
 def scan_inputs(timeline: Timeline) -> list[Path]:
     """The files that a scan may be read from: its frames, and what may stand beside them or their folder."""
     folders = {file.parent for file in timeline.files}
     folders |= {folder.parent for folder in folders if folder.name == "frames"}
-    return [*timeline.files, *(folder / name for folder in folders for name in (TIMES_FILE, FACES_FILE))]
+    names = (TIMES_FILE, *OTHER_TIMES_FILES, FACES_FILE)
+    return [*timeline.files, *(folder / name for folder in folders for name in names)]
 
 
 def found_among(paths: Iterable[Path], inputs: Iterable[Path]) -> list[Path]:

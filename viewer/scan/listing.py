@@ -21,7 +21,7 @@ from .range_folders import find_range_frames
 from .reading.names import frame_counts
 from .reading.sequence import Decided
 from .sources import FileSequence
-from .times import TIMES_FILE, natural_key
+from .times import is_times_file, natural_key
 
 _UNLIKE = 2.0  # times the size of the smallest file: frames of one scan differ less
 _DIGITS = re.compile("[0-9]+")
@@ -184,7 +184,7 @@ def _scan_files(paths: Sequence[Path]) -> list[Path]:
         for path in paths
         if path.suffix.lower() in known
         and not path.name.startswith(".")
-        and path.name != TIMES_FILE
+        and not is_times_file(path.name)
         and os.path.isfile(path)
     ]
     scans = [file for file in files if file.suffix.lower() not in formats.NOTES]

@@ -22,10 +22,11 @@ from .reading.record import Aside, Decision
 from .reading.sequence import Decided
 from .reading.times import Times, counted_times, times_in_names
 from .reading.times import decide as decide_times
+from .reading.times_table import read_times_csv
 from .reading.unit import decide as decide_unit
 from .sources import FACES_FILE, FileSequence, FrameSource, MultiFrameFile
 from .timeline import ScanMessage, Timeline
-from .times import TIMES_FILE, natural_key
+from .times import is_times_file, natural_key
 from .units import checked_unit, usable_unit
 
 DEMO = "demo"
@@ -84,9 +85,11 @@ def open_scan(
     if stated and not usable_unit(stated):
         what = f"the scan has the unit of length '{shortened(stated)}', which is not a short word such as mm"
         timeline.messages.append(ScanMessage("unit", f"{what}: the unit stays unknown"))
-    if fps is not None and times.decision.source == "neighbour":
+    if fps is not None and times.is_measured and times.decision.source != "user":
         timeline.messages.append(
-            ScanMessage("times", f"Scan4D takes the times from {TIMES_FILE}, and ignores {fps:g} fps")
+            ScanMessage(
+                "times", f"Scan4D takes the times from {times.decision.where}, and ignores {fps:g} fps"
+            )
         )
     return timeline
 
@@ -117,12 +120,26 @@ def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> Non
 
 def _times_of(source: FrameSource, fps: float | None, corrections: Corrections) -> Times:
     """The times of all frames. Raises InputError where a table or a correction is unusable."""
-    table = source.times_file if isinstance(source, FileSequence) else None
+    table = _times_table(source, corrections) if isinstance(source, FileSequence) else None
     folder = source.files[0].parent if source.files else None
     return decide_times(
         _labels(source), folder, count=len(source), table=table, fps=fps, corrections=corrections,
         stored=None if table else source.times(),
     )  # fmt: skip
+
+
+def _times_table(source: FileSequence, corrections: Corrections) -> Path | None:
+    """The times.csv of a sequence; without one, a table with another usual name that states its times."""
+    if source.times_file is not None or "times" in corrections:
+        return source.times_file
+    for file in source.other_times_files:
+        try:
+            read_times_csv(file, _labels(source))
+            return file
+        except InputError as error:
+            what = f"Scan4D does not take the times from {file.name}: {error.what}"
+            source.decided.report("times", what)
+    return None
 
 
 def has_times_in_names(timeline: Timeline) -> bool:
@@ -220,7 +237,7 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     by_kind: dict[str, list[Path]] = {}
     for file in files:
         kind = file.suffix.lower()
-        is_left_aside = file.name.startswith(".") or file.name == TIMES_FILE
+        is_left_aside = file.name.startswith(".") or is_times_file(file.name)
         if kind in known and not is_left_aside and os.path.isfile(file):
             by_kind.setdefault(kind, []).append(file)
     if by_kind.keys() - formats.NOTES:

@@ -21,8 +21,8 @@ from .faces import Faces
 from .points import PointCloud
 from .pose import Scanned
 from .reading.sequence import Decided
-from .reading.times import read_times_csv
-from .times import TIMES_FILE, frame_in_words
+from .reading.times_table import read_times_csv
+from .times import OTHER_TIMES_FILES, TIMES_FILE, frame_in_words
 
 _SAMPLES = 4  # frames beside the first one that an uncertain decision looks at
 FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces that all of them have
@@ -92,11 +92,18 @@ class FileSequence:
         """The times.csv beside the frames, or beside their folder where that is called `frames`."""
         return None if len(self) == 1 else self._beside(TIMES_FILE)
 
+    @property
+    def other_times_files(self) -> list[Path]:
+        """Tables of times with other names, such as timestamps.txt, where there is no times.csv."""
+        if len(self) == 1 or self.times_file is not None:
+            return []
+        return [file for name in OTHER_TIMES_FILES if (file := self._beside(name)) is not None]
+
     def times(self) -> NDArray[np.float64] | None:
         """Times of the times.csv."""
         file = self.times_file
         labels = [self.label(index) for index in range(len(self))]
-        return None if file is None else read_times_csv(file, labels)
+        return None if file is None else read_times_csv(file, labels).seconds
 
     def load(self, index: int) -> Scanned:
         path = self.files[index]

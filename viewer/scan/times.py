@@ -8,6 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 TIMES_FILE = "times.csv"
+# Names of tables of times that other programs write; Scan4D uses them where they can be read.
+_STEMS, _SUFFIXES = ("times", "timestamps", "timestamp"), (".csv", ".txt", ".tsv")
+OTHER_TIMES_FILES = tuple(
+    name
+    for stem in _STEMS
+    for suffix in _SUFFIXES
+    for name in (stem + suffix, stem.capitalize() + suffix, (stem + suffix).upper())
+    if name != TIMES_FILE
+)
 DEFAULT_FPS = 25.0
 FPS_LIMITS = 1e-6, 1e6  # of frame rates
 
@@ -15,6 +24,11 @@ FPS_LIMITS = 1e-6, 1e6  # of frame rates
 def frame_in_words(index: int) -> str:
     """A frame as every text tells it, counted from 1; poses, of the command line and Python, count from 0."""
     return f"frame {index + 1}"
+
+
+def is_times_file(name: str) -> bool:
+    """Whether a file of this name is a table of times, not a frame."""
+    return name == TIMES_FILE or name in OTHER_TIMES_FILES
 
 
 def natural_key(name: str) -> tuple[list[str | int], str]:

@@ -9,7 +9,8 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.reading.corrections import Corrections
-from viewer.scan.reading.times import counted_times, decide, read_times_csv, times_in_names
+from viewer.scan.reading.times import counted_times, decide, times_in_names
+from viewer.scan.reading.times_table import read_times_csv
 
 LABELS = ["a.ply", "b.ply", "c.ply"]
 
@@ -45,15 +46,70 @@ def test_counted_times_start_at_zero_and_leave_gaps() -> None:
     ],
 )
 def test_times_csv(tmp_path: Path, text: str) -> None:
-    times = read_times_csv(table(tmp_path, text), LABELS)
+    times = read_times_csv(table(tmp_path, text), LABELS).seconds
     assert times.dtype == np.float64
     assert times.tolist() == [0.5, 1, 2.25]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "frame,time\n1,0.5\n2,1\n6,2.25\n",
+        "Nr.;Zeit in ms\n1;500\n2;1.000,0\n6;2.250,0\n",
+        "Bild;Zeit\n0;0,5\n1;1\n2;2,25\n",
+        "frame_id\telapsed_time_ms\n1\t500\n2\t1000\n3\t2250\n",
+        "index,milliseconds\n1,500\n2,1000\n3,2250\n",
+        "time\n0.5\n1\n2.25\n",
+        "Zeit\n0,5\n1\n2,25\n",
+        "f001 0.5\nf002 1\nf006 2.25\n",
+        "file,time\nC:\\scans\\F001.PLY,0.5\nC:\\scans\\F002.PLY,1\nC:\\scans\\F006.PLY,2.25\n",
+        "0.5,f001.png\n1,f002.png\n2.25,f006.png\n",
+        "# recorded in May\n# file time\nf001.ply 0.5\nf002.ply 1\nf006.ply 2.25\n",
+        "file,time\nf001.ply,500 ms\nf002.ply,1000 ms\nf006.ply,2250 ms\n",
+        "Datei;Zeit;Ort\nf001.ply;0,5;Köln\nf002.ply;1;Köln\nf006.ply;2,25;Köln\n".encode("cp1252"),
+        "file\ttime\nf001.ply\t0,5\nf002.ply\t1\nf006.ply\t2,25\n".encode("utf-16-le"),
+    ],
+)
+def test_tables_of_times_as_people_write_them(tmp_path: Path, text: str | bytes) -> None:
+    assert read_times_csv(table(tmp_path, text), NUMBERED).seconds.tolist() == [0.5, 1, 2.25]
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ["2024-05-01T12:30:01.000", "2024-05-01T12:30:01.250Z", "2024-05-01T12:30:02Z"],
+        ["2024-05-01 23:59:59.5", "2024-05-01 23:59:59.75", "2024-05-02 00:00:00.5"],
+        ["01.05.2024 12:30:01,5", "01.05.2024 12:30:01,75", "01.05.2024 12:30:02,5"],
+        ["12:30:01.000", "12:30:01.250", "12:30:02.000"],
+        ["59:01.000", "59:01.250", "59:02.000"],
+    ],
+)
+def test_clock_times_count_from_the_first_frame(tmp_path: Path, times: list[str]) -> None:
+    rows = "".join(f"{label};{time}\n" for label, time in zip(LABELS, times, strict=True))
+    found = read_times_csv(table(tmp_path, f"file;time\n{rows}"), LABELS)
+    assert found.seconds == pytest.approx([0, 0.25, 1])
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e6, 1e9])
+def test_times_since_1970_tell_their_unit(tmp_path: Path, unit: float) -> None:
+    seconds = [1716383012.25, 1716383012.5, 1716383013.0]
+    rows = "".join(f"{at},{int(time * unit)}\n" for at, time in enumerate(seconds))
+    assert read_times_csv(table(tmp_path, rows), LABELS).seconds == pytest.approx(seconds, abs=1e-6)
+
+
+def test_long_steps_without_a_unit_are_marked(tmp_path: Path) -> None:
+    found = decide(LABELS, table=table(tmp_path, "file,time\na.ply,0\nb.ply,33\nc.ply,66\n"))
+    assert (found.seconds.tolist(), found.is_measured) == ([0, 33, 66], True)
+    assert found.decision.is_marked
+    assert "time_ms" in found.decision.why
+    found = decide(LABELS, table=table(tmp_path, "file,time [s]\na.ply,0\nb.ply,33\nc.ply,66\n"))
+    assert (found.decision.source, found.decision.is_marked) == ("neighbour", False)
 
 
 def test_the_times_csv_in_the_documentation(tmp_path: Path) -> None:
     page = Path(__file__).resolve().parents[3] / "docs" / "reference" / "scans.md"
     rows = [line.strip() for line in page.read_text(encoding="utf-8").splitlines() if line.startswith("    ")]
-    times = read_times_csv(table(tmp_path, "\n".join(rows)), ["00001.ply", "00002.ply"])
+    times = read_times_csv(table(tmp_path, "\n".join(rows)), ["00001.ply", "00002.ply"]).seconds
     assert times.tolist() == [0, 0.033]
 
 
@@ -69,11 +125,15 @@ def test_the_times_csv_in_the_documentation(tmp_path: Path) -> None:
         ("a.ply,0\nb.ply,2\nc.ply,2\n", "line 3: 'c.ply' is not later than 'b.ply'"),
         ("0,0\n1,1\n3,2\n", "line 3: index 3 is outside 0..2"),
         ("0,0\n1,1\n99999999999999999999,2\n", "line 3: index 99999999999999999999 is outside 0..2"),
-        ("frame,time\n0,0\n", "line 1: no column called 'file' or 'index'"),
+        ("frame,time\n0,0\n", "times.csv: no time for 'b.ply'"),
+        ("time\n0\n1\n2\n3\n", "times.csv: has 4 times for 3 frames"),
         ("file,minute\na.ply,0\n", "line 1: time 'minute' is not a number"),
         ("a.ply;0,5\nb.ply;1,2,5\n", "line 2: time '1,2,5' is not a number"),
-        (b"a.ply,0\nb.ply,\xff\xfe\n", "times.csv: cannot be read"),
-        ("a" * 200_000, "times.csv: cannot be read"),
+        ("a.ply,0,5\nb.ply,1,0\nc.ply,2,2\n", "decimal marks"),
+        ("file,time\na.ply,12:30:01\nb.ply,1\nc.ply,2\n", "line 3: time '1' is not a clock time"),
+        (b"a.ply,0\nb.ply,\xff\xfe\n", "line 2: time 'ÿþ' is not a number"),
+        ("a" * 200_000, "times.csv: has 1 times for 3 frames"),
+        ("a" * 200_000 + ",1", "times.csv: cannot be read"),
     ],
 )
 def test_times_csv_that_make_no_sense(tmp_path: Path, text: str | bytes, message: str) -> None:
@@ -102,7 +162,7 @@ def test_times_in_names(labels: list[str], times: list[float] | None) -> None:
 
 def test_times_csv_of_another_encoding(tmp_path: Path) -> None:
     file = table(tmp_path, "file,time\na.ply,0\nb.ply,1\nc.ply,2\n".encode("utf-16"))
-    assert read_times_csv(file, LABELS).tolist() == [0, 1, 2]
+    assert read_times_csv(file, LABELS).seconds.tolist() == [0, 1, 2]
 
 
 NUMBERED = ["f001.ply", "f002.ply", "f006.ply"]

@@ -15,7 +15,7 @@ from ...output.legend import number
 from ...scan.points import UNKNOWN_UNIT
 from ...scan.pose import Pose
 from ...scan.reading.unit import guess_unit
-from ...scan.times import FPS_LIMITS, TIMES_FILE
+from ...scan.times import FPS_LIMITS
 from ...scan.units import UNIT_WORDS, is_length
 from .. import widgets
 from ..files.rereading import Rereading
@@ -144,7 +144,11 @@ class ScanSection(WindowPart):
         if len(self.playback.timeline) == 1:
             return
         if not pacing.can_change:
-            by = "set on the command line" if pacing.is_stated else f"from {TIMES_FILE}"
+            by = (
+                "set on the command line"
+                if pacing.is_stated
+                else f"from {self.playback.timeline.reading['times'].shown_source}"
+            )
             widgets.fact("Rate", f"{pacing.rate:.4g} Hz, {by}")
             return
         widgets.label(

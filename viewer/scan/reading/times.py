@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import csv
-import re
-from collections.abc import Iterator, Sequence
-from io import StringIO
-from itertools import pairwise
-from pathlib import Path, PurePath
+from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...csv_text import text_of_cell
 from ...errors import InputError, shortened
-from ...files import open_plain
 from ..times import DEFAULT_FPS
 from .corrections import NOTHING_CORRECTED, Corrections
 from .names import are_dates, frame_counts, small_stamps, stamped_seconds
 from .record import Decision
+from .times_table import read_times_csv
 
 KEY = "times"
 NAMES, INDEX, STORED = "names", "index", "stored"
@@ -58,8 +53,7 @@ def decide(
     if stated is not None:
         return Times(_array(stored), Decision(KEY, stated, "user", "--read"))
     if table is not None:
-        seconds = read_times_csv(table, labels)
-        return Times(seconds, Decision(KEY, table.name, "neighbour", table.name), is_measured=True)
+        return _of_table(table, labels)
     if fps is not None:
         return Times(counted_times(labels, fps, count), Decision(KEY, f"{_FPS}{fps:g}", "user", "--fps"))
     if stored is not None:
@@ -68,6 +62,16 @@ def decide(
     if stamps is not None:
         return Times(_array(stamps), Decision(KEY, NAMES, "folder", why="The names of the files are times"))
     return _assumed(labels, count)
+
+
+def _of_table(table: Path, labels: Sequence[str]) -> Times:
+    found = read_times_csv(table, labels)
+    decision = Decision(KEY, table.name, "neighbour", table.name, found.why)
+    if found.doubt:
+        decision = Decision(
+            KEY, table.name, "assumed", table.name, found.doubt, (INDEX, f"{_FPS}30"), changes_numbers=True
+        )
+    return Times(found.seconds, decision, is_measured=True)
 
 
 def _assumed(labels: Sequence[str], count: int | None) -> Times:
@@ -105,7 +109,7 @@ def _as_stated(labels: Sequence[str], folder: Path | None, stated: str, count: i
     if stated.startswith(_COLUMN):
         raise InputError(f"there is no column for '{shortened(stated)}'", hint="Use it for a table of frames")
     path = Path(stated) if folder is None or Path(stated).is_absolute() else folder / stated
-    return Times(read_times_csv(path, labels), decision, is_measured=True)
+    return Times(read_times_csv(path, labels).seconds, decision, is_measured=True)
 
 
 def counted_times(
@@ -132,133 +136,3 @@ def times_in_names(labels: Sequence[str]) -> NDArray[np.float64] | None:
 
 def _array(seconds: object) -> NDArray[np.float64]:
     return np.asarray(seconds, np.float64)
-
-
-# --- times.csv ------------------------------------------------------------------------------
-
-_SEPARATORS = ";\t,|"
-_FILE_WORDS = (
-    "file",
-    "filename",
-    "file name",
-    "datei",
-    "dateiname",
-    "fichier",
-    "archivo",
-    "bestand",
-    "image",
-)
-_INDEX_WORDS = ("index",)
-_TIME_WORDS = (
-    "time", "times", "timestamp", "timestamps", "seconds", "t", "zeit", "zeitstempel", "sekunden", "temps",
-    "tiempo", "tempo", "tijd",
-)  # fmt: skip
-_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
-_UNIT = re.compile(r"(?P<name>.*?)\s*(?:[\[(](?P<a>[a-zµ]+)[\])]|[_ /](?P<b>s|sec|ms|us|µs|ns))")
-
-
-class _Head(NamedTuple):
-    """The columns of the frames and the times, and the seconds of a unit of time."""
-
-    frame: int
-    time: int
-    scale: float
-
-
-def read_times_csv(path: Path, labels: Sequence[str]) -> NDArray[np.float64]:
-    """(T,) seconds of the frames called `labels`, as the rows of the file give them.
-
-    A row holds a frame (its file name, or its index counted from 0) and a time in seconds. Commas, semicolons
-    or tabs separate them, and numbers may have a decimal comma. A first row of names, such as `file` or
-    `index` and `time` or `time_ms`, is optional and may put the columns in another order. Rows for files that
-    are not among the labels are passed over. Raises InputError, with the line, where a row cannot be
-    understood, and where a frame has no time or two, or not a later one than the frame before it.
-    """
-    rows = list(_csv_rows(path))
-    head = _head(path, *rows[0]) if rows else None
-    frame_column, time_column, scale = head or _Head(0, 1, 1.0)
-    times = np.full(len(labels), np.nan)
-    lines = [0] * len(labels)
-    indices = {label: index for index, label in enumerate(labels)}
-    for line, cells in rows[1:] if head else rows:
-        if len(cells) <= max(frame_column, time_column):
-            raise _bad_row(path, line, "a column is missing")
-        time = _number(path, line, cells[time_column]) * scale
-        index = _frame_index(path, line, cells[frame_column], indices)
-        if index is None:
-            continue
-        if lines[index]:
-            what = f"has a second time for '{labels[index]}', which line {lines[index]} already has"
-            raise _bad_row(path, line, what)
-        times[index], lines[index] = time, line
-    if np.isnan(times).any():
-        missing = labels[int(np.isnan(times).argmax())]
-        raise InputError(f"no time for '{missing}'", path, "Add a row for it, or move the frame elsewhere")
-    for before, after in pairwise(range(len(labels))):
-        if times[before] >= times[after]:
-            raise _bad_row(path, lines[after], f"'{labels[after]}' is not later than '{labels[before]}'")
-    return times
-
-
-def _csv_rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """The rows that are not blank, each with the line it ends on."""
-    try:
-        with open_plain(path) as file:
-            data = file.read()
-        is_utf_16 = data[:2] in (b"\xff\xfe", b"\xfe\xff")
-        text = data.decode("utf-16" if is_utf_16 else "utf-8-sig")
-        first = next((line for line in text.splitlines() if line.strip()), "")
-        separator = max(_SEPARATORS, key=lambda sign: (sign in first and sign != ",", sign in first))
-        reader = csv.reader(StringIO(text, newline=""), delimiter=separator)
-        for row in reader:
-            cells = [text_of_cell(cell.strip()) for cell in row]
-            if any(cells):
-                yield reader.line_num, cells
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"cannot be read ({error})", path, "It should be comma-separated text") from error
-
-
-def _head(path: Path, line: int, names: list[str]) -> _Head | None:
-    """The columns that the first row names; None where it names none. Raises InputError where it names a time
-    and no frame."""
-    plain = [_named_unit(name.casefold().strip("\"' ")) for name in names]
-    time = next((place for place, (name, _) in enumerate(plain) if name in _TIME_WORDS), None)
-    if time is None:
-        return None
-    known = (*_FILE_WORDS, *_INDEX_WORDS)
-    frame = next((place for place, (name, _) in enumerate(plain) if name in known), None)
-    if frame is None:
-        raise _bad_row(path, line, "no column called 'file' or 'index'")
-    return _Head(frame, time, plain[time][1])
-
-
-def _named_unit(name: str) -> tuple[str, float]:
-    """A name of a column without the unit behind it, and the seconds of that unit."""
-    match = _UNIT.fullmatch(name)
-    unit = match and (match["a"] or match["b"])
-    return (match["name"].strip(), _UNITS[unit]) if match and unit in _UNITS else (name, 1.0)
-
-
-def _number(path: Path, line: int, text: str) -> float:
-    try:
-        number = float(text.replace(",", ".") if text.count(",") == 1 and "." not in text else text)
-    except ValueError:
-        number = np.nan
-    if not np.isfinite(number):
-        raise _bad_row(path, line, f"time '{shortened(text)}' is not a number")
-    return number
-
-
-def _frame_index(path: Path, line: int, frame: str, indices: dict[str, int]) -> int | None:
-    """The frame that a row means; None for a file that is not part of the scan."""
-    index = indices.get(frame, indices.get(PurePath(frame).name))
-    if index is None and frame.isdecimal():
-        if len(frame) > 9 or int(frame) >= len(indices):
-            raise _bad_row(path, line, f"index {shortened(frame)} is outside 0..{len(indices) - 1}")
-        index = int(frame)
-    return index
-
-
-def _bad_row(path: Path, line: int, what: str) -> InputError:
-    hint = "A row is a file name or an index, a comma or semicolon, and seconds that increase"
-    return InputError(what, f"{path}, line {line}", hint)
