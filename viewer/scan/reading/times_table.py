@@ -228,11 +228,9 @@ def _named_frames(rows: Sequence[_Row], labels: Sequence[str]) -> int | None:
     """The column that holds names of the frames; None where none does."""
     known = _names_of(labels)
     width = max((len(row.cells) for row in rows), default=0)
-    found = [
-        sum(_of_name(row.cells[at], known) is not None for row in rows if at < len(row.cells))
-        for at in range(width)
-    ]
-    return found.index(max(found)) if found and max(found) else None
+    columns = [[row.cells[at] for row in rows if at < len(row.cells)] for at in range(width)]
+    counts = [sum(_of_name(cell, known) is not None for cell in cells) for cells in columns]
+    return int(np.argmax(counts)) if any(counts) else None
 
 
 # --- frames -------------------------------------------------------------------------------------
