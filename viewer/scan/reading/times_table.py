@@ -241,7 +241,7 @@ def _plain_file(cell: str) -> str:
 
 
 def _names_of(labels: Sequence[str]) -> dict[str, int]:
-    """What a table may call each frame -> its index: the label, its file, and that without its suffix."""
+    """The index of each frame by what a table may call it: its label, its file, or that without suffix."""
     found: dict[str, int] = {}
     for make in (str, _file_name, _stem):
         names = [make(_plain_file(label)) for label in labels]
