@@ -37,6 +37,13 @@ def test_a_disc_missing_inside_is_its_area_of_holes_and_moves_no_outline() -> No
     assert errors["spill_percent"] == errors["boundary_mean"] == errors["boundary_p95"] == 0
 
 
+def test_a_slit_is_a_gap_that_does_not_reach_the_outline() -> None:
+    true, gap, notch = disc(25), disc(6), disc(6, (30, 65))
+    assert metrics.slits(true & ~gap, true) == 100 * gap.sum() / true.sum()
+    assert metrics.slits(true & ~notch, true) == 0
+    assert metrics.slits(true, true) == 0
+
+
 @pytest.mark.parametrize("k", [1, 20])
 def test_spill_reaches_as_far_as_an_edge_moved(k: int) -> None:
     column = np.indices(SIZE)[1]

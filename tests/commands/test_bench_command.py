@@ -87,6 +87,18 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
     assert "translated by 10^9" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
+def test_the_surface_suite_prints_its_goals(run: Run, mesh: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    done = run("bench", "--suite", "surface", "--scene", mesh, *SMALL, "-o", out)
+    assert done.code == 0, done.err
+    assert "holes and see-through, ramp 1:100" in done.out
+    lines = [json.loads(line) for line in (out / "surface.jsonl").read_text().splitlines()]
+    assert {line["scene"] for line in lines} == {"ball.ply", "torus", "sheets", "demo"}
+    assert {line["backend"] for line in lines} == {"points", "estimate"}
+    assert "One surface" in (out / "report.html").read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -100,6 +112,7 @@ def test_the_stability_suite_alone_keeps_the_scenes(run: Run, tmp_path: Path) ->
         (["--suite", "speed"], ["speed", "numerics"]),
         (["--seed", "-1"], ["-1"]),
         (["--suite", "numerics", "--compare", "."], ["--compare"]),
+        (["--suite", "surface", "--compare", "."], ["--compare"]),
         (["--scene", "sphere", "--size", "20000x20000"], ["20000x20000", "too large"]),
     ],
 )

@@ -41,6 +41,14 @@ def coverage(drawn: Mask, true: Mask) -> Errors:
     }
 
 
+def slits(drawn: Mask, true: Mask) -> float:
+    """The share of the true silhouette, percent, that is empty in a picture and does not reach its outline:
+    gaps within the subject. drawn, true: (H, W)."""
+    box = _box(drawn | true, 1)
+    drawn, true = drawn[box], true[box]
+    return _percent(_count(_enclosed(~drawn, true)), _count(true))
+
+
 def depth(
     drawn: NDArray[np.floating],
     true: NDArray[np.floating],

@@ -31,7 +31,7 @@ from ..look import Look
 from ..mesh.range_mesh import triangulated
 from ..picture.surface import Surface
 from ..signals import Interrupts
-from . import baselines, numerics
+from . import baselines, numerics, surface_suite
 from .baselines import CEILING, FLOOR, RANGE_MESH
 from .judge import Judge, Walk
 from .metrics import Errors, aggregate
@@ -210,6 +210,34 @@ class Bench:
                 "reason": row.tolerance.reason,
                 **self.where(),
             }
+
+    def surface(self, names: Sequence[str], models: Sequence[str], points: int, picks: int) -> Iterator[Row]:
+        """The rows of the suite "surface", for each condition, scene and backend; a scene that cannot be had
+        is noted. models: scenes of the conditions that have none of their own. points, picks: as in
+        `surface_suite.Amount`."""
+        settings = self.settings
+        amount = surface_suite.Amount(points, settings.views, picks, settings.size)
+        for condition in surface_suite.CONDITIONS:
+            for scene in surface_suite.scenes_of(condition, models):
+                try:
+                    subject = self.subject(Group(scene, ()))
+                    found = surface_suite.measure_condition(
+                        self.renderer, subject, condition, names, amount, settings.seed
+                    )
+                    for name, errors in found:
+                        yield {
+                            "condition": condition.name,
+                            "scene": subject.name,
+                            "backend": name,
+                            "points": points,
+                            "size": list(settings.size),
+                            "views": settings.views,
+                            "seed": settings.seed,
+                            "errors": errors,
+                            **self.where(),
+                        }
+                except InputError as error:
+                    self.note(f"the suite surface leaves out {scene}, {condition.name}: {error}")
 
     def where(self) -> Row:
         """The part of a row that says where and when it was measured."""

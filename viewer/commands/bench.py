@@ -15,11 +15,11 @@ from functools import partial
 from pathlib import Path
 
 from ..backends import backend, backends
-from ..bench import numerics
+from ..bench import goals, numerics, surface_suite
 from ..bench.calibrating import SCENES, laws_of, measure_ways
 from ..bench.plan import Group, plan
-from ..bench.report.page import PAGE, write_report
-from ..bench.report.results import NOTES, NUMERICS, WAYS, compare, read_rows
+from ..bench.report.page import PAGE, three_digits, write_report
+from ..bench.report.results import NOTES, NUMERICS, SURFACE, WAYS, compare, read_rows
 from ..bench.run import Bench, BenchSettings
 from ..bench.scenes import catalog
 from ..choice.known import keep_model
@@ -45,6 +45,7 @@ _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 _QUICK_SCENES = ("torus", "bunny", "demo", "torus-simulated")
 _QUICK_COUNTS = (10_000, 1_000_000)
 _QUICK_NOISES = (2.0,)
+_SUITES = ("scenes", "numerics", "surface")
 _CALIBRATION = BenchSettings(views=4, repeat=2, frames=0)
 _QUICK_CALIBRATION = ("torus", "box", "sheets-bare", "torus-simulated")
 
@@ -59,9 +60,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="measure only these renderers; gl-points and mesh are always included",
     )
-    parser.add_argument(
-        "--suite", choices=("scenes", "numerics"), help="one suite; default: scenes and numerics"
-    )
+    parser.add_argument("--suite", choices=_SUITES, help="one suite; default: scenes and numerics")
     parser.add_argument(
         "--calibrate", action="store_true",
         help="measure only what the automatic choice needs on this device, and store it for this user",
@@ -86,12 +85,14 @@ def run(args: Namespace) -> int:
         claim(_report_files(args.out), [], args.force)
         tell(write_report(args.out))
         return 0
-    if args.compare and args.suite == "numerics":
-        raise InputError("--compare applies only to scenes", "--suite numerics")
+    if args.compare and args.suite in ("numerics", "surface"):
+        raise InputError("--compare applies only to scenes", f"--suite {args.suite}")
     old = read_rows(args.compare) if args.compare else None
     names = list(dict.fromkeys(args.backend or backends()))
     for name in names:
         backend(name)  # an unknown name is an error before anything is drawn
+    if args.suite == "surface":
+        return _surface(args, names)
     settings = settings_of(args, QUICK if args.quick else BenchSettings())
     groups, missing = _groups(args, settings, names) if args.suite != "numerics" else ([], {})
     others = {}
@@ -104,6 +105,30 @@ def run(args: Namespace) -> int:
     chosen.measure(bench, args.out, lambda: tell(write_report(args.out)))
     if old is not None:
         print(*compare(old, read_rows(args.out)), sep="\n")
+    return int(bench.stopped)
+
+
+def _surface(args: Namespace, names: Sequence[str]) -> int:
+    """Measure the suite "surface", and print the table of its goals. 1 where Ctrl-C stopped it."""
+    amount = surface_suite.QUICK if args.quick else surface_suite.Amount()
+    settings = settings_of(args, BenchSettings(amount.size, amount.views))
+    models, missing = list(dict.fromkeys(args.scene or ())), {}
+    if not models:
+        reasons = catalog.scene_names(settings.data)
+        wanted = surface_suite.QUICK_MODELS if args.quick else surface_suite.MODELS
+        models = [name for name in wanted if not reasons[name]]
+        missing = {name: reasons[name] for name in wanted if reasons[name]}
+    rows = partial(Bench.surface, names=names, models=models, points=amount.points, picks=amount.picks)
+    source = RowSource(rows, surface_suite.steps(names, models))
+    chosen = MeasuringPlan([], {SURFACE: source}, left_out(missing), _report_files(args.out))
+    bench = Bench(drawing.renderer(args.device), settings, args.out)
+    chosen.claim(args, settings)
+
+    def report() -> None:
+        print(*goals.table_lines(goals.table(read_rows(args.out / SURFACE)), three_digits), sep="\n")
+        tell(write_report(args.out))
+
+    chosen.measure(bench, args.out, report)
     return int(bench.stopped)
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from ...errors import InputError
 from ...files import output_folder, whole_file
 from ...resources import resource_path
+from .. import goals
 from ..baselines import CEILING, FLOOR
 from . import plots
 from .pictures import PANELS, picture_path
@@ -23,6 +24,7 @@ from .results import (
     NOTES,
     NUMERICS,
     RESULTS,
+    SURFACE,
     Metric,
     Row,
     error_metrics,
@@ -92,10 +94,10 @@ def write_report(folder: Path) -> Path:
     The same rows give the same page. Raises InputError where there is nothing to report, where a file is
     broken or cannot be written.
     """
-    rows, numerics = (
-        read_rows(folder / name) if (folder / name).exists() else [] for name in (RESULTS, NUMERICS)
+    rows, numerics, surface = (
+        read_rows(folder / name) if (folder / name).exists() else [] for name in (RESULTS, NUMERICS, SURFACE)
     )
-    if not rows and not numerics:
+    if not (rows or numerics or surface):
         raise InputError("no results to report", folder, "Run scan4d bench first")
     for stale in (folder / "plots").glob("*.png"):
         stale.unlink()
@@ -114,6 +116,7 @@ def write_report(folder: Path) -> Path:
         pictures=list(_pictures(folder, rows)),
         panels=PANELS,
         numerics=stability(numerics),
+        goals=goals_met(surface),
         metrics=shown,
         every=[(row_title(row), [three_digits(metric.of(row)) for metric in shown]) for row in rows],
     )
@@ -235,6 +238,25 @@ def stability(lines: Sequence[Row]) -> dict[str, Any]:
     counts = {kind: sum(cell.kind == kind for cell in cells.values()) for kind in ("held", "failed", "limit")}
     limits = {line["limit"] for line in lines if line.get("limit")}
     return {"backends": backends, "rows": table, "counts": counts, "limits": len(limits)}
+
+
+def goals_met(rows: Sequence[Row]) -> dict[str, Any]:
+    """The table of the suite "surface": backends, and rows of (goal, bound, cells)."""
+    lines = goals.table(rows)
+    backends = list(dict.fromkeys(name for line in lines for name in line.found))
+
+    def cell(line: goals.Line, name: str) -> Cell:
+        if name not in line.found:
+            return Cell(_DASH)
+        value = line.found[name]
+        kind = "" if math.isinf(line.goal.high) else "held" if line.goal.meets(value) else "failed"
+        return Cell(three_digits(value), kind)
+
+    table = [
+        (f"{line.goal.title}: {line.condition}", line.goal.bound, [cell(line, name) for name in backends])
+        for line in lines
+    ]
+    return {"backends": backends, "rows": table}
 
 
 def _outcome(line: Row) -> Cell:

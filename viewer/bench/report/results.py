@@ -17,7 +17,7 @@ from ..baselines import CEILING, FLOOR
 Row = dict[str, Any]
 
 RESULTS, NUMERICS, NOTES = "results.jsonl", "numerics.jsonl", "notes.txt"
-WAYS = "ways.jsonl"
+WAYS, SURFACE = "ways.jsonl", "surface.jsonl"
 SPREADS = ("gpu_ms", "cpu_ms", "busy_ms", "derive_ms", "upload_ms")
 
 _SCENE = "scene_hash"
@@ -28,6 +28,7 @@ _NEEDED: dict[str, dict[str, Any]] = {
         "size": list, "seed": int, "views": int, "sweep": str, "gpu_ms": dict, "errors": dict,
     },
     NUMERICS: {"row": str, "backend": str, "held": bool},
+    SURFACE: {"scene": str, "condition": str, "backend": str, "errors": dict},
     WAYS: {"scene": str, "key": str, "scale": int | float, "ms": int | float, "seen": dict},
 }  # fmt: skip
 

@@ -43,16 +43,35 @@ def without_normals(cloud: PointCloud, _: np.random.Generator) -> PointCloud:
     return replace(cloud, normals=None, radii=None)
 
 
-def thinned(cloud: PointCloud, random: np.random.Generator) -> PointCloud:
-    """Points left by chance, ten times as many at one end of the longest axis as at the other.
+def density_ramp(thinnest: float) -> Change:
+    """A change that removes points by chance: none at one end of the longest axis, and all but a share
+    `thinnest` at the other.
 
-    The share of them falls as an exponential from end to end, so that the slope of its logarithm is the same
-    everywhere.
+    The share of points that stay falls as an exponential from end to end, so that the slope of its logarithm
+    is the same everywhere.
     """
-    low, high = cloud.positions.min(axis=0), cloud.positions.max(axis=0)
-    axis = int((high - low).argmax())
-    along = (cloud.positions[:, axis] - low[axis]) / (high[axis] - low[axis])
-    return with_rows(replace(cloud, radii=None), np.flatnonzero(random.random(len(cloud)) < _THINNEST**along))
+
+    def change(cloud: PointCloud, random: np.random.Generator) -> PointCloud:
+        low, high = cloud.positions.min(axis=0), cloud.positions.max(axis=0)
+        axis = int((high - low).argmax())
+        along = (cloud.positions[:, axis] - low[axis]) / (high[axis] - low[axis])
+        stays = random.random(len(cloud)) < thinnest**along
+        return with_rows(replace(cloud, radii=None), np.flatnonzero(stays))
+
+    return change
+
+
+thinned = density_ramp(_THINNEST)
+
+
+def fewer(share: float) -> Change:
+    """A change that keeps a share of the points, by chance."""
+
+    def change(cloud: PointCloud, random: np.random.Generator) -> PointCloud:
+        rows = random.choice(len(cloud), round(share * len(cloud)), replace=False)
+        return with_rows(replace(cloud, radii=None), np.sort(rows))
+
+    return change
 
 
 def noisy(spacings: float) -> Change:

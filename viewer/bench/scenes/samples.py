@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ...mesh.triangles import Mesh
 from ...scan.points import PointCloud
 from ...srgb import bytes_from_linear, linear_from_bytes
+from .subjects import with_rows
 
 Arrays = dict[str, NDArray]
 Sampler = Callable[[int, slice], Arrays]  # some rows of a number of points
@@ -24,6 +25,8 @@ _RADIUS_PER_SPACING = 1.5  # discs of this radius close the surface
 _R2 = np.array([0.7548776662466927, 0.5698402909980532])  # powers of the generalised golden ratio
 _GOLDEN_TURN = np.pi * (3 - np.sqrt(5))
 _ALL = slice(None)
+_CANDIDATES = 5  # positions tried for each point of blue noise
+_APART = 0.715  # distance between points of blue noise, in spacings of as many evenly spread ones
 _CHUNK = 1 << 20  # points made at a time, so that float64 copies stay small
 
 
@@ -161,6 +164,54 @@ def on_mesh(mesh: Mesh, count: int, seed: int = 0) -> PointCloud:
         )
 
     return _joined([sample(rows) for rows in _chunks(count)])
+
+
+def at_random(mesh: Mesh, count: int, rng: np.random.Generator) -> PointCloud:
+    """Points at random positions of a mesh, uniform by area; normals and colours as `on_mesh`, no radii."""
+    ends = np.cumsum(np.linalg.norm(mesh.areas(), axis=1))
+    faces = np.searchsorted(ends, rng.random(count) * ends[-1])
+    u, v = rng.random((2, count))
+    root = np.sqrt(u)
+    positions, normals, colors = _at(mesh, faces, np.stack([1 - root, root * (1 - v), root * v]))
+    return PointCloud.from_arrays(positions, normals=normals, colors=colors, origin=mesh.origin)
+
+
+def blue_noise(mesh: Mesh, count: int, rng: np.random.Generator) -> PointCloud:
+    """About so many points of a mesh at random positions, none of which is close to another on the same side
+    of the surface (Poisson disks, by random order: Bowers et al. 2010); attributes as `at_random`."""
+    from scipy.spatial import cKDTree
+
+    some = at_random(mesh, _CANDIDATES * count, rng)
+    assert some.normals is not None
+    area = float(np.linalg.norm(mesh.areas(), axis=1).sum()) / 2
+    pairs = cKDTree(some.positions).query_pairs(_APART * np.sqrt(area / count), output_type="ndarray")
+    pairs = pairs[(some.normals[pairs[:, 0]] * some.normals[pairs[:, 1]]).sum(axis=1) > 0]
+    # Candidates come in random order: the lower row goes first.
+    open_, kept = np.ones(len(some), bool), np.zeros(len(some), bool)
+    while open_.any():
+        later = np.zeros(len(some), bool)
+        later[pairs[:, 1]] = True
+        first = open_ & ~later
+        kept |= first
+        taken = first[pairs[:, 0]]
+        open_[first] = False
+        open_[pairs[taken, 1]] = False
+        pairs = pairs[open_[pairs].all(axis=1)]
+    return with_rows(some, np.flatnonzero(kept))
+
+
+def torus_grid(around: int, stretch: float, *, ring: float = 1.0, tube: float = 0.4) -> Arrays:
+    """A grid on the torus of `on_torus`. around: points around the ring. stretch: how many times as far apart
+    they are as those around the tube, where the ring is longest."""
+    step = 2 * np.pi * (ring + tube) / around
+    along = max(round(2 * np.pi * tube * stretch / step), 3)
+    turn, angle = (
+        part.ravel()
+        for part in np.meshgrid(np.arange(around) * 2 * np.pi / around, np.arange(along) * 2 * np.pi / along)
+    )
+    outward = np.stack([np.cos(turn), np.zeros(len(turn)), np.sin(turn)], axis=1)
+    normals = outward * np.cos(angle)[:, None] + np.array([0, 1, 0]) * np.sin(angle)[:, None]
+    return _points(outward * ring + normals * tube, normals, step)
 
 
 def _at(mesh: Mesh, faces: NDArray, weights: NDArray) -> tuple[NDArray, NDArray, NDArray | None]:
