@@ -39,7 +39,7 @@ def study(tmp_path: Path) -> Path:
 
 def test_a_folder_lists_folders_sequences_and_files(study: Path) -> None:
     assert rows(study) == [
-        ("whole", study.name, 6),
+        ("whole", study.name, 5),
         ("folder", "empty", 0), ("folder", "s1", 0), ("folder", "s2", 2), ("folder", "s10", 1),
         ("sequence", "left_%03d.ply", 3), ("sequence", "right_%d.ply", 2),
         *(("file", name, 1) for name in (

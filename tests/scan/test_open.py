@@ -114,7 +114,7 @@ def test_a_folder_called_frames_inside(tmp_path: Path) -> None:
 def test_nothing_to_open(tmp_path: Path) -> None:
     assert "holds no scan files. Known files: .asc, .csv, .exr, .las, .laz, .npy" in message(tmp_path)
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
-    assert message(tmp_path).endswith("holds no scan files. Its folders: a9, a10, b")
+    assert message(tmp_path).endswith("holds no scan files. Open one of its folders: a9, a10, b")
     assert "a.jpg: unknown file suffix '.jpg'. Scan4D does not read a picture alone" in message(
         put(tmp_path, "a.jpg") / "a.jpg"
     )
@@ -169,7 +169,7 @@ def test_glob_patterns(tmp_path: Path) -> None:
     assert "h*.npy: matches no file. Check the folder" in message(tmp_path / "h*.npy")
     assert "f%03d.npy: matches no file" in message(tmp_path / "f%03d.npy")
     put(tmp_path, "a.jpg")
-    assert "*.jpg: matches no scan file. Known files:" in message(tmp_path / "*.jpg")
+    assert "*.jpg: matches no scan file, but 1 .jpg file" in message(tmp_path / "*.jpg")
 
 
 def test_one_file_is_one_pose_at_time_zero(tmp_path: Path) -> None:

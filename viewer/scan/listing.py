@@ -18,6 +18,7 @@ from ..files import absolute
 from . import formats
 from .open import entries, find_source, folder_frames, is_demo, matches, scan_frames
 from .range_folders import find_range_frames
+from .reading.frames import is_no_scan
 from .reading.names import frame_counts
 from .reading.sequence import Decided
 from .sources import FileSequence
@@ -183,7 +184,7 @@ def _scan_files(paths: Sequence[Path]) -> list[Path]:
         path
         for path in paths
         if path.suffix.lower() in known
-        and not path.name.startswith(".")
+        and not is_no_scan(path.name)
         and not is_times_file(path.name)
         and os.path.isfile(path)
     ]

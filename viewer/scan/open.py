@@ -18,6 +18,7 @@ from .range_folders import find_range_frames, lacking_part, pods
 from .reading import frames as deciding_frames
 from .reading import takes as deciding_takes
 from .reading.corrections import NOTHING_CORRECTED, Corrections
+from .reading.hints import foreign_files
 from .reading.record import Aside, Decision
 from .reading.sequence import Decided
 from .reading.times import Times, counted_times, times_in_names
@@ -102,7 +103,8 @@ def left_aside(path: str | os.PathLike[str], source: FrameSource) -> list[str]:
     kinds = {*formats.known_suffixes()} - _TABLES
     used = {*(file.name for file in source.files), FACES_FILE}
     found = (file for file in entries(Path(path)) if file.suffix.lower() in kinds and file.name not in used)
-    return sorted((file.name for file in found if not file.name.startswith(".")), key=natural_key)
+    found = (file for file in found if not deciding_frames.is_no_scan(file.name))
+    return sorted((file.name for file in found), key=natural_key)
 
 
 def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> None:
@@ -194,8 +196,14 @@ def folder_frames(folder: Path) -> list[Path]:
     if lacking := lacking_part(folder):
         raise InputError(lacking, folder, "Copy the folder as a whole")
     inner = sorted((entry.name for entry in entries(folder) if os.path.isdir(entry)), key=natural_key)
-    hint = f"Its folders: {_listed(inner)}" if inner else f"Known files: {_listed(formats.known_suffixes())}"
+    if (foreign := foreign_files(entries(folder))) is not None:
+        raise InputError(f"holds no scan files, but {foreign.what}", folder, foreign.hint)
+    hint = f"Open one of its folders: {_listed(inner)}" if inner else _known_files()
     raise InputError("holds no scan files", folder, hint)
+
+
+def _known_files() -> str:
+    return f"Known files: {_listed(formats.known_suffixes())}"
 
 
 def _open_pattern(pattern: str, decided: Decided) -> FrameSource:
@@ -204,7 +212,9 @@ def _open_pattern(pattern: str, decided: Decided) -> FrameSource:
         raise InputError("matches no file", pattern, "Check the folder, and put the pattern in quotes")
     frames = _choose_frames(files, pattern)
     if not frames:
-        raise InputError("matches no scan file", pattern, f"Known files: {_listed(formats.known_suffixes())}")
+        foreign = foreign_files(files)
+        what, hint = ("", _known_files()) if foreign is None else (f", but {foreign.what}", foreign.hint)
+        raise InputError(f"matches no scan file{what}", pattern, hint)
     return _open_frames(frames, Path(pattern).name, decided)
 
 
@@ -237,7 +247,7 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     by_kind: dict[str, list[Path]] = {}
     for file in files:
         kind = file.suffix.lower()
-        is_left_aside = file.name.startswith(".") or is_times_file(file.name)
+        is_left_aside = deciding_frames.is_no_scan(file.name) or is_times_file(file.name)
         if kind in known and not is_left_aside and os.path.isfile(file):
             by_kind.setdefault(kind, []).append(file)
     if by_kind.keys() - formats.NOTES:

@@ -22,6 +22,9 @@ from viewer.scan.times import natural_key
         ["f-2.ply", "f-1.ply", "f0.ply", "f1.ply", "f10.ply"],
         ["-1.ply", "0.ply", "1.ply"],
         ["scan-1.ply", "scan-2.ply", "scan-10.ply"],
+        ["t-1.ply", "t+0.ply", "t+1.ply"],
+        ["01.05.2024.ply", "15.05.2024.ply", "02.07.2024.ply"],
+        ["05-01-2024.ply", "05-31-2024.ply", "06-02-2024.ply"],
         ["0.04.ply", "0.2.ply", "1.5.ply"],
         ["a0.05.ply", "a0.125.ply", "a0.2.ply"],
         ["v1.2.ply", "v1.9.ply", "v1.10.ply"],  # versions
@@ -56,6 +59,8 @@ def test_a_name_is_split_at_its_last_number() -> None:
     assert numbered_name("take1_frame007.ply") == ("take1_frame", "007", ".ply")
     assert numbered_name("f-2.ply") == ("f-", "2", ".ply")
     assert numbered_name("f-2.ply", signed=True) == ("f", "-2", ".ply")
+    assert numbered_name("f12_cam1.ply") == ("f", "12", "_cam1.ply")
+    assert numbered_name("cam1_f12.ply") == ("cam1_f", "12", ".ply")
     assert numbered_name("reference.ply") is None
 
 
@@ -87,6 +92,11 @@ def test_frame_numbers(names: list[str], numbers: list[int] | None) -> None:
         (["2024-05-01.ply", "2024-05-02.ply"], True),
         (["2024-05-01_1.ply", "2024-05-01_2.ply"], False),
         (["00000001.ply", "00000002.ply"], False),
+        (["01.05.2024.ply", "15.05.2024.ply", "02.07.2024.ply"], True),
+        (["05-01-2024.ply", "05-31-2024.ply"], True),
+        (["2024-05.ply", "2024-06.ply"], True),
+        (["240501.ply", "240601.ply"], True),
+        (["240501.ply", "240502.ply"], False),  # may be frame numbers
         (["2024-05-01.ply"], False),
     ],
 )
@@ -117,6 +127,20 @@ def test_dates(names: list[str], dates: bool) -> None:
         (["shot1.0001.ply", "shot1.0011.ply"], None),  # a tenth of a millisecond is no step
         (["20240501.ply", "20240601.ply"], None),
         (["12-30-61.ply", "12-30-62.ply"], None),
+        (["20240501123001.ply", "20240501123003.ply"], [0, 2]),
+        (["20240501123001040.ply", "20240501123001120.ply"], [0, 0.08]),
+        (["1716383012_345678000.ply", "1716383013_012001000.ply"], [0, 0.666323]),
+        (["0001_1716383012345.ply", "0002_1716383012378.ply", "0003_1716383012512.ply"], [0, 0.033, 0.167]),
+        (["f_0ms.ply", "f_40ms.ply", "f_120ms.ply"], [0, 0.04, 0.12]),
+        (["t0us.ply", "t40000us.ply"], [0, 0.04]),
+        (["t0s.ply", "t1.5s.ply"], [0, 1.5]),
+        (["0,00.ply", "0,04.ply", "0,12.ply"], [0, 0.04, 0.12]),
+        (["t0p00.ply", "t0p04.ply", "t0p12.ply"], [0, 0.04, 0.12]),
+        (["12h30m01s.ply", "12h31m02s.ply"], [0, 61]),
+        (["00m59s.ply", "01m02s.ply"], [0, 3]),
+        (["f1_steps.ply", "f2_steps.ply"], None),
+        (["2024-05-01_12-30-01_001.ply", "2024-05-01_12-30-01_002.ply"], None),  # frames of one second
+        (["01.05.2024.ply", "15.05.2024.ply", "02.07.2024.ply"], None),
         (["a_9.5.ply", "a_0.75.ply"], None),
         (["1716383012345678.ply"], None),
         ([], None),

@@ -6,7 +6,7 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.reading.corrections import Corrections
-from viewer.scan.reading.frames import decide, message_of_files
+from viewer.scan.reading.frames import decide, is_no_scan, message_of_files
 
 FRAMES = ["f001.ply", "f002.ply", "f003.ply"]
 
@@ -18,6 +18,7 @@ FRAMES = ["f001.ply", "f002.ply", "f003.ply"]
         "f002 copy.ply", "f002 copie.ply", "f002_copy.ply", "Copy of f002.ply", "Kopie von f002.ply",
         "f002 (PC-7's conflicted copy 2024-05-01).ply", "f002 (Konfliktkopie).ply",
         "f002.sync-conflict-20240501-123456-ABCDEFG.ply", "f002~.ply", "f002.bak.ply",
+        "f002_old.ply", "f002 backup.ply", "f002-DESKTOP-AB12C.ply", "f002-PC7.ply",
     ],
 )  # fmt: skip
 def test_a_copy_is_left_aside(copy: str) -> None:
@@ -37,7 +38,7 @@ def test_a_copy_is_left_aside(copy: str) -> None:
         ["smile.ply", "frown.ply", "rest.ply", "open.ply"],
         ["f001.ply", "f002.ply", "reference.ply"],  # two frames are no pattern
         ["f1.ply", "f2.ply", "f3.ply", "a.ply", "b.ply", "c.ply"],
-        ["f1.ply", "f2.ply", "f3.ply", "mean2.ply"],
+        ["take1_1.ply", "take1_2.ply", "take1_3.ply", "take2_1.ply"],
     ],
 )
 def test_other_names_are_frames(names: list[str]) -> None:
@@ -47,11 +48,28 @@ def test_other_names_are_frames(names: list[str]) -> None:
     assert message_of_files(found) == ""
 
 
-@pytest.mark.parametrize("name", ["reference.ply", "mean.ply", "template.ply", "a.ply"])
+@pytest.mark.parametrize(
+    "name",
+    ["reference.ply", "mean.ply", "template.ply", "a.ply", "mean2.ply", "neutral_000.ply", "f001-003.ply"],
+)
 def test_a_file_without_a_number_among_numbered_ones_is_no_frame(name: str) -> None:
     found = decide([name, *FRAMES])
     assert found.names == FRAMES
     assert [(row.file, row.why) for row in found.aside] == [(name, "reference")]
+
+
+def test_references_beside_several_takes_are_no_frames() -> None:
+    takes = [f"{take}_{frame}.ply" for take in "ab" for frame in (1, 2, 3)]
+    found = decide([*takes, "reference.ply"])
+    assert (found.names, [row.file for row in found.aside]) == (takes, ["reference.ply"])
+    named = ["mean.ply", "reference.ply", "template_all.ply"]
+    assert sorted(row.file for row in decide([*FRAMES, *named]).aside) == named
+
+
+@pytest.mark.parametrize("name", [".f1.ply", "._f1.ply", "~$f1.csv", "~f1.ply"])
+def test_hidden_files_and_lock_files_are_no_scans(name: str) -> None:
+    assert is_no_scan(name)
+    assert not is_no_scan(name.lstrip("._~$"))
 
 
 def test_a_user_chooses_by_a_pattern() -> None:

@@ -52,6 +52,16 @@ def test_takes_have_numbers_in_common() -> None:
     assert found == {"a_*.ply": ["a_1.ply", "a_2.ply", "a_10.ply"], "b_*.ply": ["b_1.ply", "b_2.ply"]}
 
 
+def test_cameras_and_times_since_1970_make_takes() -> None:
+    cameras = [f"f{frame}_cam{camera}.ply" for frame in (1, 2, 3) for camera in (0, 1)]
+    found = takes_in(cameras)
+    assert [*found] == ["f*_cam0.ply", "f*_cam1.ply"]
+    assert found["f*_cam0.ply"] == ["f1_cam0.ply", "f2_cam0.ply", "f3_cam0.ply"]
+    assert len(takes_in([f"{take}_{1716383012310 + at}.ply" for at, take in enumerate("aaabbb")])) == 2
+    clocks = [f"20240501_{clock}_00{frame}.ply" for clock in (123001, 140000) for frame in (1, 2, 3)]
+    assert [*takes_in(clocks)] == ["20240501_123001_*.ply", "20240501_140000_*.ply"]
+
+
 def test_the_first_take_opens_and_the_message_names_all() -> None:
     takes = decide(TAKES)
     assert takes.names == TAKES[:3]

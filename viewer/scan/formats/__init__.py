@@ -44,7 +44,7 @@ from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
 from ..reading.axes import note_turned
 from ..reading.cloud import assemble
-from ..reading.hints import hint_for
+from ..reading.hints import hint_for, hinted_suffix
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
 from ..reading.textures import paint
@@ -320,7 +320,9 @@ def _readable(path: Path) -> ModuleType:
         )
     suffix = path.suffix.lower()
     if suffix not in _formats():
-        hint = hint_for(suffix, known_suffixes())  # a suffix that is close is another format
+        hint = hint_for(
+            hinted_suffix(path.name), known_suffixes()
+        )  # a suffix that is close is another format
         raise InputError(f"unknown file suffix '{shortened(suffix)}'", path, hint)
     if status.st_size == 0:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")

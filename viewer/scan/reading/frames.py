@@ -6,6 +6,7 @@ import os
 import re
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
+from pathlib import Path
 from typing import NamedTuple
 
 from ...errors import InputError, shortened
@@ -15,7 +16,12 @@ from .record import Aside, Decision
 
 KEY = "frames"
 _LEAST = 3  # frames of one pattern, beside which other files are no frames
-_MOST_REFERENCES = 2
+_MOST_REFERENCES = 2  # unless their names say what they are:
+_REFERENCE = re.compile(
+    r"(?:^|[^a-z])(?:ref|reference|referenz|mean|average|template|base|model|merged|all)(?:[^a-z]|$)",
+    re.IGNORECASE,
+)
+_NO_SCANS = (".", "~")  # hidden files, and the lock files of other programs, begin so
 _ALL = "*"
 LIST = ";"  # between the files that a correction lists, in the order in which they play
 
@@ -28,7 +34,8 @@ _COPIES = tuple(
         rf"(?:{_WORDS})(?: of| von| de| di)? (?P<base>.+)",
         r"(?P<base>.+?) ?\([^()]*(?:conflict|konflikt|conflit|conflicto)[^()]*\)",
         r"(?P<base>.+?)\.sync-conflict-[0-9]{8}-[0-9]{6}(?:-[A-Z0-9]+)?",
-        r"(?P<base>.+?)(?:~|\.bak|\.orig|\.backup)",
+        r"(?P<base>.+?)(?:~|\.bak|\.orig|\.backup|[ _-](?:old|bak|backup|orig))",
+        r"(?P<base>.+?)-(?-i:[A-Z][A-Z0-9]*[0-9-][A-Z0-9-]*)",
     )
 )
 
@@ -59,13 +66,30 @@ def copied_names(names: Sequence[str]) -> dict[str, str]:
     return found if len(there) - len(found) >= 2 else {}
 
 
+def is_no_scan(name: str) -> bool:
+    """Whether a file is hidden, or a lock file of another program, such as `~$f1.csv`."""
+    return name.startswith(_NO_SCANS)
+
+
 def references_in(names: Sequence[str]) -> list[str]:
-    """Names of one or two files without a number, where three or more others share a numbered pattern."""
-    numbered = [numbered_name(name) for name in names]
-    patterns = {(found.before, found.after) for found in numbered if found is not None}
-    odd = [name for name, found in zip(names, numbered, strict=True) if found is None]
-    is_one = len(patterns) == 1 and len(names) - len(odd) >= _LEAST
-    return odd if is_one and 1 <= len(odd) <= _MOST_REFERENCES else []
+    """Names of one or two files without the number of a frame, or with a name of their own before it, where
+    all others share numbered patterns, one of them three or more."""
+    groups: dict[tuple[str, str] | None, list[str]] = {}
+    for name in names:
+        found = numbered_name(name)
+        groups.setdefault(None if found is None else (found.before, found.after), []).append(name)
+    large = {group for group, found in groups.items() if group is not None and len(found) > 1}
+    odd = [name for group, found in groups.items() if group not in large for name in found]
+    texts = {_without_digits(name) for group in large for name in groups[group]}
+    largest = max((len(groups[group]) for group in large), default=0)
+    if largest < _LEAST or any(_without_digits(name) in texts for name in odd):  # which number is which?
+        return []
+    is_named = all(_REFERENCE.search(Path(name).stem) for name in odd)
+    return odd if len(odd) <= _MOST_REFERENCES or is_named else []
+
+
+def _without_digits(name: str) -> str:
+    return re.sub("[0-9]+", "0", name)
 
 
 def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -> FrameFiles:

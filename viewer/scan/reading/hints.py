@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import NamedTuple
 
 _CLOUDCOMPARE = "Convert it into PLY with CloudCompare"
 _MESHLAB = "Convert it into PLY or OBJ with MeshLab or Blender"
@@ -11,6 +15,11 @@ _VOLUMES = "It holds a volume, no points. Make a surface of it in 3D Slicer, and
 _RECORDING = "It holds a recording. Export depth pictures and the camera of it into a folder with"
 _ARCHIVE = "It is an archive. Unpack it, and open the folder"
 _SPLATS = "It holds packed Gaussian splats. Convert it into PLY with SuperSplat"
+
+_DEPTH = "Scan4D reads depth from 16-bit PNG files with a camera.json beside them"
+_DICOM_AT, _DICOM = 128, b"DICM"  # the mark of DICOM files, which often have no suffix
+_LOOKED_AT = 4  # files without a suffix
+_PICTURES = {".png", ".jpg", ".jpeg", ".bmp"}
 
 _HINTS = {
     ".e57": ("E57", "Convert it with 'pdal translate FILE.e57 FILE.ply', or with CloudCompare"),
@@ -57,6 +66,41 @@ def hint_for(suffix: str, known: Iterable[str]) -> str:
         what, advice = _HINTS[suffix]
         return f"Scan4D does not read {what}. {advice}"
     return f"Known: {', '.join(known)}"
+
+
+class Foreign(NamedTuple):
+    """Files that Scan4D does not read. what: how many there are of which kind. hint: what to do with them."""
+
+    what: str
+    hint: str
+
+
+def foreign_files(files: Iterable[Path]) -> Foreign | None:
+    """The most frequent kind of files with a hint, by suffix, or by the mark of DICOM; None for none."""
+    visible = [file for file in files if not file.name.startswith((".", "~")) and file.is_file()]
+    counts = Counter(suffix for file in visible if (suffix := hinted_suffix(file.name)) in _HINTS)
+    bare = [file for file in visible if not file.suffix or file.suffix[1:].isdecimal()]
+    if not counts and any(map(_is_dicom, bare[:_LOOKED_AT])):
+        counts[".dcm"] = len(bare)
+    if not counts:
+        return None
+    suffix, count = counts.most_common(1)[0]
+    kind = "DICOM" if suffix == ".dcm" else suffix
+    hint = _DEPTH if suffix in _PICTURES else hint_for(suffix, ())
+    return Foreign(f"{count} {kind} file{'s' * (count > 1)}", hint)
+
+
+def hinted_suffix(name: str) -> str:
+    """The suffix in lower case that tells what a file is: ".nii" of "head.nii.gz"."""
+    path = Path(name.lower())
+    inner = Path(path.stem).suffix
+    return inner if path.suffix == ".gz" and inner in _HINTS else path.suffix
+
+
+def _is_dicom(file: Path) -> bool:
+    with suppress(OSError), file.open("rb") as stream:
+        return stream.read(_DICOM_AT + len(_DICOM))[_DICOM_AT:] == _DICOM
+    return False
 
 
 def hinted_suffixes() -> list[str]:

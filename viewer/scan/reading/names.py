@@ -11,16 +11,25 @@ from typing import NamedTuple
 
 from ..times import natural_key
 
-_SIGNED = re.compile(r"(-?[0-9]+)")
+_SIGNED = re.compile(r"([-+]?[0-9]+)")
 _DECIMALS = re.compile(r"([0-9]+(?:\.[0-9]+)?)")
 _DIGITS = re.compile(r"([0-9]+)")
 _LAST = re.compile(r"(.*?)([0-9]+)([^0-9]*)", re.DOTALL)
+_OF_CAMERA = re.compile(
+    r"(?:^|[^a-z])(?:cam|camera|kamera|view|kinect|sensor|device|pod|lod|side)[ _-]?$", re.IGNORECASE
+)
 _YEARS = 1990, 2100
 _EPOCHS = {10: 1.0, 13: 1e-3, 16: 1e-6, 19: 1e-9}  # digits of times since 1970 -> seconds of their unit
 _SHORTEST = 1 / 300  # seconds between frames, where decimals tell times
 _LONGEST = 10.0
 _LARGEST_STEP = 1000  # numbers further apart are no frame numbers
-_TIGHT = "-.:h"  # between hours and minutes: "_" stands between other numbers too
+_JOINED_CLOCK = re.compile(r"(?<![0-9])([0-9]{8})([0-9]{6})([0-9]{3}|[0-9]{6})?(?![0-9])")
+_SPLIT_STAMP = re.compile(r"(?<![0-9])([0-9]{10})[-_.]([0-9]{9}|[0-9]{6}|[0-9]{3})(?![0-9])")
+_DECIMAL_MARK = re.compile(r"(?<=[0-9])(?:,|(?<=[^0-9]0)p)(?=[0-9])|(?<=^0)p(?=[0-9])")
+_UNIT = re.compile(r"[ _]?(s|sec|ms|us|µs|ns)(?![a-zäöüß])", re.IGNORECASE)
+_SECONDS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
+_SPAN = re.compile(r"(?:(\d+)h)?(\d+)m(\d+)s", re.ASCII)
+_TIGHT = "-.:hm"  # between hours and minutes: "_" stands between other numbers too
 
 
 def has_signs(names: Sequence[str]) -> bool:
@@ -35,6 +44,8 @@ def has_signs(names: Sequence[str]) -> bool:
 
 def in_order(names: Sequence[str]) -> list[str]:
     """Names as a person would sort them: 2 before 10, and -1 before 0 where a minus is a sign."""
+    if (days := _days_last_year(names)) is not None:  # 15.05.2024 before 02.07.2024
+        return sorted(names, key=lambda name: (days[name], name))
     if _are_unequal_decimals(names):  # 0.04 before 0.2
         return sorted(names, key=lambda name: Decimal(_DECIMALS.search(name)[1]))  # type: ignore[index]
     if not has_signs(names):
@@ -75,23 +86,51 @@ class Numbered(NamedTuple):
 
 
 def numbered_name(name: str, signed: bool = False) -> Numbered | None:
-    """The name split at its last number; None where it has none. signed: whether a minus is a sign."""
+    """The name split at the number of its frame; None where it has none. signed: whether a minus is a sign.
+
+    That is the last number, or the one before where the last one is of a camera: `frame12_cam1.ply`.
+    """
     match = _LAST.fullmatch(name)
     if match is None:
         return None
     before, digits, after = match.groups()
-    if signed and before.endswith("-"):
-        before, digits = before[:-1], f"-{digits}"
+    if _OF_CAMERA.search(before) and (inner := _LAST.fullmatch(before)) is not None:
+        before, digits, after = inner[1], inner[2], inner[3] + digits + after
+    if signed and before.endswith(("-", "+")):
+        before, digits = before[:-1], before[-1] + digits
     return Numbered(before, digits, after)
 
 
+def _days_last_year(names: Sequence[str]) -> dict[str, datetime] | None:
+    """The day of each name, where all have one with the year behind: 31.05.2024, or 05-31-2024; else None."""
+    rows = [_DIGITS.split(name) for name in names]
+    if not rows or len({tuple(row[::2]) for row in rows}) != 1:
+        return None
+    columns = list(zip(*(row[1::2] for row in rows), strict=True))
+    for start in range(len(columns) - 2):
+        days = list(zip(*columns[start : start + 3], strict=True))
+        is_alone = all(len(set(c)) == 1 for at, c in enumerate(columns) if not start <= at < start + 3)
+        if not is_alone or not all(len(a) <= 2 and len(b) <= 2 and len(year) == 4 for a, b, year in days):
+            continue
+        for day, month in ((0, 1), (1, 0)):
+            moments = [_moment([one[2], one[month], one[day]], []) for one in days]
+            known = [moment for moment in moments if moment is not None]
+            if len(known) == len(names):
+                return dict(zip(names, known, strict=True))
+    return None
+
+
 def is_date(digits: str) -> bool:
-    """Whether 8 digits are a day, year first."""
+    """Whether 8 digits are a day, year first, or 6 digits, which lack the century."""
+    if len(digits) == 6:
+        digits = f"20{digits}"
     return len(digits) == 8 and _moment([digits[:4], digits[4:6], digits[6:]], []) is not None
 
 
 def are_dates(names: Sequence[str]) -> bool:
-    """Whether all numbers that differ among names are those of a day, such as 20240501 or 2024-05-01."""
+    """Whether all numbers that differ among names are those of a day: 20240501, 2024-05-01 or 01.05.2024."""
+    if len(names) > 1 and _days_last_year(names) is not None:
+        return True
     rows = [_DIGITS.split(name) for name in names]
     if len({tuple(row[::2]) for row in rows}) != 1:
         return False
@@ -99,7 +138,13 @@ def are_dates(names: Sequence[str]) -> bool:
     changing = {number for number, column in enumerate(columns) if len(set(column)) > 1}
     for start, column in enumerate(columns):
         if changing == {start}:
-            return all(map(is_date, column))
+            is_month = start and all(_moment([year, month, "1"], []) for year, month in
+                                     zip(columns[start - 1], column, strict=True)
+                                     if len(year) == 4 and len(month) == 2)  # fmt: skip
+            if is_month and {*map(len, columns[start - 1])} == {4} and {*map(len, column)} == {2}:
+                return start + 1 == len(columns)
+            is_short = len(column[0]) == 6  # days of one month may as well be frame numbers
+            return all(map(is_date, column)) and not (is_short and len({day[:4] for day in column}) == 1)
         days = columns[start : start + 3]
         within = changing <= {start, start + 1, start + 2}
         if len(days) == 3 and within and all(_moment(list(day), []) for day in zip(*days, strict=True)):
@@ -110,9 +155,10 @@ def are_dates(names: Sequence[str]) -> bool:
 def stamped_seconds(names: Sequence[str]) -> list[float] | None:
     """Seconds from the first frame on where the names are real times: times since 1970, decimal seconds, or a
     clock with or without a date. None where they are not, or do not increase."""
-    if len(names) < 2:
+    if len(names) < 2 or are_dates(names):
         return None
-    for find in (_since_1970, _decimal_seconds, _clock_seconds):
+    names = [_plain_stamps(name) for name in names]
+    for find in (_since_1970, _seconds_with_unit, _decimal_seconds, _clock_seconds):
         found = find(names)
         if found is not None:
             return found if all(before < after for before, after in pairwise(found)) else None
@@ -152,19 +198,62 @@ def small_stamps(names: Sequence[str]) -> list[float] | None:
     return None if unit is None else [(number - numbers[0]) * unit for number in numbers]
 
 
-def _since_1970(names: Sequence[str]) -> list[float] | None:
-    columns = varying(names, _DIGITS)
-    if columns is None or len(columns) != 1 or len({*map(len, columns[0])}) != 1:
-        return None
-    digits = columns[0]
-    unit = _EPOCHS.get(len(digits[0]))
-    if unit is None or not all(text.isdecimal() for text in digits):
-        return None
+def _plain_stamps(name: str) -> str:
+    """A name with its times apart: 20240501_123001 for 20240501123001, one number for seconds and their part,
+    and a decimal point for a comma."""
+    name = _JOINED_CLOCK.sub(_apart, name)
+    name = _SPLIT_STAMP.sub(lambda match: match[1] + match[2] if is_epoch(match[1]) else match[0], name)
+    return _DECIMAL_MARK.sub(".", name)
+
+
+def _apart(match: re.Match[str]) -> str:
+    date, clock, part = match.groups()
+    known = _moment([date[:4], date[4:6], date[6:]], [clock[:2], clock[2:4], clock[4:]]) is not None
+    return "_".join(filter(None, (date, clock, part))) if known else match[0]
+
+
+def is_epoch(digits: str) -> bool:
+    """Whether digits are a time since 1970 in seconds, milli-, micro- or nanoseconds."""
+    unit = _EPOCHS.get(len(digits)) if digits.isdecimal() else None
     low, high = (datetime(year, 1, 1).timestamp() for year in _YEARS)
-    numbers = [int(text) for text in digits]
-    if not all(low <= number * unit <= high for number in numbers):
+    return unit is not None and low <= int(digits) * unit <= high
+
+
+def _since_1970(names: Sequence[str]) -> list[float] | None:
+    columns = varying(names, _DIGITS) or []
+    stamps = [column for column in columns if all(map(is_epoch, column)) and len({*map(len, column)}) == 1]
+    others = [column for column in columns if column not in stamps]
+    if len(stamps) != 1 or not all(map(_is_counter, others)):
         return None
-    return [(number - numbers[0]) * unit for number in numbers]
+    numbers = [int(text) for text in stamps[0]]
+    return [(number - numbers[0]) * _EPOCHS[len(stamps[0][0])] for number in numbers]
+
+
+def _is_counter(column: Sequence[str]) -> bool:
+    """Whether a part of names counts up by 1."""
+    if not all(text.isdecimal() for text in column):
+        return False
+    return {int(after) - int(before) for before, after in pairwise(column)} == {1}
+
+
+def _seconds_with_unit(names: Sequence[str]) -> list[float] | None:
+    """Seconds of names with "40ms", "0.04s" or "01m30s"."""
+    spans = [_SPAN.search(name) for name in names]
+    if all(spans):
+        parts = [[int(part or 0) for part in span.groups()] for span in spans if span is not None]
+        seconds = [3600.0 * hours + 60 * minutes + second for hours, minutes, second in parts]
+        return [second - seconds[0] for second in seconds]
+    rows = [_DECIMALS.split(name) for name in names]
+    if len({len(row) for row in rows}) != 1:
+        return None
+    changing = [at for at, column in enumerate(zip(*rows, strict=True)) if len({*column}) > 1]
+    if len(changing) != 1 or changing[0] % 2 == 0:
+        return None
+    unit = _UNIT.match(rows[0][changing[0] + 1])
+    if unit is None:
+        return None
+    stamps = [Decimal(row[changing[0]]) for row in rows]
+    return [float(stamp - stamps[0]) * _SECONDS[unit[1].lower()] for stamp in stamps]
 
 
 def _decimal_seconds(names: Sequence[str]) -> list[float] | None:
@@ -179,8 +268,11 @@ def _decimal_seconds(names: Sequence[str]) -> list[float] | None:
         return None  # "take1.01", "take1.02": a number of the take and one of the frame
     stamps = [Decimal(text) for text in columns[0]]
     seconds = [float(stamp - stamps[0]) for stamp in stamps]
-    middle = sorted(after - before for before, after in pairwise(seconds))[len(seconds) // 2 - 1]
-    return seconds if middle >= _SHORTEST else None
+    return seconds if _typical_step(seconds) >= _SHORTEST else None
+
+
+def _typical_step(seconds: Sequence[float]) -> float:
+    return sorted(after - before for before, after in pairwise(seconds))[len(seconds) // 2 - 1]
 
 
 def _clock_seconds(names: Sequence[str]) -> list[float] | None:
@@ -202,7 +294,8 @@ def _clock_seconds(names: Sequence[str]) -> list[float] | None:
             moments = [form.moment([row[1::2][number] for number in form.all]) for row in rows]
             known = [moment for moment in moments if moment is not None]
             if len(known) == len(moments):
-                return [(moment - known[0]).total_seconds() for moment in known]
+                seconds = [(moment - known[0]).total_seconds() for moment in known]
+                return None if form.part and _typical_step(seconds) < _SHORTEST else seconds
     return None
 
 

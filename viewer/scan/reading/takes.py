@@ -11,7 +11,7 @@ from ...errors import InputError, shortened
 from ..times import TIMES_FILE
 from . import frames, times
 from .corrections import NOTHING_CORRECTED, Corrections
-from .names import are_dates, has_signs, in_order, numbered_name, stamped_seconds
+from .names import are_dates, has_signs, in_order, is_epoch, numbered_name, stamped_seconds
 from .record import Aside, Decision, Take
 
 KEY = "take"
@@ -36,8 +36,9 @@ class Takes(NamedTuple):
 def takes_in(names: Sequence[str]) -> dict[str, list[str]]:
     """Pattern -> names in order, where names are of several scans; empty where they are of one.
 
-    The frames of a take differ in the last number of their names alone. Takes have numbers in common, as
-    frames that count on from take to take are one scan. Dates and clock times are no numbers of frames.
+    The frames of a take differ in the number of the frame alone, see `numbered_name`. Takes have numbers in
+    common, as frames that count on from take to take are one scan; or their numbers are times since 1970.
+    Dates and clock times are no numbers of frames.
     """
     signed, ordered = has_signs(names), in_order(names)
     groups: dict[tuple[str, str], list[str]] = {}
@@ -52,7 +53,8 @@ def takes_in(names: Sequence[str]) -> dict[str, list[str]]:
     first, *others = numbers.values() or [set()]
     if not others or any(len(found) < _LEAST for found in groups.values()):
         return {}
-    if not all(first & other for other in others):
+    are_stamps = all(is_epoch(str(number)) for found in numbers.values() for number in found)
+    if not are_stamps and not all(first & other for other in others):
         return {}
     if are_dates(ordered) or stamped_seconds(ordered) is not None:
         return {}
