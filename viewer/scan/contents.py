@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,15 @@ class ArrayInFile(Protocol):
 
     def read(self, frame: int | None = None) -> NDArray:
         """The whole array, or one entry along its first axis. Raises InputError."""
+
+    def memory(self, frame: int | None = None) -> int:
+        """Bytes that `read` takes."""
+
+    def reshaped(self, shape: tuple[int, ...]) -> Self:
+        """Return the same values in another shape, which has the same axes but for those of length 1."""
+
+    def with_last(self, axis: int) -> Self:
+        """Return the same values with an axis, the second or third one from the end, moved to the end."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..files import printable
 from . import formats
-from .contents import PointContents
 from .faces import Faces
 from .points import PointCloud
 from .pose import Scanned
@@ -67,7 +66,7 @@ class FileSequence:
 
     def __init__(self, paths: Sequence[Path], name: str, decided: Decided | None = None) -> None:
         self.decided = decided or Decided()
-        self.decided.samples = self._samples
+        self.decided.other_colors = self._other_colors
         self.name = printable(name)
         self.files = tuple(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))
@@ -140,12 +139,11 @@ class FileSequence:
             mesh = None
         return (len(mesh) + mesh.dropped, mesh.topology) if mesh else (0, None)
 
-    def _samples(self) -> Iterator[PointContents]:
-        """The contents of some frames, spread evenly, for decisions that one frame leaves uncertain."""
-        last = len(self) - 1
-        for index in sorted({round(last * step / _SAMPLES) for step in range(_SAMPLES + 1)}):
+    def _other_colors(self) -> Iterator[NDArray]:
+        """The colours of some frames as stored."""
+        for index in _spread(len(self)):
             with suppress(InputError):
-                found = formats.contents(self.files[index], 0, self.decided.at(index))
+                found = formats.read_colors(self.files[index], 0, self.decided.at(index))
                 if found is not None:
                     yield found
 
@@ -166,6 +164,7 @@ class MultiFrameFile:
         self._path = path
         self._count = count
         self._read = formats.frames(path, self.decided)
+        self.decided.other_colors = self._other_colors
 
     @cached_property
     def unit(self) -> str | None:
@@ -185,3 +184,16 @@ class MultiFrameFile:
 
     def faces(self, index: int) -> Faces:
         return formats.read_faces(self._path, index, self.decided.at(index))
+
+    def _other_colors(self) -> Iterator[NDArray]:
+        """The colours of some frames as stored."""
+        for index in _spread(len(self)):
+            with suppress(InputError):
+                found = formats.read_colors(self._path, index, self.decided.at(index))
+                if found is not None:
+                    yield found
+
+
+def _spread(count: int) -> list[int]:
+    """Some of so many frames, spread evenly, the first and the last one among them."""
+    return sorted({round((count - 1) * step / _SAMPLES) for step in range(_SAMPLES + 1)})

@@ -145,6 +145,122 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
     assert view.unit == "units"
 
 
+K = np.array([[30, 0, 15.5], [0, 30, 11.5], [0, 0, 1.0]])
+DEPTH = (1 + np.add.outer(np.arange(24), np.arange(32)) / 100).astype(np.float32)
+DEPTHS = np.stack([DEPTH, DEPTH + 1, DEPTH + 2])
+POSES = np.tile(np.eye(4), (3, 1, 1))
+POSES[:, 0, 3] = 0, 1, 2
+RED = np.zeros((24, 32, 3), np.uint8)
+RED[..., 0] = 255
+OTHER_K = K * [[0.5], [0.5], [1]]
+
+
+@pytest.mark.parametrize(
+    "arrays",
+    [
+        {"depth": DEPTHS, "intrinsics": K},
+        {"depth": DEPTHS, "K": np.stack([OTHER_K, OTHER_K, K])},
+        {"depth": DEPTHS, "K": np.stack([OTHER_K.T, OTHER_K.T, K.T])},
+        {"depths": DEPTHS, "intrinsic": np.stack([K] * 3)},
+        {"Depth": DEPTHS, "camera_matrix": K},
+        {"depth_map": DEPTHS[..., None], "cam_K": K.ravel()},
+        {"depth": DEPTHS[:, None], "intrinsics": np.array([30, 30, 15.5, 11.5])},
+        {"depth": DEPTHS[None, ..., None], "intrinsic": np.stack([K] * 3)[None]},
+        {"depth": DEPTHS, "intrinsics": np.array([[60, 60, 9, 9], [60, 60, 9, 9], [30, 30, 15.5, 11.5]])},
+        {"depth": DEPTHS, "fx": np.full(3, 30), "fy": 30, "cx": np.full((3, 1), 15.5), "cy": 11.5},
+        {"depth": DEPTHS, "K": K * [[2], [2], [1]] + [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]]}
+        | {"width": 64, "height": 48},
+        {"depth": (DEPTHS * 1000).astype(">u2"), "K": K, "depth_scale": 0.001},
+        {"depth": np.asfortranarray(DEPTHS), "K": np.asfortranarray(K)},
+    ],
+)
+def test_depths_of_several_frames(arrays: dict[str, np.ndarray], path: Path) -> None:
+    """Cameras are one of all frames or one a frame, under the names of other programs."""
+    np.savez(path, **arrays)
+    with open_scan(path) as scan:
+        assert len(scan) == 3
+        (view,) = scan.pose(2).views
+        assert scan.reading["camera"].source == "file"
+    assert (view.fx, view.fy, view.cx, view.cy) == (30, 30, 16, 12)
+    assert view.depth == pytest.approx(DEPTHS[2], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "poses", "x"),
+    [
+        *[(name, POSES, 2) for name in ("pose", "poses", "cam2world", "c2w", "cam_c2w", "camera_to_world")],
+        *[(name, POSES, -2) for name in ("w2c", "extrinsics", "world_to_camera")],
+        ("extrinsic", POSES[:, :3], -2),
+        ("extrinsic", POSES[None, :, :3], -2),
+        ("pose", POSES[1], 1),
+    ],
+)
+def test_poses_of_several_frames(name: str, poses: np.ndarray, x: float, path: Path) -> None:
+    np.savez(path, depth=DEPTHS, K=K, **{name: poses})
+    with open_scan(path) as scan:
+        assert scan.pose(2).views[0].eye.tolist() == pytest.approx([x, 0, 0])
+
+
+@pytest.mark.parametrize(
+    "colors",
+    [
+        {"color": RED},
+        {"rgb": np.stack([RED] * 3)},
+        {"images": np.stack([RED] * 3).transpose(0, 3, 1, 2)},
+        {"images": np.stack([RED / 255] * 3)[None]},
+        {"images": np.stack([RED.repeat(2, 0).repeat(2, 1)] * 3)},
+    ],
+)
+def test_partners_of_several_frames(colors: dict[str, np.ndarray], path: Path) -> None:
+    """Colours may have another size and their channels in front; times are those of points."""
+    mask = np.tile(np.arange(32) < 16, (3, 24, 1))
+    np.savez(path, depth=DEPTHS, K=K, **colors, mask=mask, depth_conf=DEPTHS, fps=50)
+    with open_scan(path) as scan:
+        assert scan.times.tolist() == pytest.approx([0, 0.02, 0.04])
+        (view,) = scan.pose(1).views
+    assert np.array_equal(view.color, RED)
+    assert np.array_equal(view.mask, mask[0])
+    assert np.array_equal(view.confidence, DEPTHS[1])
+
+
+def test_colours_of_another_shape_are_left_out_and_told(path: Path) -> None:
+    np.savez(path, depth=DEPTH, K=K, color=np.zeros((40, 90, 3), np.uint8))
+    with open_scan(path) as scan:
+        assert scan.pose(0).views[0].color is None
+        assert [one.text for one in scan.messages] == [
+            "Scan4D leaves out the colours: a picture has 90 x 40 pixels, but its depth picture has 32 x 24"
+        ]
+        assert scan.reading.unused
+
+
+@pytest.mark.parametrize(
+    ("arrays", "reason"),
+    [
+        ({"K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]}, "principal point 319.5, 239.5 of its camera"),
+        ({"K": K, "width": 64, "height": 36}, "its camera is for 64 x 36, the picture has 32 x 24"),
+    ],
+)
+def test_cameras_of_another_picture(arrays: dict[str, object], reason: str, path: Path) -> None:
+    np.savez(path, depth=DEPTH, **arrays)
+    with pytest.raises(InputError, match=reason):
+        formats.read(path)
+
+
+def test_points_count_more_than_depth_without_a_camera(path: Path) -> None:
+    """Point maps of networks have depths beside them, and all of them an axis of length 1 in front."""
+    points = np.stack([np.dstack([*np.indices((24, 32)), depth]) for depth in DEPTHS])
+    arrays = {"world_points": points[None], "depth": DEPTHS[None, ..., None]}
+    np.savez(path, **arrays, images=np.full((1, 3, 3, 24, 32), 0.5))
+    with open_scan(path) as scan:
+        assert len(scan) == 3
+        cloud = scan.pose(1).cloud
+        assert len(cloud) == 768
+        assert np.unique(cloud.colors[:, :3]).tolist() == [128]
+    np.savez(path, **arrays, intrinsic=K)
+    with open_scan(path) as scan:
+        assert scan.pose(1).views[0].fx == 30
+
+
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
@@ -156,24 +272,26 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
         ({"xyz": np.full((9, 9, 3), np.nan)}, "has only 0 points, too few for a surface"),
         ({"xyz": np.ones((9, 9, 3))}, "its points lie along a line"),
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 3))}, r"\(2, 3\), but 'depth' has shape \(2, 2\)"),
-        ({"depth": np.ones((2, 2)), "mask": np.ones((2, 2, 1))}, r"'mask' has shape \(2, 2, 1\)"),
         ({"depth": np.ones((2, 2)), "color": np.ones((2, 2, 2))}, r"array 'color' has shape \(2, 2, 2\)"),
         ({"depth": np.full((2, 2), "a")}, "array 'depth' is of type <U1, expected numbers"),
         ({"depth": np.full((2, 2), None)}, "'depth' is of type object|pickled"),
-        ({"depth": np.ones((2, 2)), "fx": 3}, "its calibration lacks fy, cx, cy"),
-        ({"depth": np.ones((2, 2)), "kind": "height"}, "its calibration lacks fx, fy, cx, cy"),
+        ({"depth": np.ones((2, 2)), "fx": 3}, "is not a calibration: it lacks fy, cx, cy"),
+        ({"depth": np.ones((2, 2)), "kind": "height"}, "is not a calibration: it lacks fx, fy, cx, cy"),
         ({"depth": np.ones((2, 2)), "kind": "far"}, "unknown kind of depth 'far'"),
         ({"depth": np.ones((2, 2)), "kind": 3}, r"array 'kind' is \(\) int64, expected a word"),
         ({"depth": np.ones((2, 2)), "depth_scale": 0}, "its depth_scale is 0"),
         (
             {"depth": np.ones((2, 2)), "depth_scale": np.ones(2)},
-            "'depth_scale' is .2,. float64, expected 1",
+            "is not a calibration: depth_scale is",
         ),
         (
-            {"depth": np.ones((2, 2)), "intrinsics": np.eye(4)},
-            "'intrinsics' is .4, 4. float64, expected 9",
+            {"depth": np.ones((2, 2)), "intrinsics": np.eye(2)},
+            "its matrix has shape .2, 2., expected 9 numbers",
         ),
-        ({"depth": np.ones((2, 2)), "intrinsics": np.zeros((3, 3))}, "calibration cannot be used: fx 0"),
+        (
+            {"depth": np.ones((2, 2)), "intrinsics": np.zeros((3, 3))},
+            "is not a calibration: fx is 0 and fy 0",
+        ),
         ({"depth": np.ones((2, 2)), "pose": np.eye(3)}, "'pose' is .3, 3. float64, expected 16 numbers"),
         ({"depth": np.ones((2, 2)), "pose": 2 * np.eye(4)}, "its pose is not a rotation and a translation"),
         ({"depth": np.ones((2, 2)), "world_to_camera": np.zeros((4, 4))}, "its pose is not a rotation"),
@@ -181,7 +299,10 @@ def test_a_terrain_by_its_cells(path: Path) -> None:
             {"depth": np.ones((2, 2)), "distortion": np.ones(2000)},
             "'distortion' is .2000,. float64",
         ),
-        ({"depth": np.ones((2, 2)), "distortion": np.ones(3)}, "expected the numbers k1 k2 p1 p2"),
+        (
+            {"depth": np.ones((2, 2)), "distortion": np.ones(3)},
+            "has 3 coefficients of distortion, expected 4, 5 or 8",
+        ),
         ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add dx and dy"),
         ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "its cells have the unusable size 0 x -1"),
         (

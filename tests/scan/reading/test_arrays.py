@@ -192,3 +192,29 @@ def test_an_archive_without_points_lists_its_arrays(tmp_path: Path) -> None:
         open_scan(save(tmp_path, ".npz", np.ones((4, 3)), "corners"))
     assert "only: corners (4, 3)" in str(caught.value)
     assert "(H, W, 3)" in str(caught.value)
+
+
+@pytest.mark.parametrize("suffix", [".npy", ".npz"])
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("dtype", ["<f8", ">f4"])
+def test_coordinates_in_front_of_the_points(tmp_path: Path, suffix: str, order: str, dtype: str) -> None:
+    path = tmp_path / f"scan{suffix}"
+
+    def opened(values: NDArray) -> tuple[int, NDArray, str]:
+        stored = np.array(values, dtype, order=order)
+        np.save(path, stored) if suffix == ".npy" else np.savez(path, pts3d=stored)
+        with open_scan(path) as scan:
+            return len(scan), scan.pose(len(scan) - 1).cloud.world(), scan.reading["columns"].source
+
+    points = picture().astype(np.float32)
+    many = points.reshape(-1, 3)
+    frames, found, source = opened(many.T)
+    assert (frames, source) == (1, "assumed")
+    np.testing.assert_allclose(found, many)
+    frames, found, _ = opened(points.transpose(2, 0, 1))
+    assert frames == 1
+    np.testing.assert_allclose(found, many)
+    frames, found, _ = opened(np.stack([points, points + 1]).transpose(0, 3, 1, 2))
+    assert frames == 2
+    np.testing.assert_allclose(found, many + 1)
+    assert opened(many[:3])[0] == 1, "three points stay rows"

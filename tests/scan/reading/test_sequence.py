@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
+from numpy.typing import NDArray
 
 from viewer.scan.reading.corrections import Corrections
 from viewer.scan.reading.record import Aside, Decision
@@ -69,11 +72,58 @@ def test_hooks_of_readers_get_the_decisions_where_they_ask_for_them() -> None:
     assert ask(lambda path, decided: decided, Path("a"), decided=decided) is decided
 
 
-def test_frames_of_a_sequence_can_be_sampled(tmp_path: Path) -> None:
-    """Only formats that return contents give samples; others give none."""
-    from viewer.scan.open import find_source
+DARK, BRIGHT = (250, 200, 100), (40000, 20000, 10000)
 
-    for index in range(3):
-        np.save(tmp_path / f"f{index}.npy", np.zeros((4, 3), np.float32))
-    source = find_source(tmp_path)
-    assert all(contents.columns or contents.arrays for contents in source.decided.samples())  # type: ignore[attr-defined]
+
+def write_fields(path: Path, positions: NDArray, colors: NDArray) -> None:
+    names = ["x", "y", "z", "red", "green", "blue"]
+    fields = np.zeros(len(positions), [(name, "f4" if name in "xyz" else "u2") for name in names])
+    for name, values in zip(names, [*positions.T, *colors.T], strict=True):
+        fields[name] = values
+    np.save(path, fields)
+
+
+def write_archive(path: Path, positions: NDArray, colors: NDArray) -> None:
+    np.savez(path, positions=positions, colors=colors)
+
+
+def write_picture(path: Path, positions: NDArray, colors: NDArray) -> None:
+    """Depth pictures instead, of the same colours."""
+    shape = (*colors.shape[:-2], 2, 5, 3)
+    color = np.broadcast_to(colors[..., None, :1, :], shape)
+    np.savez(path, depth=np.ones(shape[:-1]), color=np.ascontiguousarray(color), fx=3, fy=3, cx=1, cy=1)
+
+
+@pytest.mark.parametrize("first", [DARK, BRIGHT])
+@pytest.mark.parametrize(
+    ("suffix", "write", "is_one_file"),
+    [
+        (".npy", write_fields, False),
+        (".npz", write_archive, False),
+        (".npz", write_archive, True),
+        (".npz", write_picture, False),
+        (".npz", write_picture, True),
+    ],
+)
+def test_a_dark_frame_of_arrays_does_not_decide(
+    tmp_path: Path,
+    suffix: str,
+    write: Callable[[Path, NDArray, NDArray], None],
+    is_one_file: bool,
+    first: tuple[int, int, int],
+) -> None:
+    """The colours of all frames have the scale of the brightest one, whichever frame is read first."""
+    from viewer.scan.open import open_scan
+
+    frames = [first, DARK, BRIGHT]
+    positions = np.arange(12.0).reshape(4, 3)
+    colors = np.array([[color] * 4 for color in frames], np.uint16)
+    if is_one_file:
+        write(tmp_path / f"all{suffix}", np.stack([positions] * 3), colors)
+    else:
+        for index in range(3):
+            write(tmp_path / f"f{index}{suffix}", positions, colors[index])
+    with open_scan(tmp_path / f"all{suffix}" if is_one_file else tmp_path) as scan:
+        found = [pose.cloud.colors[0, :3].tolist() for pose in scan]
+        assert (scan.reading["colors"].value, scan.reading["colors"].source) == (65535, "file")
+    assert found == [[1, 1, 0] if color == DARK else [156, 78, 39] for color in frames]

@@ -8,6 +8,7 @@ A format module declares
 - where a file can hold more than one moment: `frame_count(path) -> int`, from the header alone, and
   `read_times(path)` (seconds, (T,) float64, or None);
 - where it holds faces: `read_faces(path, frame=0) -> Iterator[Faces]`, in pieces, none where there are none;
+- where it has no `contents`: `read_colors(path, frame) -> NDArray`, colours as stored, or None;
 - where frames refer to others: `Frames(path)`, whose `read(frame)` remembers what the next one needs;
 - where it states the unit of length: `read_unit(path) -> str`, from the header alone;
 - where it can be written: `write(path, cloud)`, which may return a remark for the user, or
@@ -43,7 +44,7 @@ from ..points import PointCloud
 from ..pose import Pose, Scanned
 from ..range_view import RangeView, in_one_unit, merge
 from ..reading.axes import note_turned
-from ..reading.cloud import assemble
+from ..reading.cloud import assemble, stored_colors
 from ..reading.hints import hint_for, hinted_suffix
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
@@ -137,15 +138,16 @@ def read(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Sc
         return _scanned(module, path, frame, decided)
 
 
-def contents(path: Path | str, frame: int, decided: Decided) -> PointContents | None:
-    """Read what a file says of one moment of points; None for formats with `read`. Raises InputError."""
+def read_colors(path: Path | str, frame: int, decided: Decided) -> NDArray | None:
+    """The colours of one moment of points as stored, (N, C), of any type; None where the format or the file
+    has none. Raises InputError."""
     path = Path(path)
     module = _readable(path)
-    if not hasattr(module, "contents"):
-        return None
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        found = ask(module.contents, path, frame, decided=decided)
-        return found if isinstance(found, PointContents) else None
+        if hasattr(module, "read_colors"):
+            return ask(module.read_colors, path, frame, decided=decided)
+        found = ask(module.contents, path, frame, decided=decided) if hasattr(module, "contents") else None
+        return stored_colors(found) if isinstance(found, PointContents) else None
 
 
 def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scanned:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from threading import RLock
 from typing import IO
@@ -29,6 +29,7 @@ class StoredArray:
     """An array whose header is read and whose values are not.
 
     stream stands behind the header; size: bytes from there to the end, as the container says.
+    moved: which axis of the file, from the end, is the last one of `shape`: 2 or 3; 0: none is moved.
     """
 
     name: str
@@ -37,6 +38,7 @@ class StoredArray:
     dtype: np.dtype
     column_order: bool
     size: int
+    moved: int = 0
 
     @classmethod
     def open(cls, name: str, stream: IO[bytes], size: int) -> StoredArray:
@@ -62,13 +64,28 @@ class StoredArray:
         return array
 
     @property
+    def _is_whole(self) -> bool:
+        """Whether entries along the first axis do not lie one behind the other."""
+        return self.column_order or self.moved == len(self.shape)
+
+    @property
     def nbytes(self) -> int:
         """Bytes of all values."""
         return math.prod(self.shape) * self.dtype.itemsize
 
+    def reshaped(self, shape: tuple[int, ...]) -> StoredArray:
+        """Return the same values in another shape, which has the same axes but for those of length 1."""
+        return replace(self, shape=shape)
+
+    def with_last(self, axis: int) -> StoredArray:
+        """Return the same values with an axis, the second or third one from the end, moved to the end."""
+        shape = [*self.shape]
+        shape.append(shape.pop(-axis))
+        return replace(self, shape=tuple(shape), moved=axis)
+
     def memory(self, frame: int | None = None) -> int:
         """Bytes that `read` takes."""
-        is_part = frame is not None and not self.column_order
+        is_part = frame is not None and not self._is_whole
         return math.prod(self.shape[1:] if is_part else self.shape) * self.dtype.itemsize
 
     def read(self, frame: int | None = None) -> NDArray:
@@ -79,7 +96,7 @@ class StoredArray:
         self._check_type()
         if frame is None:
             return self._values(self.shape)
-        if self.column_order:
+        if self._is_whole:
             return self._values(self.shape)[frame].copy()
         shape = self.shape[1:]
         self.stream.seek(frame * math.prod(shape) * self.dtype.itemsize, 1)
@@ -89,7 +106,7 @@ class StoredArray:
         """The first entries along the first axis; `read` still works then. Raises InputError as `read`."""
         self._check_type()
         at = self.stream.tell()
-        whole = self.column_order or count >= self.shape[0]
+        whole = self._is_whole or count >= self.shape[0]
         values = self._values(self.shape if whole else (count, *self.shape[1:]))[:count]
         self.stream.seek(at)
         return values
@@ -99,6 +116,13 @@ class StoredArray:
             raise InputError(f"array '{self.name}' holds pickled objects, which are refused")
 
     def _values(self, shape: tuple[int, ...]) -> NDArray:
+        if not self.moved:
+            return self._as_stored(shape)
+        stored = [*shape]
+        stored.insert(len(shape) - self.moved, stored.pop())
+        return np.moveaxis(self._as_stored(tuple(stored)), -self.moved, -1)
+
+    def _as_stored(self, shape: tuple[int, ...]) -> NDArray:
         flat = np.empty(math.prod(shape) * self.dtype.itemsize, np.uint8)
         for start in range(0, flat.size, _CHUNK):
             part = flat[start : start + _CHUNK]

@@ -30,10 +30,25 @@ from ..contents import Deferred
 from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ..pose import Scanned
-from ..reading.arrays import PointArray, point_array, points_among, stated_times
-from ..reading.cloud import assemble, cloud_of
+from ..reading.arrays import (
+    PointArray,
+    as_points,
+    point_array,
+    points_among,
+    stated_times,
+    without_batch,
+)
+from ..reading.cloud import assemble, cloud_of, stored_colors
+from ..reading.range_arrays import (
+    COLORS,
+    RangeArrays,
+    as_picture,
+    image_source,
+    range_arrays,
+    states_a_camera,
+)
 from ..reading.sequence import Decided
-from ._array_views import makes_views, unit_of_arrays, view_of_arrays
+from ._array_views import colors_of_arrays, unit_of_arrays, view_of_arrays
 from ._columns import first_repeated
 from ._precision import within_decimals
 from ._stored import StoredArray, columns_of_array, rows_of_points
@@ -49,7 +64,6 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
     "radii": [()],
     "axes": [(4,)],
 }
-_ALSO_COLORS = ("color", "rgb", "images", "image")  # what other programs call them beside point maps
 _OF_ALL = {"origin", "times", "viewpoint"}
 _FORM = "Name points 'positions', (N, 3), (T, N, 3) or (H, W, 3), and range images 'depth', (H, W)"
 _SAVE_ANEW = "Save the arrays with numpy.savez"
@@ -67,30 +81,33 @@ _FAR = 16  # radii of the points from their origin, where float32 still tells a 
 
 def frame_count(path: Path, decided: Decided) -> int:
     """How many frames the points have; 1 for a range view."""
-    with opened(path) as stream, _arrays(stream) as arrays:
-        return 1 if _is_range_scan(arrays) else _points(arrays, decided).frames
+    with opened(path) as stream, _arrays(stream, decided) as arrays:
+        return found.frames if (found := _images(arrays)) else _points(arrays, decided).frames
 
 
 def read_unit(path: Path, decided: Decided) -> str | None:
     """The unit of a range view, or None."""
-    with opened(path) as stream, _arrays(stream) as arrays:
-        return unit_of_arrays(arrays, size_of(stream), decided) if _is_range_scan(arrays) else None
+    with opened(path) as stream, _arrays(stream, decided) as arrays:
+        return unit_of_arrays(found, size_of(stream), decided) if (found := _images(arrays)) else None
 
 
 def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
     """Seconds of the frames, (T,) float64, of an array of times, a rate or a step; or None."""
-    with opened(path) as stream, _arrays(stream) as arrays:
-        if _is_range_scan(arrays) or not (points := _points(arrays, decided)).sequence:
+    with opened(path) as stream, _arrays(stream, decided) as arrays:
+        images = _images(arrays)
+        points = None if images else _points(arrays, decided)
+        frames = images.frames if images else points.frames if points and points.sequence else 1
+        if frames == 1 and images:
             return None
-        stated = stated_times(arrays, points.frames)
+        stated = stated_times(arrays, frames)
         return None if stated is None else stated[0]
 
 
 def read(path: Path, frame: int, decided: Decided) -> Scanned:
     """One frame; it reads no array that is not needed, and no other frame. Raises InputError."""
-    with opened(path) as stream, _arrays(stream) as arrays:
-        if _is_range_scan(arrays):
-            return (view_of_arrays(arrays, size_of(stream), decided),)
+    with opened(path) as stream, _arrays(stream, decided) as arrays:
+        if (images := _images(arrays)) is not None:
+            return (view_of_arrays(images, size_of(stream), frame, decided),)
         points, held, array = _points(arrays, decided), size_of(stream), arrays["positions"]
         if array.dtype.names is not None or array.shape[-1] != 3:
             admit(held, array.memory())
@@ -121,6 +138,24 @@ def read(path: Path, frame: int, decided: Decided) -> Scanned:
         if "viewpoint" in arrays and arrays["viewpoint"].shape == (3,):
             cloud = replace(cloud, viewpoint=_vector(arrays["viewpoint"], 3))
         return with_topology(cloud, _faces(arrays, held, cloud.nbytes))
+
+
+def read_colors(path: Path, frame: int, decided: Decided) -> NDArray | None:
+    """The colours of a frame as stored, (N, C), or None. Raises InputError."""
+    with opened(path) as stream, _arrays(stream, decided) as arrays:
+        held = size_of(stream)
+        if (images := _images(arrays)) is not None:
+            return colors_of_arrays(images, frame)
+        points, array = _points(arrays, decided), arrays["positions"]
+        if array.dtype.names is not None or array.shape[-1] != 3:
+            admit(held, array.memory())
+            return stored_colors(columns_of_array(array.read(), held, decided))
+        shares = _shares(arrays, points, frame)
+        if "colors" not in shares:
+            return None
+        stored = arrays["colors"]
+        admit(held, stored.memory(shares["colors"]))
+        return stored.read(shares["colors"]).reshape(points.count, -1)
 
 
 def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
@@ -177,7 +212,7 @@ def write(path: Path, cloud: PointCloud) -> None:
 
 
 @contextmanager
-def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
+def _arrays(stream: BinaryIO, decided: Decided | None = None) -> Iterator[dict[str, StoredArray]]:
     """All arrays of the archive by name, open as long as the context lasts."""
     _check_directory(stream)
     with ZipFile(stream) as archive, ExitStack() as members:
@@ -188,20 +223,27 @@ def _arrays(stream: BinaryIO) -> Iterator[dict[str, StoredArray]]:
             for info in infos
             for name in [info.filename.removesuffix(".npy")]
         }
-        called = points_among(arrays)
-        if called is not None and "positions" not in arrays and not makes_views(arrays):
-            _rename(arrays, called)
-        yield arrays
+        yield _with_positions(without_batch(arrays), decided or Decided())
 
 
-def _rename(arrays: dict[str, StoredArray], called: str) -> None:
-    """Have the array of points be `positions`, as its own name says `point maps`; and theirs its partners."""
-    arrays["positions"] = arrays.pop(called)
-    if "colors" not in arrays:
-        shape = arrays["positions"].shape[:-1]
-        alike = [name for name in _ALSO_COLORS if name in arrays and arrays[name].shape[:-1] == shape]
+def _with_positions(arrays: dict[str, StoredArray], decided: Decided) -> dict[str, StoredArray]:
+    """The arrays, of which that of the points is `positions`, and its colours `colors`. Where the file holds
+    depth with its camera as well, or nothing but range images, they stay as they are."""
+    called = points_among(arrays)
+    if called is None:
+        return arrays
+    source = image_source(arrays)
+    if called != "positions" and source is not None and (source == called or states_a_camera(arrays)):
+        return arrays
+    positions = as_points(arrays.pop(called), decided)
+    shape = positions.shape[:-1]
+    if "colors" not in arrays and called != "positions":
+        pictures = {name: as_picture(array) for name, array in arrays.items() if name.lower() in COLORS}
+        alike = [name for name, array in pictures.items() if array.shape[:-1] == shape]
         if alike:
-            arrays["colors"] = arrays.pop(alike[0])
+            del arrays[alike[0]]
+            arrays["colors"] = pictures[alike[0]]
+    return arrays | {"positions": positions}
 
 
 def _check_directory(stream: BinaryIO) -> None:
@@ -259,8 +301,9 @@ def _shares(arrays: dict[str, StoredArray], points: PointArray, frame: int) -> d
     return shares
 
 
-def _is_range_scan(arrays: dict[str, StoredArray]) -> bool:
-    return "positions" not in arrays and makes_views(arrays)
+def _images(arrays: dict[str, StoredArray]) -> RangeArrays | None:
+    """The range images of an archive without points, None where it has none. Raises InputError."""
+    return None if "positions" in arrays else range_arrays(arrays)
 
 
 def _points(arrays: dict[str, StoredArray], decided: Decided) -> PointArray:

@@ -16,6 +16,7 @@ from ..image_poses import IMAGE_AXES, from_camera_to_world
 from ..range_view import RangeView
 from ..reading.camera import DepthCamera, Size
 from ..reading.camera_files import stated_cameras
+from ..reading.depths import size_of_image
 from ..reading.sequence import Decided
 from ..times import natural_key
 from ._cameras import FolderCamera
@@ -26,7 +27,6 @@ from ._pictures import (
     ViewFiles,
     depth_view,
     is_depth,
-    size_of_image,
 )
 from ._source import RangeFrames
 from ._texts import object_of, rows_of, text_of

@@ -17,14 +17,14 @@ from ..formats._pictures import COLOR_KINDS, DEPTH_KINDS, numbers_of_picture, op
 from ..formats._stored import StoredArray
 from ..points import UNKNOWN_UNIT
 from ..range_view import RangeView, mask_of
-from ..reading.camera import DepthCamera, Size, have_same_aspect
+from ..reading.camera import DepthCamera, Size
+from ..reading.depths import lying_over, measured_depths, over_depth, size_of_image
 from ..reading.sequence import Decided
 from ..units import usable_unit
 
 COLOR_SUFFIXES = (".png", ".jpg", ".jpeg")
 DEPTH_SUFFIX = ".png"
 OTHER_DEPTH_SUFFIXES = (".tif", ".tiff", ".npy", ".exr")
-_ALIKE = 0.02  # how far the ratio of aspect ratios of colours and depth may be from 1
 
 _SIXTEEN_BITS = "I;16"  # as Pillow calls a grey picture of these
 _COLORED = ("RGB", "RGBA", "LA", "P")  # likewise
@@ -116,59 +116,24 @@ def depth_view(
         camera = camera_of(stored, None if color is None else size_of_image(color))
     except InputError as error:
         raise InputError(error.what, error.where or files.depth, error.hint) from error
-    measured = np.ones(stored.shape, bool)
-    if stored.dtype.kind != "f":
-        measured = (stored != 0) & (stored != _NOTHING)
+    measured = measured_depths(stored, decided, () if stored.dtype.kind == "f" else (0, _NOTHING))
+    measured |= stored != stored  # the depth itself says so of NaN
     if files.mask is not None:
         mask = over_depth(read_numbers(files.mask), stored)
         if mask is None:
             raise InputError("is a mask of another shape than its depth picture", files.mask)
         measured &= mask_of(mask)
 
-    def lying_over(image: NDArray, what: str) -> NDArray | None:
-        """The image over the depth; None, and a message, where it has another aspect ratio."""
-        if (fitting := over_depth(image, stored)) is None:
-            sizes = f"{_shown(image)} pixels, but its depth picture has {_shown(stored)}"
-            decided.note_unused(f"{what} of {sizes}")
-            decided.report("camera", f"Scan4D leaves out the {what}: a picture has {sizes}")
-        return fitting
-
     confidence = None
     if files.confidence is not None:
-        confidence = lying_over(read_numbers(files.confidence), "confidence")
+        confidence = lying_over(read_numbers(files.confidence), stored, "confidence", decided)
     return RangeView(
         depth=stored.astype(np.float32) / np.float32(camera.depth_scale),
         mask=measured,
-        color=None if color is None else lying_over(color, "colours"),
+        color=None if color is None else lying_over(color, stored, "colours", decided),
         confidence=None if confidence is None else confidence.astype(np.float32),
         world_to_camera=world_to_camera,
         name=name,
         unit=usable_unit(camera.unit) or UNKNOWN_UNIT,
         **camera.of_view,
     )
-
-
-def over_depth(image: NDArray, depth: NDArray) -> NDArray | None:
-    """The image, (h, w) or (h, w, 3), at the pixels of the depth (H, W); None where it has another shape.
-
-    Each pixel of the depth gets the nearest one of the image. Both show the same if aspect ratios agree.
-    """
-    (height, width), (rows, columns) = depth.shape, image.shape[:2]
-    if (height, width) == (rows, columns):
-        return image
-    if not have_same_aspect((columns, rows), (width, height), _ALIKE):
-        return None
-    row, column = (
-        (np.arange(count) * 2 + 1) * other // (2 * count)
-        for count, other in ((height, rows), (width, columns))
-    )
-    return np.ascontiguousarray(image[row[:, None], column])
-
-
-def size_of_image(image: NDArray) -> Size:
-    """Width and height of an image, pixels."""
-    return image.shape[1], image.shape[0]
-
-
-def _shown(image: NDArray) -> str:
-    return "{} x {}".format(*size_of_image(image))

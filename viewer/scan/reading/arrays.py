@@ -3,6 +3,7 @@
 | shape | what it is |
 |---|---|
 | (N, C) | rows of columns: x y z, and as `columns.py` decides |
+| (3, N), (3, H, W), (S, 3, H, W) | the same with the coordinates in front |
 | (N,) of fields | the same, with names |
 | (T, N, 3) | T frames of N points |
 | (H, W, 3) | one organised cloud: rows of a picture, whose pixels are near to their neighbours both ways |
@@ -14,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +28,8 @@ from .record import Decision
 from .sequence import Decided
 
 Meaning = Literal["cloud", "rows", "image", "images"]
+
+ArrayT = TypeVar("ArrayT", bound=ArrayInFile)
 
 KEY = "frames"
 ROWS, IMAGE = "rows", "image"  # what `--read frames=` takes for (A, B, 3)
@@ -49,6 +52,9 @@ _NEAR = 0.1  # of the extent: how far neighbours in a picture may be apart
 _ALIKE = 10.0  # how much farther apart neighbours along one axis may be than along the other
 _FILLED = 0.02  # the least part of the pixels that hold a point
 _MOST_COLUMNS = 64
+_MOST_AXES = 4
+_FRONT = (3, 4, 6, 7, 9)  # coordinates, and what may stand beside them, of arrays with these in front
+_MOST_BESIDE = 16  # numbers of a point where there are so few rows
 _FORM = "Points are (N, 3), (N, C) with x y z first, (T, N, 3), (H, W, 3) or (S, H, W, 3)"
 
 
@@ -78,12 +84,45 @@ def points_among(arrays: Mapping[str, ArrayInFile]) -> str | None:
     return next((name for name in named if may_be_points(arrays[name])), None)
 
 
+def without_batch(arrays: Mapping[str, ArrayT]) -> dict[str, ArrayT]:
+    """The arrays without a first axis of length 1, which networks add, where the array of points has it."""
+    points = (array for name, array in arrays.items() if name.lower() in POINT_ARRAYS)
+    if not any(len(array.shape) > _MOST_AXES and array.shape[0] == 1 for array in points):
+        return dict(arrays)
+    return {
+        name: array.reshaped(array.shape[1:]) if len(array.shape) > 1 and array.shape[0] == 1 else array
+        for name, array in arrays.items()
+    }
+
+
+def as_points(array: ArrayT, decided: Decided) -> ArrayT:
+    """The array with the coordinates of a point last, where they stand in front, which the record says."""
+    axis = _coordinates_first(array.shape) if array.dtype.names is None else 0
+    if axis and 3 in (array.shape[0], array.shape[-3:][0]):
+        why = f"The array {array.shape} has its coordinates in front of its points"
+        decided.note(Decision("columns", ["x", "y", "z"], "assumed", why=why, changes_numbers=True))
+    return array.with_last(axis) if axis else array
+
+
+def _coordinates_first(shape: tuple[int, ...]) -> int:
+    """The axis, counted from the end, that holds x, y and z in front of the points: 2, 3 or 0, none."""
+    if len(shape) == 2 and shape[0] in _FRONT and shape[1] > _MOST_BESIDE:
+        return 2
+    if len(shape) in (3, _MOST_AXES) and shape[-3] == 3 and min(shape[-2:]) >= _LEAST_ROWS:
+        return 3
+    return 0
+
+
 def may_be_points(array: ArrayInFile) -> bool:
     """Whether the shape and the type of an array allow that it holds points."""
     names, shape = array.dtype.names, array.shape
     if names is not None:
         return len(shape) == 1
-    return 2 <= len(shape) <= 4 and (shape[-1] == 3 or (len(shape) == 2 and 3 < shape[1] <= _MOST_COLUMNS))
+    if _coordinates_first(shape):
+        return True
+    return 2 <= len(shape) <= _MOST_AXES and (
+        shape[-1] == 3 or (len(shape) == 2 and 3 < shape[1] <= _MOST_COLUMNS)
+    )
 
 
 def point_array(

@@ -70,6 +70,7 @@ class CameraSources:
     corrected: what the user says, or None; depth_scale likewise
     source:   where `stated` comes from
     is_known_scale: whether the data set defines the depth scale
+    scale:    steps in one unit where nothing states them
     kind:     what messages call the data set, never empty beside a default
     """
 
@@ -79,6 +80,7 @@ class CameraSources:
     depth_scale: float | None = None
     source: Source = "neighbour"
     is_known_scale: bool = False
+    scale: float = MILLIMETRES
     kind: str = ""
 
     @property
@@ -154,6 +156,37 @@ def note_fitted(view: RangeView, decided: Decided) -> None:
     why = "The camera is the pinhole that fits the organised points best"
     value = {"fx": view.fx, "fy": view.fy, "cx": view.cx - CENTER, "cy": view.cy - CENTER, "kind": view.kind}
     decided.note(Decision("camera", value | {"distortion": []}, "file", "the organised points", why))
+
+
+def decide_of_arrays(
+    stated: Sequence[StatedCamera],
+    size: Size,
+    decided: Decided,
+    is_whole: bool,
+    depth_scale: float | None = None,
+) -> DecidedCamera:
+    """The camera of depths in arrays, and their scale: 1 where no array states it.
+
+    is_whole: whether the depths are whole numbers. depth_scale: that an array states beside no camera. The
+    decisions go into the record. Raises InputError where a stated camera cannot be the picture's.
+    """
+    camera = decided.corrections.get("camera")
+    if isinstance(camera, str):
+        raise InputError("--read camera of a single file needs numbers, not a file", hint=_STATE_IT)
+    sources = CameraSources(
+        stated=stated,
+        corrected=None if camera is None else corrected_camera(camera),
+        depth_scale=decided.corrections.get("depth-scale"),
+        source="file",
+        scale=1.0 if depth_scale is None else depth_scale,
+    )
+    found = decide_camera(sources, size, is_whole=is_whole)
+    of_camera, of_scale = found.decisions
+    if depth_scale is not None and of_scale.source == "assumed":
+        of_scale = Decision("depth-scale", depth_scale, "file", "depth_scale", changes_numbers=True)
+    is_unstated = of_scale.source == "assumed" and not is_whole
+    decided.note(of_camera, *(() if is_unstated else (of_scale,)))
+    return found
 
 
 def scaled(camera: StatedCamera, size: Size) -> StatedCamera:
@@ -289,16 +322,14 @@ def _depth_scale(sources: CameraSources, is_whole: bool) -> tuple[float, Decisio
         is_default = not any(one.depth_scale is not None for one in sources.stated)
         where = next((one.where for one in sources.stated if one.depth_scale is not None), sources.kind)
         return decided(stated, "folder" if is_default else sources.source, where)
-    if not is_whole:
+    if not is_whole and sources.scale == MILLIMETRES:
         return decided(1.0, "assumed", "", "The picture stores floats, which are usually lengths")
     if sources.is_known_scale:
         return decided(MILLIMETRES, "folder", sources.kind)
-    return decided(
-        MILLIMETRES,
-        "assumed",
-        "",
-        "No file states the unit of the depths, and most recorders store millimetres",
-    )
+    why = "Nothing states the unit of the depths"
+    if sources.scale == MILLIMETRES:
+        why = "No file states the unit of the depths, and most recorders store millimetres"
+    return decided(sources.scale, "assumed", "", why)
 
 
 def _first(sources: CameraSources, name: str) -> Any:

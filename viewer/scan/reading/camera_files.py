@@ -74,7 +74,7 @@ _ALIASES = {
     "unit": ("unit",),
     "model": ("model", "distortionmodel", "distorsion"),
 }  # fmt: skip
-_PREFIXES = ("mcalibrationdepth", "mdepth", "depth", "camera1", "camera", "m")
+_PREFIXES = ("mcalibrationdepth", "mdepth", "depth", "camera1", "camera", "cam", "m")
 _COLOR = 2  # in the order of cameras: the last
 _LENS_NAMES = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _FIELD_OF = {name: name for name in _LENS_NAMES} | {
@@ -139,6 +139,12 @@ def stated_cameras(name: str, text: str) -> tuple[StatedCamera, ...]:
 def camera_of(stored: Mapping[str, Any], where: str = "") -> StatedCamera:
     """The camera that an object states by the names of its fields. Raises InputError where it states none."""
     return replace(_checked(_fields(stored)), where=where)
+
+
+def cameras_of(stored: Mapping[str, Any], where: str = "") -> tuple[StatedCamera, ...]:
+    """The cameras that an object states by the names of its fields, at least one, that of depth first. Raises
+    InputError where it states none."""
+    return tuple(replace(one, where=where) for one in _of_object(stored))
 
 
 def _cameras(name: str, text: str) -> Iterator[StatedCamera]:
@@ -252,7 +258,7 @@ def _inner(stored: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, dic
     An object that gives the object around it a camera, such as `intrinsics`, is passed over.
     """
     for key, value in stored.items():
-        if _field_name(key) is not None and not _COLOR_WORDS.search(key) and _has_pinhole(_fields(value)):
+        if field_of(key) is not None and not _COLOR_WORDS.search(key) and _has_pinhole(_fields(value)):
             continue
         for one in value if isinstance(value, list) else [value]:
             if isinstance(one, dict):
@@ -304,8 +310,8 @@ def _kinect_modes(is_color: bool) -> Iterator[tuple[tuple[int, int], tuple[int, 
         yield (width, height), (width, whole), (0, (whole - height) // 2)
 
 
-def _field_name(key: str) -> str | None:
-    """The field that a name means, None where it means none: `ppx` is cx, `m_depthWidth` is width."""
+def field_of(key: str) -> str | None:
+    """The field of a camera that a name means, None where it means none: `ppx` is cx."""
     word = re.sub(r"[^a-z0-9]", "", key.lower())
     shorter = [word, word.removesuffix("depth"), word.removesuffix("px")]
     shorter += [word[len(prefix) :] for prefix in _PREFIXES if word.startswith(prefix)]
@@ -319,7 +325,7 @@ def _fields(stored: Any) -> dict[str, Any]:
         return {}
     found: dict[str, Any] = {}
     for key, value in stored.items():
-        field = _field_name(key)
+        field = field_of(key)
         if field in _LENS_NAMES and not isinstance(value, int | float):
             continue  # KITTI's P1 is a matrix
         if field is not None:

@@ -5,7 +5,7 @@ Few arrays are held beside what they become.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -133,11 +133,10 @@ def _taken(columns: dict[str, NDArray], chosen: Sequence[str]) -> NDArray:
     return _joined([np.asarray(columns.pop(name)) for name in chosen])
 
 
-def _colors_of(samples: Iterable[PointContents]) -> Iterator[NDArray]:
-    """The colours of frames, (N, C), of those that have some."""
-    for sample in samples:
-        if names := _complete(_COLORS, sample.columns):
-            yield _taken(sample.columns, names)
+def stored_colors(contents: PointContents) -> NDArray | None:
+    """The colours of a frame as its file stores them, (N, C); None where it has none."""
+    names = _complete(_COLORS, contents.columns)
+    return _taken(contents.columns, names) if names else None
 
 
 def listed(names: Iterable[str], most: int = 12, longest: int = 24) -> str:
@@ -204,7 +203,7 @@ def _in_bytes(stored: Deferred, decided: Decided) -> Deferred:
 
     def make() -> NDArray[np.uint8]:
         values = np.asarray(stored)
-        full = colors.settled_scale(values, decided, lambda: _colors_of(decided.samples()))
+        full = colors.settled_scale(values, decided, decided.other_colors)
         return colors.opaque_if_unseen(rgba8(values, full))
 
     return Deferred(make, stored.dtype, stored.size // stored.dtype.itemsize)

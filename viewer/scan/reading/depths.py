@@ -1,14 +1,16 @@
-"""Decides which numbers of a depth picture were measured."""
+"""Decides which numbers of a depth picture were measured, and which pictures lie over it."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .camera import Size, have_same_aspect
 from .missing import KEY, NONE, unmeasured_value
 from .record import Decision
 from .sequence import Decided
 
+_ALIKE = 0.02  # how far the ratio of aspect ratios of colours and depth may be from 1
 _FARTHEST = 1e10  # what renderers write where nothing is, and more
 
 
@@ -42,3 +44,39 @@ def measured_depths(stored: NDArray, decided: Decided, always: tuple[float, ...]
         why = f"Scan4D leaves out {measured.size - int(np.count_nonzero(measured)):,} pixels of the picture"
         decided.note(Decision(KEY, ", ".join(removing), "assumed", why=why, alternatives=(NONE,)))
     return measured
+
+
+def lying_over(image: NDArray, depth: NDArray, what: str, decided: Decided) -> NDArray | None:
+    """The image over the depth, as `over_depth`; None where it has another shape, which the record and a
+    message say. what: the image is, in words."""
+    if (fitting := over_depth(image, depth)) is None:
+        sizes = f"{_shown(image)} pixels, but its depth picture has {_shown(depth)}"
+        decided.note_unused(f"{what} of {sizes}")
+        decided.report("camera", f"Scan4D leaves out the {what}: a picture has {sizes}")
+    return fitting
+
+
+def over_depth(image: NDArray, depth: NDArray) -> NDArray | None:
+    """The image, (h, w) or (h, w, C), at the pixels of the depth (H, W); None where it has another shape.
+
+    Each pixel of the depth gets the nearest one of the image. Both show the same if aspect ratios agree.
+    """
+    (height, width), (rows, columns) = depth.shape, image.shape[:2]
+    if (height, width) == (rows, columns):
+        return image
+    if not have_same_aspect((columns, rows), (width, height), _ALIKE):
+        return None
+    row, column = (
+        (np.arange(count) * 2 + 1) * other // (2 * count)
+        for count, other in ((height, rows), (width, columns))
+    )
+    return np.ascontiguousarray(image[row[:, None], column])
+
+
+def size_of_image(image: NDArray) -> Size:
+    """Width and height of an image, pixels."""
+    return image.shape[1], image.shape[0]
+
+
+def _shown(image: NDArray) -> str:
+    return "{} x {}".format(*size_of_image(image))

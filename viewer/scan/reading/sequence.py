@@ -8,7 +8,8 @@ from functools import cache
 from inspect import signature
 from typing import Any, Literal, NamedTuple
 
-from ..contents import PointContents
+from numpy.typing import NDArray
+
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Aside, Contradiction, Decision, Reading, Take
 
@@ -42,23 +43,23 @@ class _Made:
 class Decided:
     """The decisions about one scan, as a reader gets them with a frame. Any thread may call it.
 
-    corrections: of the user. frame: which one is being read. samples: contents of some other frames of the
-    sequence, read when asked, for decisions that one frame leaves uncertain.
+    corrections: of the user. frame: which one is being read. other_colors: colours of some other frames as
+    stored, (N, C) each, read when asked, for when those of one frame are not enough.
     """
 
     def __init__(
         self,
         corrections: Corrections = NOTHING_CORRECTED,
-        samples: Callable[[], Iterator[PointContents]] = lambda: iter(()),
+        other_colors: Callable[[], Iterator[NDArray]] = lambda: iter(()),
     ) -> None:
         self.corrections = corrections
-        self.samples = samples
+        self.other_colors = other_colors
         self.frame = 0
         self._made = _Made()
 
     def at(self, frame: int) -> Decided:
         """Return the same decisions, for a reader of this frame."""
-        other = Decided(self.corrections, self.samples)
+        other = Decided(self.corrections, self.other_colors)
         other.frame, other._made = frame, self._made
         return other
 
