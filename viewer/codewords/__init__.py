@@ -4,3 +4,7 @@ Maršík 2010. `encode_elements` projects, quantises and lights the points of a 
 fractions. What follows is whole numbers, the same to the bit everywhere: `WordStream` holds words line by
 line, and can be saved; `draw_words` draws them. No OpenGL anywhere in this package.
 """
+
+from __future__ import annotations
+
+SUFFIX = ".cw"  # of files of `WordStream`

@@ -34,10 +34,10 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, explained
 from ..files import open_plain, whole_file
+from . import SUFFIX
 from .lighting import Materials
 from .words import COLUMNS, DEPTHS, FIELDS
 
-SUFFIX = ".cw"
 FINE_DEPTHS = 1 << 24  # steps of finer depths from the nearest to the farthest
 STEEPEST_DEPTHS = 1 << 26  # that finer depths may grow by in a pixel
 _MAGIC, _VERSION = b"SCAN4DCW", 1

@@ -233,10 +233,11 @@ def _scan_files(folder: Path) -> list[Path]:
     """The files in a folder that can be frames, if it is there."""
     if not os.path.isdir(folder):
         return []
-    known = set(formats.known_suffixes())
     there = [entry for entry in sorted(entries(folder)) if not entry.name.startswith(".")]
     return [
-        file for file in there if file.suffix.lower() in known and file.name != TIMES_FILE and file.is_file()
+        file
+        for file in there
+        if file.name != TIMES_FILE and formats.is_known(file.suffix.lower()) and file.is_file()
     ]
 
 

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..camera import Camera
+from ..codewords import SUFFIX
 from ..codewords.engine import NO_WORD, CodePicture, draw_words
 from ..codewords.settings import Params, words_of
-from ..codewords.stream import SUFFIX, WordStream, read_stream, write_stream
+from ..codewords.stream import WordStream, read_stream, write_stream
 from ..drawing.request import Request, view_of
 from ..errors import InputError
 from ..look import Look, drawable, value_source

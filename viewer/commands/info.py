@@ -7,16 +7,13 @@ from __future__ import annotations
 
 import json
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..codewords.stream import SUFFIX, WordStream, read_stream
-from ..codewords.words import FIELDS, decode_words
-from ..errors import shortened
+from ..codewords import SUFFIX
 from ..scan.formats import package_reading
 from ..scan.points import PointCloud, finite_rows
 from ..scan.pose import Pose
@@ -25,7 +22,7 @@ from ..scan.range_view import RangeView
 from ..scan.reading.record import Reading
 from ..scan.sources import FrameSource
 from ..scan.timeline import Timeline
-from ._console import escaped
+from ._facts import extent, named_lines
 from ._scans import SCAN_HELP, first_readable, open_timeline, report
 
 
@@ -41,8 +38,10 @@ def add_arguments(parser: ArgumentParser) -> None:
 def run(args: Namespace) -> int:
     """Print it."""
     if args.scan.lower().endswith(SUFFIX):
-        words = stream_facts(args.scan, read_stream(args.scan))
-        print(json.dumps(words, indent=2, allow_nan=False) if args.json else _stream_as_text(words))
+        from ._word_facts import stream_as_text, stream_facts  # few scans need it
+
+        words = stream_facts(args.scan)
+        print(json.dumps(words, indent=2, allow_nan=False) if args.json else stream_as_text(words))
         return 0
     with open_timeline(args, args.scan) as timeline:
         pose = first_readable(timeline, range(len(timeline)))
@@ -118,8 +117,8 @@ class _Found:
         self.low = np.minimum(self.low, retained.min(axis=0, initial=np.inf))
         self.high = np.maximum(self.high, retained.max(axis=0, initial=-np.inf))
         for name, values in attributes.items():
-            both = [self.ranges[name], _range(values if is_finite is None else values[is_finite])]
-            self.ranges[name] = _range(np.array([span for span in both if span is not None]))
+            both = [self.ranges[name], extent(values if is_finite is None else values[is_finite])]
+            self.ranges[name] = extent(np.array([span for span in both if span is not None]))
 
 
 def _parts(pose: Pose) -> Iterator[tuple[NDArray[np.float32], dict[str, NDArray]]]:
@@ -130,26 +129,6 @@ def _parts(pose: Pose) -> Iterator[tuple[NDArray[np.float32], dict[str, NDArray]
     names = _attributes(pose.overview)
     for samples, positions in pose.points.parts():
         yield positions, {name: pose.points.of_samples(name, samples) for name in names}
-
-
-def stream_facts(path: str, stream: WordStream) -> dict[str, Any]:
-    """Facts of a stream of code words, as plain values. Depths in scan units."""
-    fields = decode_words(stream.words)
-    return {
-        "name": Path(path).name,
-        "size": list(stream.size),
-        "strips": stream.strips,
-        "words": len(stream),
-        "tiles": int(fields["mode"].sum()),
-        "elements": len(np.unique(stream.ids)),
-        "bytes": stream.nbytes,
-        "projection": "perspective" if stream.perspective else "orthographic",
-        "depth": {"nearest": stream.near, "farthest": stream.far, "error": stream.depth_error()},
-        "finer": stream.finer is not None,
-        "materials": len(stream.materials),
-        "background": list(stream.background),
-        "fields": {name: _range(values) for name, values in fields.items()},
-    }
 
 
 def _view_facts(view: RangeView) -> dict[str, Any]:
@@ -165,12 +144,6 @@ def _shown_view(view: dict[str, Any]) -> str:
 def _attributes(cloud: PointCloud) -> dict[str, NDArray]:
     named = {name: getattr(cloud, name) for name in ("normals", "colors", "radii", "axes")}
     return {name: values for name, values in named.items() if values is not None} | dict(cloud.scalars)
-
-
-def _range(values: NDArray) -> list[float] | None:
-    """[lowest, highest] of the finite values, None where there is none."""
-    finite = values[np.isfinite(values)]
-    return [float(finite.min()), float(finite.max())] if finite.size else None
 
 
 def _as_text(facts: dict[str, Any], record: Reading, verbose: bool) -> str:
@@ -205,31 +178,4 @@ def _as_text(facts: dict[str, Any], record: Reading, verbose: bool) -> str:
         rows.append((name, f"{attribute['type']}{columns}, {span}"))
     if verbose:
         rows += [("", ""), ("how Scan4D read this scan", ""), *record.lines(verbose=True)]
-    return _in_columns(rows)
-
-
-def _stream_as_text(facts: dict[str, Any]) -> str:
-    depth = facts["depth"]
-    text = "in 2^24 steps" if facts["finer"] else f"accurate to {depth['error']:.3g}"
-    rows = [
-        ("code words", facts["name"]),
-        ("picture", "{} x {} pixels".format(*facts["size"])),
-        ("strips", f"{facts['strips']}"),
-        ("words", f"{facts['words']:,}, {facts['tiles']:,} of them tiles, of {facts['elements']:,} elements"),
-        ("projection", facts["projection"]),
-        ("depth", f"{depth['nearest']:g} to {depth['farthest']:g}, {text}"),
-        ("materials", f"{facts['materials']}"),
-        ("background", ", ".join(map(str, facts["background"]))),
-        ("memory", f"{facts['bytes'] / 1e6:.1f} MB"),
-    ]
-    for name, span in facts["fields"].items():
-        shown = "none" if span is None else "{:g} to {:g}".format(*span)
-        rows.append((name, f"{FIELDS[name][1]} bits, {shown}"))
-    return _in_columns(rows)
-
-
-def _in_columns(rows: Sequence[tuple[str, Any]]) -> str:
-    """Names and their values, below one another."""
-    shown = [(escaped(shortened(name)), escaped(str(value))) for name, value in rows]
-    width = max(len(name) for name, _ in shown)
-    return "\n".join(f"{name:{width}}  {value}" for name, value in shown)
+    return named_lines(rows)

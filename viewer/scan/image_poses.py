@@ -33,8 +33,14 @@ def from_world_to_camera(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     """The matrix (3, 3) of a quaternion x y z w of any length but 0. Raises InputError for others."""
-    from scipy.spatial.transform import Rotation
-
-    if not (np.isfinite(quaternion).all() and quaternion.any()):
+    length = float(np.linalg.norm(quaternion))
+    if not (np.isfinite(length) and length > 0):
         raise InputError(f"the quaternion {quaternion.tolist()} is not a rotation")
-    return Rotation.from_quat(quaternion).as_matrix()
+    x, y, z, w = quaternion / length
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )  # SciPy's takes longer to import than a scan to read

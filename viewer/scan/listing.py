@@ -179,13 +179,12 @@ def _inside(folder: Path) -> list[str]:
 
 def _scan_files(paths: Sequence[Path]) -> list[Path]:
     """The files that scans may be in; TXT and CSV only where there is nothing else."""
-    known = set(formats.known_suffixes())
     files = [
         path
         for path in paths
-        if path.suffix.lower() in known
-        and not is_no_scan(path.name)
+        if not is_no_scan(path.name)
         and not is_times_file(path.name)
+        and formats.is_known(path.suffix.lower())
         and os.path.isfile(path)
     ]
     scans = [file for file in files if file.suffix.lower() not in formats.NOTES]

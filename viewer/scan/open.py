@@ -100,11 +100,15 @@ def left_aside(path: str | os.PathLike[str], source: FrameSource) -> list[str]:
     `path` is no folder."""
     if not os.path.isdir(path):
         return []
-    kinds = {*formats.known_suffixes()} - _TABLES
     used = {*(file.name for file in source.files), FACES_FILE}
-    found = (file for file in entries(Path(path)) if file.suffix.lower() in kinds and file.name not in used)
-    found = (file for file in found if not deciding_frames.is_no_scan(file.name))
-    return sorted((file.name for file in found), key=natural_key)
+    found = (
+        file
+        for file in entries(Path(path))
+        if file.name not in used and not deciding_frames.is_no_scan(file.name)
+    )
+    kinds = ((file, file.suffix.lower()) for file in found)
+    others = (file.name for file, kind in kinds if kind not in _TABLES and formats.is_known(kind))
+    return sorted(others, key=natural_key)
 
 
 def retime(timeline: Timeline, fps: float | None, by_names: bool = False) -> None:
@@ -243,12 +247,11 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
     Left aside: hidden files, times.csv, unknown suffixes, and TXT and CSV beside frames of another kind.
     Raises InputError where two kinds remain, and where TXT and CSV stand beside pictures alone.
     """
-    known = set(formats.known_suffixes())
     by_kind: dict[str, list[Path]] = {}
     for file in files:
         kind = file.suffix.lower()
         is_left_aside = deciding_frames.is_no_scan(file.name) or is_times_file(file.name)
-        if kind in known and not is_left_aside and os.path.isfile(file):
+        if not is_left_aside and formats.is_known(kind) and os.path.isfile(file):
             by_kind.setdefault(kind, []).append(file)
     if by_kind.keys() - formats.NOTES:
         by_kind = {kind: frames for kind, frames in by_kind.items() if kind not in formats.NOTES}

@@ -13,7 +13,7 @@ from viewer import cli
 from viewer.bounds import Bounds
 from viewer.errors import InputError
 from viewer.scan import formats
-from viewer.scan.formats import svo
+from viewer.scan.octree import file as octree_file
 from viewer.scan.octree.build import Stop
 from viewer.scan.octree.octree import Octree
 from viewer.scan.octree.storage import read_header, to_bytes
@@ -104,13 +104,13 @@ def test_threads_read_at_once(scan: Path) -> None:
 
 def test_reading_in_turn_reads_each_octree_once(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[int] = []
-    original = svo.from_bytes
+    original = octree_file.from_bytes
 
     def noted(data: bytes, previous: Octree | None) -> Octree:
         read.append(len(data))
         return original(data, previous)
 
-    monkeypatch.setattr(svo, "from_bytes", noted)
+    monkeypatch.setattr(octree_file, "from_bytes", noted)
     frames = formats.frames(scan)
     for index in range(COUNT):
         frames(index)
@@ -121,7 +121,7 @@ def test_reading_in_turn_reads_each_octree_once(scan: Path, monkeypatch: pytest.
 
 
 def test_opening_reads_headers_alone(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(svo, "from_bytes", lambda *_, **__: pytest.fail("a pose was read"))
+    monkeypatch.setattr(octree_file, "from_bytes", lambda *_, **__: pytest.fail("a pose was read"))
     with open_scan(scan) as timeline:
         assert (len(timeline), timeline.unit, timeline.label(3)) == (COUNT, "mm", "ball.svo frame 4")
         assert np.allclose(timeline.times, 0.5 + 0.1 * np.arange(COUNT))
@@ -350,7 +350,7 @@ def test_a_file_that_has_changed_is_looked_at_again(tmp_path: Path, full_cloud: 
 def test_files_of_very_many_octrees_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     tree = Octree(np.zeros(3), 1.0, (), 1, 1)
     (tmp_path / "scan.svo").write_bytes(b"".join(to_bytes(tree, time=float(i)) for i in range(6)))
-    monkeypatch.setattr(svo, "_MOST_POSES", 5)
+    monkeypatch.setattr(octree_file, "_MOST_POSES", 5)
     with pytest.raises(InputError, match="has 6 octrees, more than the 5 that Scan4D reads"):
         formats.frame_count(tmp_path / "scan.svo")
 

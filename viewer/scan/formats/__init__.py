@@ -27,6 +27,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -35,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import EmptyFrame, InputError, Scan4DError, explained, shortened, unknown_name
-from ...extensions import load_modules, package_of
+from ...extensions import load_modules, names_in, package_of
 from ...files import whole_file
 from ..admission import admit
 from ..contents import PointContents
@@ -61,6 +62,11 @@ def known_suffixes() -> list[str]:
     return sorted(_formats())
 
 
+def is_known(suffix: str) -> bool:
+    """Whether files of a suffix, in lower case, can be read."""
+    return _format(suffix) is not None
+
+
 def writable_suffixes(views: bool = False) -> list[str]:
     """Every suffix that can be written, sorted. views: those that take range views too."""
     writers = ["write", "write_views"] if views else ["write"]
@@ -76,14 +82,14 @@ def scan_suffixes() -> list[str]:
 
 def format_of(suffix: str) -> ModuleType:
     """The module that reads files of a suffix. Raises InputError where none does."""
-    if suffix not in _formats():
+    if (module := _format(suffix)) is None:
         raise unknown_name("file suffix", suffix, _formats())
-    return _formats()[suffix]
+    return module
 
 
 def package_reading(path: Path) -> str:
     """Name and version of the package that reads a file of this suffix; "" for Scan4D itself."""
-    module = _formats().get(path.suffix.lower())
+    module = _format(path.suffix.lower())
     return package_of(module.__name__) if module else ""
 
 
@@ -278,6 +284,27 @@ def _writing(path: Path, module: ModuleType) -> Iterator[Path]:
 
 
 @cache
+def _format(suffix: str) -> ModuleType | None:
+    """The module that reads files of a suffix, or None.
+
+    Scan4D asks its own module of that name first, so that it need not import the others.
+    """
+    if not suffix:
+        return None
+    name = suffix.removeprefix(".")
+    if name in _own_names():
+        module = import_module(f"{__name__}.{name}")
+        if suffix in module.SUFFIXES:
+            return module
+    return _formats().get(suffix)
+
+
+@cache
+def _own_names() -> list[str]:
+    return names_in(__path__)
+
+
+@cache
 def _formats() -> dict[str, ModuleType]:
     found: dict[str, ModuleType] = {}
 
@@ -321,14 +348,13 @@ def _readable(path: Path) -> ModuleType:
             "is a device or a pipe, not a file", path, "Copy the data of the device or pipe into a file"
         )
     suffix = path.suffix.lower()
-    if suffix not in _formats():
-        hint = hint_for(
-            hinted_suffix(path.name), known_suffixes()
-        )  # a suffix that is close is another format
+    if (module := _format(suffix)) is None:
+        # a suffix that is close is another format
+        hint = hint_for(hinted_suffix(path.name), known_suffixes())
         raise InputError(f"unknown file suffix '{shortened(suffix)}'", path, hint)
     if status.st_size == 0:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")
-    return _formats()[suffix]
+    return module
 
 
 @contextmanager

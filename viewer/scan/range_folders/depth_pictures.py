@@ -107,4 +107,4 @@ def _with_pictures(folder: Path, names: Sequence[str]) -> tuple[Path, Sequence[s
 def _has_scan_files(names: Sequence[str]) -> bool:
     """Whether there are scan files beside the pictures; text tables there are notes."""
     suffixes = {Path(name).suffix.lower() for name in names}
-    return bool(suffixes & {*formats.known_suffixes()} - formats.NOTES)
+    return any(formats.is_known(suffix) for suffix in suffixes - formats.NOTES)

@@ -1,0 +1,54 @@
+"""What `scan4d info` prints about a file of code words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..codewords.stream import read_stream
+from ..codewords.words import FIELDS, decode_words
+from ._facts import extent, named_lines
+
+
+def stream_facts(path: str) -> dict[str, Any]:
+    """Facts of a file of code words, as plain values. Depths in scan units. Raises InputError."""
+    stream = read_stream(path)
+    fields = decode_words(stream.words)
+    return {
+        "name": Path(path).name,
+        "size": list(stream.size),
+        "strips": stream.strips,
+        "words": len(stream),
+        "tiles": int(fields["mode"].sum()),
+        "elements": len(np.unique(stream.ids)),
+        "bytes": stream.nbytes,
+        "projection": "perspective" if stream.perspective else "orthographic",
+        "depth": {"nearest": stream.near, "farthest": stream.far, "error": stream.depth_error()},
+        "finer": stream.finer is not None,
+        "materials": len(stream.materials),
+        "background": list(stream.background),
+        "fields": {name: extent(values) for name, values in fields.items()},
+    }
+
+
+def stream_as_text(facts: dict[str, Any]) -> str:
+    """The facts as lines of a name and a value."""
+    depth = facts["depth"]
+    text = "in 2^24 steps" if facts["finer"] else f"accurate to {depth['error']:.3g}"
+    rows = [
+        ("code words", facts["name"]),
+        ("picture", "{} x {} pixels".format(*facts["size"])),
+        ("strips", f"{facts['strips']}"),
+        ("words", f"{facts['words']:,}, {facts['tiles']:,} of them tiles, of {facts['elements']:,} elements"),
+        ("projection", facts["projection"]),
+        ("depth", f"{depth['nearest']:g} to {depth['farthest']:g}, {text}"),
+        ("materials", f"{facts['materials']}"),
+        ("background", ", ".join(map(str, facts["background"]))),
+        ("memory", f"{facts['bytes'] / 1e6:.1f} MB"),
+    ]
+    for name, span in facts["fields"].items():
+        shown = "none" if span is None else "{:g} to {:g}".format(*span)
+        rows.append((name, f"{FIELDS[name][1]} bits, {shown}"))
+    return named_lines(rows)

@@ -1,0 +1,234 @@
+"""SVO files: octrees of all poses, one after another; docs/reference/octree-files.md has the layout.
+
+Each pose is its leaves: a point in the middle of each, with its colour and normal; and the few points far
+outside, as they are. Written are geometry, colours, normals, times and unit. A pose may refer to the one
+before it: then Scan4D reads that, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from functools import lru_cache
+from itertools import pairwise
+from pathlib import Path
+from threading import Lock
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...bounds import Bounds
+from ...errors import InputError
+from ...task import checkpoint
+from ..admission import admit, check_count, opened, read_exactly, size_of
+from ..points import PointCloud
+from ..pose import Pose
+from .build import Stop, build
+from .cube import Cube
+from .leaves import leaf_points
+from .octree import Octree
+from .storage import (
+    LARGEST_HEADER,
+    CutShort,
+    Header,
+    Strays,
+    from_bytes,
+    read_header,
+    read_strays,
+    to_bytes,
+)
+
+_MOST_POSES = 1 << 17  # an hour at 30 a second
+_LONGEST = 8  # octrees read for one pose
+_MARGIN = 1 / 8  # around the poses that a cube is made for, of its edge
+_NODE_BYTES = 68  # that decoding takes for a node of the largest level, beside attributes
+_HELD_BYTES = 17  # of a node, its mask, colour and normal
+_STRAY_BYTES = 200  # that reading a point outside takes
+_LEAF_BYTES = 60  # that points take for a leaf
+_MOST_RATIO = 100  # of memory to the file: leaves of surfaces take 6 bits and more each
+_TOO_LARGE = 2.5  # a cube, for a pose whose own is smaller by this factor
+_FEW = 1 / 1024  # of a pose's points: what may be outside a cube that fits
+
+
+def frame_count(path: Path) -> int:
+    """How many octrees there are; reads their headers."""
+    return len(_extents(path))
+
+
+def read_times(path: Path) -> NDArray[np.float64]:
+    """(T,) seconds."""
+    return np.array([extent.header.time for extent in _extents(path)])
+
+
+def read_unit(path: Path) -> str:
+    """The unit of the first octree."""
+    with opened(path) as file:
+        return read_header(file.read(LARGEST_HEADER))[0].unit
+
+
+def check(path: Path) -> None:
+    """Raise InputError where a pose is too large to be read again, by the headers alone."""
+    for extent in _extents(path):
+        leaves = extent.header.levels[-1].nodes
+        needed = max(extent.memory, leaves * (_LEAF_BYTES + extent.header.width))
+        admit(path.stat().st_size, needed, _MOST_RATIO)
+
+
+class Frames:
+    """The poses of one file. It holds the octree that it read last, so reading them in turn reads each once.
+
+    Any thread may read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Reads the headers. Raises InputError where the file holds something else."""
+        self._path = path
+        self._extents = _extents(path)
+        self._last: tuple[int, Octree] | None = None
+        self._reading = Lock()
+
+    def read(self, frame: int) -> PointCloud:
+        """The leaves of one pose. Raises InputError where it, or a pose that it refers to, is damaged."""
+        with self._reading, opened(self._path) as file:
+            start = frame - self._extents[frame].header.before
+            previous = None
+            if self._last is not None and start <= self._last[0] < frame:
+                start, previous = self._last[0] + 1, self._last[1]
+            for index in range(start, frame + 1):
+                checkpoint()
+                file.seek(self._extents[index].offset)
+                admit(size_of(file), self._extents[index].memory, _MOST_RATIO)
+                data = read_exactly(file, self._extents[index].size)
+                previous = from_bytes(data, previous)
+            assert previous is not None, "the requested octree exists"
+            admit(size_of(file), previous.nbytes + previous.leaves * _LEAF_BYTES, _MOST_RATIO)
+            self._last = frame, previous
+            strays = read_strays(data)
+        return _joined(leaf_points(previous), strays)
+
+
+def _joined(leaves: PointCloud, strays: Strays) -> PointCloud:
+    """Leaves, and behind them points outside, as large as half of the leaves are at most."""
+    if not len(strays):
+        return leaves
+    own = PointCloud.from_arrays(
+        strays.positions, colors=strays.colors, normals=strays.normals, origin=leaves.origin
+    )
+    assert leaves.radii is not None
+    own = replace(own, radii=np.full(len(own), np.median(leaves.radii), np.float32))
+
+    def both(first: NDArray | None, second: NDArray | None) -> NDArray | None:
+        return None if first is None or second is None else np.concatenate([first, second])
+
+    without = np.zeros_like(leaves.positions)
+    return replace(
+        leaves,
+        positions=np.concatenate([leaves.positions, own.positions]),
+        colors=both(leaves.colors, own.colors),
+        normals=both(leaves.normals, own.normals),
+        radii=both(leaves.radii, own.radii),
+        remainders=both(without, own.remainders),
+    )
+
+
+def write_poses(
+    path: Path,
+    poses: Iterable[Pose],
+    unit: str,
+    stop: Stop | None = None,
+    around: Bounds | None = None,
+) -> None:
+    """Write the octrees of all poses. stop: where their subdivision ends. around: the bounds of them all;
+    None: those of the first, with a margin.
+
+    They share the cube around these for as long as it fits, since only then one tells of the next.
+    """
+    cube = None if around is None else Cube.around(around.low, around.high)
+    previous, chain = None, 0
+    with open(path, "wb") as file:
+        for pose in poses:
+            cube = _cube_for(pose.cloud, cube, is_of_all=around is not None)
+            octree = build(pose.cloud, stop, cube)
+            reference, strays = previous if chain < _LONGEST else None, Strays.of(octree, pose.cloud)
+            data = to_bytes(octree, reference, chain=chain, time=pose.time, unit=unit, strays=strays)
+            file.write(data)
+            previous, chain = octree, read_header(data)[0].before + 1
+
+
+def _cube_for(cloud: PointCloud, cube: Cube | None, is_of_all: bool) -> Cube:
+    """The cube of the pose before where it fits, else one with a margin. is_of_all: whether that before is of
+    all poses, and so not too large for this one."""
+    body = Cube.of(cloud)
+    may_be_outside = max(len(body.outside(cloud)), _FEW * len(cloud))
+    is_close = cube is not None and (is_of_all or cube.edge <= _TOO_LARGE * body.edge)
+    if cube is not None and is_close and len(cube.outside(cloud)) <= may_be_outside:
+        return cube
+    return _with_margin(body)
+
+
+def _with_margin(cube: Cube) -> Cube:
+    margin = _MARGIN * cube.edge
+    return Cube.around(cube.low - margin, cube.low + cube.edge + margin)
+
+
+class _Extent(NamedTuple):
+    """Place of an octree in the file. size: with its header, as far as the file reaches."""
+
+    offset: int
+    size: int
+    header: Header
+
+    @property
+    def memory(self) -> int:
+        """Bytes that decoding it takes at most at a time."""
+        nodes = [level.nodes for level in self.header.levels]
+        # Twice: with the tree of the pose before.
+        held = 2 * (_HELD_BYTES if self.header.width else 1) * sum(nodes)
+        outside = _STRAY_BYTES * self.header.strays.nodes
+        return max(nodes) * (_NODE_BYTES + 4 * self.header.width) + held + outside
+
+
+def _extents(path: Path) -> list[_Extent]:
+    """All octrees of a file. Raises InputError where there is something else, or a chain has no beginning."""
+    status = path.stat()
+    return _found(path, status.st_size, status.st_mtime_ns)
+
+
+def _cut(extents: list[_Extent], offset: int, end: int) -> _Extent:
+    """The extent of an octree whose end is missing in a file that was cut short, with the expected time."""
+    last = extents[-1].header
+    step = last.time - extents[-2].header.time if len(extents) > 1 else 1.0
+    return _Extent(offset, end - offset, replace(last, before=0, time=last.time + step))
+
+
+@lru_cache(maxsize=2)  # opening a scan asks for them several times
+def _found(path: Path, size: int, changed: int) -> list[_Extent]:
+    """`_extents` of a file of this size and time of change."""
+    extents: list[_Extent] = []
+    with opened(path) as file:
+        offset, end = 0, size_of(file)
+        while offset < end:
+            file.seek(offset)
+            try:
+                header, taken = read_header(file.read(LARGEST_HEADER))
+            except CutShort as error:
+                if not extents:
+                    error.what = f"octree 0, at byte 0: {error.what}"
+                    raise
+                extents.append(_cut(extents, offset, end))  # reading it raises the error
+                break
+            except InputError as error:
+                error.what = f"octree {len(extents)}, at byte {offset}: {error.what}"
+                raise
+            taken += header.stored
+            check_count(len(extents) + 1, _MOST_POSES, "octrees")
+            if extents and header.unit != extents[0].header.unit:
+                raise InputError(f"octree {len(extents)} has a different unit of length from the first")
+            extents.append(_Extent(offset, min(taken, end - offset), header))
+            offset += taken
+    counts = [0, *(extent.header.before for extent in extents)]
+    for index, (above, here) in enumerate(pairwise(counts)):
+        if here not in (0, above + 1) or here > index:
+            raise InputError(f"octree {index} depends on {here} before it, which are missing")
+    return extents
