@@ -80,15 +80,15 @@ def backends_page() -> str:
     parts = [
         "# Parameters",
         wrapped(
-            "This page lists the parameters of all renderers and of the look. You can change them in the "
-            "panel of the window. On the command line, `--set name=value` sets a parameter of the renderer, "
-            "and `--look name=value` one of the look. For each renderer, parameters for every user come "
-            "first, and those for research follow."
+            "This page lists the parameters of all renderers and of the look. You can change parameters in "
+            "the panel of the window. On the command line, `--set name=value` sets a parameter of the "
+            "renderer, and `--look name=value` sets a parameter of the look. For each renderer, the page "
+            "lists parameters for every user first, and then those for research."
         ),
         wrapped(
-            "The column *affects* says what a change of the parameter does. With `draw`, the picture "
-            "changes. With `derive`, Scan4D must also prepare each pose again. With `speed`, only the time "
-            "changes."
+            "The column *affects* says what a change of the parameter does. A parameter with `draw` changes "
+            "the picture. If a parameter with `derive` changes, Scan4D must also prepare each pose again. A "
+            "parameter with `speed` changes only the drawing time."
         ),
         wrapped(
             "The command `python -m pytest tests/test_docs.py --bless` writes this page from the "
@@ -101,7 +101,7 @@ def backends_page() -> str:
         parts += tables_by_reader(backend.parameters)
         if backend.values:
             parts += [
-                "The renderer computes these numbers, which `--look color_by=` can show:",
+                "For each point, the renderer computes the next numbers, which `--look color_by=` can show:",
                 values_table(backend.values),
             ]
     parts += ["## Look (`--look key=value`)", wrapped(Look.__doc__ or ""), *tables_by_reader(describe(Look))]
@@ -128,9 +128,9 @@ def keys_page() -> str:
     parts = [
         "# Keys and mouse",
         wrapped(
-            "This page lists all keys and mouse actions. In the window, `F1` shows and searches this list. "
-            "The menus contain every command, also those without a key. You can [set your own "
-            "keys](../guide/looking.md#keyboard), which replace the default keys."
+            "This page lists all keys and mouse actions of the window. In the window, `F1` shows and "
+            "searches the list of keys. The menus contain every command, also commands without a key. You "
+            "can [set your own keys](../guide/looking.md#keyboard), which replace the default keys."
         ),
         wrapped(
             "The command `python -m pytest tests/test_docs.py --bless` writes this page from the "

@@ -56,10 +56,11 @@ _EYE_DOME = {"eye_dome": (None, True)}
 class Look:
     """The look sets the colours, light and background of a picture, for all renderers.
 
-    By default, `color_by` and `light` are `auto`. With these defaults, the picture shows the scan's own
-    colours. If the scan has normals, the light comes from the viewer. Without normals, eye-dome lighting
-    shades the picture from its depth alone. Photographs of range images appear without light. With
-    `color_by=level`, measured pixels are grey, and filled pixels have a colour for each level."""
+    By default, the parameters `color_by` and `light` are `auto`. With `color_by=auto`, the picture shows the
+    scan's own colours. With `light=auto`, the light comes from the viewer if the scan has normals. If the
+    scan has no normals, eye-dome lighting shades the picture from its depth alone. Photographs of range
+    images appear without added light. With `color_by=level`, measured pixels are grey, and filled pixels have
+    a colour for each level that filled them."""
 
     quality: str = param(
         "balanced",

@@ -49,7 +49,7 @@ def test_a_german_table_opens_at_once(screen: Screen, tmp_path: Path) -> None:
 
 def test_a_button_opens_another_take(screen: Screen, tmp_path: Path, takes: Path) -> None:
     with running_app(screen, tmp_path, takes) as app:
-        app.told(r"holds 2 takes\. Scan4D shows anna")
+        app.told(r"holds 2 recordings \(takes\)\. Scan4D shows anna")
         assert app.settle().points == 300
         app.act("problems", ("item_click", "$$0/bert (2)"))
         app.see(points=200)

@@ -171,7 +171,7 @@ def test_previews_are_told_and_not_measured(run: Run) -> None:
     done = run("measure", "seq", "--landmarks", "m.mrk.json", "-o", "none.csv")
     assert done.code == 2
     assert "2 points are previews, which nobody has confirmed" in done.err
-    assert "has no landmark that is placed" in done.err
+    assert "has no placed landmark" in done.err
     assert not Path("none.csv").exists()
 
 

@@ -383,7 +383,7 @@ def test_another_window_that_made_nothing_costs_nothing() -> None:
 def test_a_document_that_was_damaged_meanwhile_is_put_aside_and_told() -> None:
     store(SESSION)
     stored_file(SESSION.scan).write_text("{")
-    assert "moved those changes to" in str(store(SESSION))
+    assert "moved the other changes to" in str(store(SESSION))
     assert stored(SESSION.scan) == SESSION
 
 

@@ -97,7 +97,7 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     )
     if motions[reference] is None:
         raise InputError(
-            "every frame lacks three rigid references that do not lie on a line",
+            "no frame has three rigid references that do not lie on one line",
             hint="Place these landmarks, or choose others as rigid references",
         )
     return motions

@@ -63,7 +63,7 @@ class Drawing(WindowPart):
         gpu, slow = self.renderer.gpu, self.slow_devices
         if gpu.software and gpu.device not in slow:
             self.slow_devices = (*slow, gpu.device)
-            self.note(f"Scan4D draws in software ({gpu.device}); a graphics card is faster.")
+            self.note(f"Scan4D draws without a graphics card ({gpu.device}); a graphics card is faster.")
 
     def begin_scan(self, timeline: object) -> None:
         """Drop the picture of the scan before."""

@@ -1,7 +1,8 @@
 """Draws each point as a square of pixels, and shows the nearest square at each pixel.
 
 `points` is the fastest renderer, and draws each point exactly at its position. A surface can have gaps
-between its points, through which farther points are visible. `hide_hidden` leaves out these farther points.
+between its points, through which farther points are visible. `hide_hidden` leaves out points behind a
+surface.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Draws range images and points, and fills the holes between their samples.
 
-The method is pyramidal projection (Farooq 2013, chapters 4 to 6). The renderer draws the samples into the
-picture, and computes targets from it: copies of half the size, a quarter, and so on. The renderer fills each
-hole from the finest target whose samples surround the hole.
+`pyramidal` uses pyramidal projection (Farooq 2013, chapters 4 to 6). `pyramidal` draws the samples into the
+picture, and computes targets: copies of the picture at half the size, a quarter, and so on. `pyramidal` fills
+each hole from the finest target whose samples surround the hole.
 """
 
 from __future__ import annotations

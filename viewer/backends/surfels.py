@@ -1,8 +1,8 @@
 """Draws each point as a disc along the surface, so that discs close the gaps between points.
 
-The renderer implements the method of Slomp 2014, sections IV and V. A disc is a square, perpendicular to the
-normal, with a Gaussian mask that ends at the radius. The renderer draws discs in one pass, or in two passes
-that blend overlapping discs. Discs are ellipses if the scan stores half-axes.
+`surfels` implements the method of Slomp 2014, sections IV and V. To draw a disc, `surfels` draws a square,
+perpendicular to the normal, with a Gaussian mask that ends at the radius. `surfels` draws discs in one pass,
+or in two passes that blend overlapping discs. If the scan stores half-axes, discs are ellipses.
 """
 
 from __future__ import annotations

@@ -43,11 +43,16 @@ class Params:
         basic=True,
     )
     sizes: int = param(
-        17, "Number of radii in the table", low=2, high=65, group="Words", when={"quality": ("table",)}
+        17,
+        "Number of disc radii in the table of shapes",
+        low=2,
+        high=65,
+        group="Words",
+        when={"quality": ("table",)},
     )
     size_parts: int = param(
         2,
-        "Number of disc radii in the table of shapes, for each pixel of radius",
+        "Number of disc radii in the table of shapes for each pixel that the radius grows",
         low=1,
         high=8,
         group="Words",
@@ -55,7 +60,7 @@ class Params:
     )
     normals: int = param(
         61,
-        "How many values the table has for each slope of a normal, n'x and n'y; odd",
+        "Number of values (odd) in the table of shapes for each slope of a normal, n'x and n'y",
         low=3,
         high=121,
         group="Words",
@@ -88,7 +93,7 @@ class Params:
     cull_back: bool = param(False, "Leave out discs that face away from the viewer", group="Splats")
     window: int = param(
         16,
-        "Number of picture lines that the engine draws at once",
+        "Number of lines of the picture that each step of drawing covers",
         low=8,
         high=64,
         affects="speed",

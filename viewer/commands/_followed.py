@@ -25,7 +25,7 @@ _NAMED = 3  # landmarks that a message names
 def check_on_scan(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
     """Raise InputError where landmarks of a file are not of this scan, or there are none."""
     if not found.is_defined.any():
-        raise InputError("has no landmark that is placed", path, "Place landmarks in the window first")
+        raise InputError("has no placed landmark", path, "Place landmarks in the window first")
     last = int(found.frames[-1])
     if found.is_framed and last >= len(timeline):
         raise InputError(

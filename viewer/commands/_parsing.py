@@ -171,7 +171,9 @@ def _common_arguments() -> _Parser:
     group.add_argument(
         "--take", metavar="NAME", help="which scan of a folder that holds several, or all as one scan"
     )
-    group.add_argument("--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: guessed")
+    group.add_argument(
+        "--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: estimated from the scan"
+    )
     group.add_argument(
         "-q",
         "--quiet",

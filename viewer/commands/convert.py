@@ -70,7 +70,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--depth",
         type=int,
         metavar="H",
-        help="fixed level of the octree's leaves, 0 to 21, instead of a share",
+        help="level of the octree at which all leaves lie, 0 to 21; replaces --delta",
     )
 
 

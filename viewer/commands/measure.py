@@ -118,7 +118,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--traced",
         type=_names,
         metavar="NAME,...",
-        help="landmarks whose speed or acceleration is written; default: all",
+        help="landmarks whose speeds or accelerations the tables contain; default: all",
     )
     how.add_argument(
         "--anchors", type=_names, metavar="NAME,...",
@@ -145,7 +145,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     how.add_argument(
         "--against", metavar="MEASURE",
-        help="plot the other measures over this one, and correlate them with it",
+        help="plot all other measures against MEASURE, and compute their correlation with MEASURE",
     )  # fmt: skip
     how.add_argument(
         "--placed-in", type=int, metavar="I",

@@ -50,7 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     how.add_argument(
         "--ties", type=float, default=Rules.ties, metavar="T",
-        help="keep pixels whose weight is at most T below the best; default 0",
+        help="keep pixels whose weight is at most T below the weight in the best view; default 0",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=int, default=Rules.smoothing, metavar="PIXELS",

@@ -169,7 +169,9 @@ def store(session: SavedSession) -> str | None:
         return None
     what = "something else, perhaps another window, has saved changes of this scan"
     return str(
-        InputError(what, session.scan, (f"Scan4D moved those changes to {aside}. Open this file to see them"))
+        InputError(
+            what, session.scan, (f"Scan4D moved the other changes to {aside}. Open this file to see them")
+        )
     )
 
 

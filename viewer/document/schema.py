@@ -263,7 +263,7 @@ def _check_storable(value: Any, name: str) -> None:
         raise TypeError(f"{where} cannot be stored: {cause}") from None
     if again != value:
         where, kept, read = _difference(value, again, name)
-        raise TypeError(f"{where} would come back as {_typed(read)}, not {_typed(kept)}")
+        raise TypeError(f"{where} would be read back as {_typed(read)}, not {_typed(kept)}")
 
 
 def _typed(value: Any) -> str:

@@ -101,7 +101,7 @@ class ProjectionParams:
     )
     hide: bool = param(
         True,
-        "Leave out samples seen through the holes of a nearer surface; polygons of range images always do",
+        "Hide samples that show through holes of a nearer surface. Polygons always hide these samples",
         key="Shift+H",
         title="Hide what lies behind",
         basic=True,

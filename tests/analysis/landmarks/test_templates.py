@@ -99,7 +99,7 @@ def test_a_template_of_a_user(tmp_path: Path) -> None:
         ({"landmarks": [{"name": "a\nb"}]}, "must be a text of one line"),
         ({"landmarks": [{"name": "a" * 300}]}, "longer than 200"),
         ({"landmarks": [{"name": "a"}, {"name": "a"}]}, "the landmark 'a' appears twice"),
-        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "which has a different partner"),
+        ({"landmarks": [{"name": "a", "partner": "b"}, {"name": "b"}]}, "which has another one or none"),
         ({"landmarks": [{"name": "a", "colour": "b"}]}, "unknown field 'colour'"),
         (
             {"measures": [{"name": "w", "kind": "distance", "landmarks": ["x", "y"]}]},

@@ -284,7 +284,7 @@ def test_a_preview_shows_the_nearest_view_and_is_refined(renderer: Renderer) -> 
     surface = Surface(renderer.gpu, SIZE)
     request = Request(Pose.of(0, 0.0, "x", views), front(), "laplacian")
     assert render_frame(renderer, request, surface, share=0.2)
-    assert surface.stats.skipped["bands"] == "a preview shows the nearest view"
+    assert surface.stats.skipped["bands"] == "a preview shows only the nearest range view"
     preview = surface.image().astype(int)
     assert not render_frame(renderer, request, surface)
     whole = surface.image().astype(int)

@@ -261,8 +261,8 @@ def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
         return None
     if fits(points * _TURNED):
         return (
-            "with the signs of x and y reversed, the landmarks lie on the scan, so either the "
-            "landmarks or the scan is in RAS, and the other is in LPS"
+            "with the signs of x and y reversed, the landmarks lie on the scan, so one of them has "
+            "the axes RAS (right, anterior, superior), and the other LPS"
         )
     span = float(np.linalg.norm(np.ptp(points, axis=0)))
     for factor in _FACTORS:

@@ -68,7 +68,7 @@ def _template(data: Any) -> Template:
     for name, partner in partners.items():
         if partners.get(partner) != name:
             raise InputError(
-                f"'{name}' has the partner '{partner}', which has a different partner or none", "landmarks"
+                f"'{name}' has the mirror partner '{partner}', which has another one or none", "landmarks"
             )
     names = {landmark.name for landmark in landmarks}
     measures = tuple(
@@ -86,7 +86,7 @@ def _landmark(data: Any, where: str) -> Landmark:
     fields = _fields(data, ("name", "partner", "about"), where)
     name = _text(fields, "name", where, needed=True)
     if len(name) > LONGEST_LANDMARK_NAME:
-        raise InputError(f"its name is longer than {LONGEST_LANDMARK_NAME} characters", where)
+        raise InputError(f"the name of a landmark is longer than {LONGEST_LANDMARK_NAME} characters", where)
     return Landmark(name, partner=_text(fields, "partner", where), about=_text(fields, "about", where))
 
 

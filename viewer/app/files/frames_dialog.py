@@ -240,7 +240,7 @@ def _draw_choices(choices: FrameChoices) -> None:
     """Declare the take, the times, and the files."""
     imgui.text_wrapped(printable(str(choices.folder)))
     if choices.takes:
-        widgets.label("Take", "The folder holds several scans, whose frames are numbered each by itself")
+        widgets.label("Take", "The folder holds several scans, and each scan has its own frame numbers")
         take = widgets.combo("take", choices.take, list(choices.takes), {"": "chosen files", **choices.takes})
         if take != choices.take:
             choices.state_take(take)
@@ -266,7 +266,10 @@ def _draw_times(choices: FrameChoices) -> None:
         if changed and rate > 0:
             choices.state_times(f"fps:{rate:.6g}")
     elif choices.times == FILE:
-        widgets.label("File of times", "A table in this folder: a file name or an index, and seconds")
+        widgets.label(
+            "File of times",
+            "A table in this folder. Each row: a file name or an index, and its time in seconds",
+        )
         entered, name = widgets.edit_path("##file", choices.times_file)
         if entered and name.strip():
             choices.state_times(name)

@@ -213,7 +213,7 @@ class Opener(WindowPart):
         named = {take.name: f"{take.name} ({take.frames})" for take in takes[:_MOST_TAKES]}
         named |= {ALL: "All"}
         choices = {title: partial(self.correct_reading, {"take": name}) for name, title in named.items()}
-        text = f"The folder holds {len(takes)} takes. Scan4D shows {shown}. Choose another one, or all."
+        text = f"The folder holds {len(takes)} recordings (takes). Scan4D shows {shown}. Choose one, or all."
         return Offer(text, choices, "takes")
 
     def _has_moved(self, scan: str) -> bool:
@@ -226,7 +226,7 @@ class Opener(WindowPart):
             return False
         if saved is None or not saved.document.made:
             return False
-        problem = f"The scan '{printable(scan)}' is missing. Scan4D still has what you made on it."
+        problem = f"The scan '{printable(scan)}' is missing. Scan4D still has your work on this scan."
         self.offer_to_locate(problem, Path(known_as(scan)).parent, partial(self.open_with, saved))
         return True
 

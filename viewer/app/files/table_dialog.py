@@ -227,7 +227,7 @@ def _draw_choices(choices: TableChoices) -> None:
         return
     _draw_word(choices, "separator", "Separator", SEPARATORS, shown.separator)
     _draw_word(choices, "decimal", "Decimal mark", DECIMALS, shown.decimal)
-    widgets.label("Lines to skip", "Lines above the first row that Scan4D does not read")
+    widgets.label("Lines to skip", "Number of lines above the first row of values; Scan4D skips them")
     changed, lines = imgui.input_int("##skip", shown.skip, 1, 10)
     if changed:
         choices.state("skip", str(max(lines, 0)))

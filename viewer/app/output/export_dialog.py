@@ -101,7 +101,7 @@ def _edit_format(choices: Choices, even_rate: float, problems: dict[str, str]) -
     widgets.label("Format", _HELP["format"])
     choices = replace(choices, format=widgets.combo("format", choices.format, list(_FORMATS), _FORMATS))
     if choices.format == MP4 and choices.what == FRAMES:
-        widgets.label("Frame times", "As the scan: each frame until the next one's time")
+        widgets.label("Frame times", "As in the scan: each frame stays until the time of the next")
         now = EVEN if choices.fps is not None else AS_SCAN
         chosen = widgets.combo("times", now, list(_TIMES), _TIMES)
         if chosen != now:
@@ -148,7 +148,7 @@ def _edit_quality(choices: Choices, shown: str) -> Choices:
     quality = widgets.combo("quality", choices.quality, list(titles), titles)
     imgui.end_disabled()
     if choices.format == EXR:
-        widgets.tooltip("EXR stores the surface at the middle of each pixel")
+        widgets.tooltip("EXR files store the surface at the middle of each pixel, without anti-aliasing")
     return replace(choices, quality=quality)
 
 

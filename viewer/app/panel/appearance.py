@@ -113,7 +113,7 @@ def _why_unlit(look: Look, name: str, params: object, pose: Pose) -> str:
     drawn_by, cloud = backend(name), pose.overview
     is_photograph = drawn_by.draws_samples(pose, params) and cloud.colors is not None
     if is_photograph and look.color_by in ("auto", "own"):
-        return "Scan4D shows the photos of range images without light; choose another Light"
+        return "Scan4D adds no light to the photos of range images. To add light, choose another Light"
     has_normals = cloud.normals is not None or drawn_by.finds_normals
     if has_normals or "normals" in drawn_by.needs(pose, params):
         return ""
@@ -129,7 +129,7 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
     has_own = pose.overview.colors is not None
     idle = {}
     if has_own and (look.color_by in ("auto", "own") or not is_here):
-        idle["plain"] = "The scan has its own colours; choose Single colour above"
+        idle["plain"] = "The scan has its own colours. For one colour, choose Single colour above"
     elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
         shown = COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()
         idle["plain"] = f"This setting has no effect while the colours show {shown}"

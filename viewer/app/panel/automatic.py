@@ -84,7 +84,7 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
 def _draw_choice(choosing: Choosing) -> None:
     """Declare what was chosen, and what it is expected to take."""
     if choosing.problem:
-        widgets.faint(f"Scan4D chooses nothing: {choosing.problem}.")
+        widgets.faint(f"Scan4D cannot choose a renderer: {choosing.problem}.")
     choice, comparison, measured = choosing.choice, choosing.comparison, choosing.measured_ms
     if choice is None or comparison is None:
         return

@@ -93,7 +93,7 @@ class ReadingSection(WindowPart):
             self._draw_values(decision, record, gutter)
             if gutter:
                 imgui.same_line(0, 0)
-                if widgets.flat_button(icons.ICON_FA_ARROW_ROTATE_LEFT, "Reset: Scan4D decides by itself"):
+                if widgets.flat_button(icons.ICON_FA_ARROW_ROTATE_LEFT, "Reset: let Scan4D decide"):
                     self._correct(key, None)
         if key in self._problems:
             imgui.text_wrapped(self._problems[key])
@@ -153,7 +153,9 @@ def words_on_assumed(record: Reading) -> str:
     if not (marks := record.marks()):
         return ""
     warning = "If a value is wrong, what you measure may be wrong too."
-    return "\n".join(["Scan4D assumes:", *marks, warning, "Change it in the section 'How this was read'."])
+    return "\n".join(
+        ["Scan4D assumes:", *marks, warning, "Change a value in the section 'How this was read'."]
+    )
 
 
 def explanation(decision: Decision) -> list[str]:

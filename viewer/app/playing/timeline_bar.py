@@ -117,7 +117,7 @@ class TimelineBar(WindowPart):
         """Declare how it plays."""
         pace, accent = self.session.pace, self.window_look.palette.accent
         for icon, name, about in (
-            (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": start again at the end"),
+            (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": after the last frame, start again"),
             (icons.ICON_FA_BACKWARD, "reverse", ""),
             (icons.ICON_FA_FILM, "every_frame", ": show each frame, even if playback gets slower"),
         ):

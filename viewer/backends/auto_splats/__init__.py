@@ -1,8 +1,8 @@
 """Draws a smooth surface from points without normals, by fitting splats to the visible points.
 
-The renderer implements the method of Preiner 2012. For each picture, it finds the visible points. For each
-visible point, it finds the nearest neighbours in three dimensions, fits a plane to them, and draws a splat
-that reaches to them. The search is exact (`neighborhoods.py`), so neighbourhoods do not change with the view.
+`auto_splats` implements the method of Preiner 2012. For each picture, `auto_splats` finds the visible points.
+For each visible point, `auto_splats` finds its nearest neighbours, fits a plane to them, and draws a splat.
+The search for neighbours is exact (`neighborhoods.py`), so neighbourhoods do not change with the view.
 Neighbours can also be hidden points of the same surface, so that neighbourhoods at outlines are complete.
 """
 

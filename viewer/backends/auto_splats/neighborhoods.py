@@ -301,7 +301,7 @@ class Neighborhoods:
             if self._find_usual(search) <= _LARGEST_CROWD:
                 break
         if search.hidden_neighbors and not hidden:
-            surface.stats.skipped["hidden neighbours"] = "they would be too many"
+            surface.stats.skipped["hidden neighbours"] = "too many points would take part in the search"
         if self.participants < search.k:  # an outlier is far from others, of which there are none
             self._grids = replace(grids, alone=UNKNOWN)
 

@@ -1,10 +1,10 @@
 """Draws discs in whole numbers, from 64-bit code words and a table of shapes.
 
-The renderer implements the method of Maršík 2010. The encoder turns each disc into code words. A word stores
-the shape of its disc as an index into a table of sizes and normals. An engine then draws the words, line by
-line of the picture. In the paper, the engine uses a window that slides down the picture. In Scan4D, each GPU
-work group draws one band of the picture. The package `viewer/codewords/` contains the code words, the tables
-of shapes and the lighting.
+`codeword` implements the method of Maršík 2010. The encoder of `codeword` turns each disc into code words. A
+code word stores the shape of its disc as an index into a table of sizes and normals. An engine then draws the
+code words, line by line of the picture. In the paper of Maršík, the engine uses a window that slides down the
+picture. In Scan4D, each GPU work group draws one band of the picture. The package `viewer/codewords/`
+contains the code words, the tables of shapes and the lighting.
 """
 
 from __future__ import annotations

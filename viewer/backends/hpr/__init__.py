@@ -1,14 +1,15 @@
 """Draws only the points that the viewer can see; the scan needs neither normals nor faces.
 
-Machado e Silva 2014 approximates the operator of Katz 2007. The operator flips the points about a sphere
-around the eye; a point is visible if its flipped position lies on the convex hull. The renderer divides
-directions into sectors, and each sector stores the point whose flipped position reaches farthest along its
-direction (sections 3 to 5). The radius, the number of sectors and the number of steps follow section 6.
+The paper (Machado e Silva 2014) approximates the hidden point operator of Katz 2007. This operator flips the
+points about a sphere around the eye; a point is visible if its flipped position lies on the convex hull.
+`hpr` divides directions into sectors. Each sector stores the point whose flipped position reaches farthest
+along the direction of the sector (sections 3 to 5 of the paper). The sphere's radius, the number of sectors
+and the number of steps follow section 6 of the paper.
 
-The renderer differs from the paper (Machado e Silva 2014) in two ways. Scan4D divides angles evenly, so that
-sectors have about the same size up to 45 degrees from the middle; around an eye near the scan it uses six
-such grids, like the faces of a cube. Scan4D also compares each point with the candidates in the sectors
-around it. Several points of one sector can therefore be visible, and the renderer needs fewer sectors.
+`hpr` differs from the paper (Machado e Silva 2014) in two ways. First, `hpr` divides angles evenly, so that
+sectors have about the same size up to 45 degrees from the middle. Around an eye near the scan, `hpr` uses six
+grids of sectors, like the faces of a cube. Second, `hpr` compares each point with the points that the sectors
+around it store. In `hpr`, several points of one sector can therefore be visible, so fewer sectors are enough.
 """
 
 from __future__ import annotations

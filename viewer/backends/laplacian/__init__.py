@@ -1,10 +1,10 @@
 """Merges several range views without visible seams, one frequency band at a time.
 
-The method is Laplacian projection (Farooq 2013, chapter 6, and the GRAPP 2009 paper; Burt and Adelson 1983).
-The renderer draws a picture of the visible surface from each view. The multi-resolution spline splits these
-pictures into frequency bands and merges each band; the coarser the band, the wider is the transition between
-two views. Fine detail comes from a single view at each position, so nothing appears twice. Differences
-in gain or colour fade over the width of the coarsest band.
+`laplacian` uses Laplacian projection (Farooq 2013, chapter 6, and the GRAPP 2009 paper; Burt and Adelson
+1983). From each range view, `laplacian` draws a picture of the visible surface. The multi-resolution spline
+splits these pictures into frequency bands and merges each band. In coarser bands, the transition between two
+views is wider. Fine detail comes from a single view at each position, so nothing appears twice. Differences
+in gain or colour between views fade over the width of the coarsest band.
 """
 
 from __future__ import annotations
@@ -140,7 +140,7 @@ class Laplacian(Backend):
 
         preview = frame.share < 1
         if preview:
-            surface.stats.skipped["bands"] = "a preview shows the nearest view"
+            surface.stats.skipped["bands"] = "a preview shows only the nearest range view"
         return draw_filled(pose, params.surface, frame.share, surface, None if preview else merge)
 
 

@@ -1,7 +1,7 @@
 """Draws an octree of the points as discs or cubes, which are coarser where they are far away.
 
-The renderer implements the method of Slomp 2014, section VI. The octree divides octants until nearly every
-point has an octant of its own. A picture draws the octants that are about as large as a pixel.
+`voxels` implements the method of Slomp 2014, section VI. `voxels` divides octants until nearly every point
+has an octant of its own. Of the octree, `voxels` draws the octants that are about as large as a pixel.
 """
 
 from __future__ import annotations

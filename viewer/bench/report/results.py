@@ -64,7 +64,7 @@ class Metric:
 COSTS = [
     Metric("gpu_ms", "ms", "time of one picture on the GPU, median over the views"),
     Metric("cpu_ms", "ms", "wall time of the call that draws one picture, median over the views"),
-    Metric("busy_ms", "ms", "processor time of all threads for that call, median over the views"),
+    Metric("busy_ms", "ms", "processor time of all threads to draw one picture, median over the views"),
     Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
     Metric("derive_ms", "ms", "time to derive data from a pose on the CPU"),
     Metric("upload_ms", "ms", "time to upload a pose and its derived data to the GPU"),

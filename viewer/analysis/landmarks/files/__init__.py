@@ -130,7 +130,7 @@ def _read(path: Path, unit: str | None, axes: str, frame: int | None) -> Landmar
     with _one_message_of(path, module):
         found: LandmarkSet = module.read(path)
         if frame is not None and len(found) > 1:
-            raise InputError(f"holds {len(found)} frames, but each file of a series must hold one")
+            raise InputError(f"holds {len(found)} frames, but each file of a series must hold one frame")
     if found.axes not in (None, axes):
         found = found.turned()
     found = found.in_unit(unit)

@@ -126,7 +126,8 @@ def _ends_at_opening(surface: PoseSurface, line: Line, lines: Sequence[Line]) ->
 
 KINDS = (
     MeasureKind(
-        "path", "Path along the surface", "shortest path on the surface from each landmark to the next",
+        "path", "Path along the surface",
+        "length of the shortest path on the surface from each landmark to the next",
         "length", 2, None, _path, True, {"closed": ("no", "yes")},
     ),
     MeasureKind(

@@ -112,7 +112,7 @@ def _catmull_rom(knots: Positions) -> Positions:
 
 KINDS = (
     MeasureKind(
-        "distance", "Distance", "straight line from the first landmark to the second",
+        "distance", "Distance", "length of the straight line from the first landmark to the second",
         "length", 2, 2, _distance, lines=_joined,
     ),
     MeasureKind(
@@ -130,7 +130,7 @@ KINDS = (
         "length", 4, None, _plane_distance, choices={"plane": PLANES}, lines=_plane_distance_lines,
     ),
     MeasureKind(
-        "curve", "Curve", "line through the landmarks in order, smooth or straight, not along the surface",
+        "curve", "Curve", "length of a smooth or straight line through all landmarks, not along the surface",
         "length", 2, None, _curve, choices={"shape": ("smooth", "straight"), "closed": ("no", "yes")},
         lines=_curve_lines,
     ),

@@ -85,7 +85,10 @@ def _draw_under_way(tool: Tool, canvas: Canvas, view: ScreenView) -> None:
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
             label = Label(
-                ["mirror position: press A to place it"], np.array([(there.x, there.y)]), _GHOST, faint=True
+                ["mirror position: press A to place it here"],
+                np.array([(there.x, there.y)]),
+                _GHOST,
+                faint=True,
             )
             canvas.labels([label])
     if tool.dragged is not None and (there := view.on_screen(tool.dragged)) is not None:

@@ -53,7 +53,7 @@ def _draw_row(tool: Tool, one: DistanceRow) -> bool:
     imgui.align_text_to_frame_padding()
     text = one.words(scale)
     imgui.text(widgets.fitted(text, button - imgui.get_cursor_pos_x()))
-    about = "± covers the true distance in 95 % of cases. It includes point spacing, pixel size and tracking"
+    about = "± holds the true distance in 95 % of cases. ± includes point spacing, pixel size and tracking"
     if any(end.covariance is None for end in one.ends):
         about = "The uncertainty of this distance is not known: measure the distance again"
     widgets.tooltip("\n".join([text, *(_end_words(end, scale) for end in one.ends), about]))

@@ -84,7 +84,7 @@ def _why_none(tool: Tool) -> str:
     return (
         "A plot of one measure against another needs two measures."
         if mode == AGAINST
-        else "No peak is high enough: lower the smallest height at the left."
+        else "No peak is high enough: lower the smallest height of peaks at the left."
     )
 
 
