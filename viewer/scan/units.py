@@ -17,6 +17,14 @@ _METRES = {
     "in": 0.0254, "ft": 0.3048,
 }  # fmt: skip
 
+_SPELT = {
+    "micrometer": "µm", "mikrometer": "µm", "micron": "µm", "microns": "µm", "millimeter": "mm",
+    "centimeter": "cm", "zentimeter": "cm", "decimeter": "dm", "dezimeter": "dm", "meter": "m",
+    "kilometer": "km", "inch": "in", "inches": "in", "zoll": "in", "foot": "ft", "feet": "ft",
+}  # fmt: skip
+_SPELT |= {f"{name[:-2]}re": unit for name, unit in _SPELT.items() if name.endswith("meter")}
+_SPELT |= {f"{name}s": unit for name, unit in _SPELT.items() if "met" in name}
+
 
 def checked_unit(name: str, where: object = None) -> str:
     """The name of a unit as a user gives it. Raises InputError where it is no short word."""
@@ -28,6 +36,12 @@ def checked_unit(name: str, where: object = None) -> str:
 def usable_unit(name: str | None) -> str | None:
     """The name of a unit as a file tells it; None where it is no short word."""
     return name if name is not None and _WORD.fullmatch(name) else None
+
+
+def plain_unit(word: str) -> str:
+    """The usual name of a unit of length that a file spells out, such as "mm" for "Millimeter"; else the
+    word."""
+    return _SPELT.get(word.casefold().replace("\u03bc", "µ"), word.replace("\u03bc", "µ"))
 
 
 def is_length(name: str) -> bool:

@@ -166,3 +166,30 @@ def test_colours_of_vertices_win_over_a_texture_unless_the_user_says_otherwise(p
     with open_scan(path, read={"texture": "none"}) as timeline:
         assert timeline.pose(0).cloud.colors[0, :3].tolist() == GREEN
         assert timeline.reading["texture"].source == "user"
+
+
+def test_opacity_behind_the_colours_is_no_weight_before_them(path: Path) -> None:
+    path.write_text("v 1 2 3 1 0 0 1\nv 4 5 6 0 1 0 1\n")
+    assert read(path).colors[:, :3].tolist() == [[255, 0, 0], [0, 255, 0]]
+    path.write_text("v 1 2 3 1 1 0 0\nv 4 5 6 1 0 1 0\n")
+    assert read(path).colors[:, :3].tolist() == [[255, 0, 0], [0, 255, 0]]
+
+
+def test_the_decimal_mark_is_in_the_record(path: Path) -> None:
+    for text, mark in (("v 1,5 2,5 3\nv 4 5 6\n", ","), ("v 1.5 2.5 3\nv 4 5 6\n", ".")):
+        path.write_text(text)
+        with open_scan(path) as timeline:
+            np.testing.assert_allclose(timeline.pose(0).cloud.world(), [[1.5, 2.5, 3], [4, 5, 6]])
+            assert (timeline.reading["decimal"].value, timeline.reading["decimal"].source) == (mark, "file")
+    path.write_text("v 1,500 2,500 3,250\nv 4,000 5,000 6,000\n")
+    with open_scan(path) as timeline:
+        timeline.pose(0)
+        assert timeline.reading["decimal"].is_marked
+    with open_scan(path, read={"decimal": ","}) as timeline:
+        np.testing.assert_allclose(timeline.pose(0).cloud.world()[0], [1.5, 2.5, 3.25])
+        assert timeline.reading["decimal"].source == "user"
+
+
+def test_a_text_in_utf_16(path: Path) -> None:
+    path.write_bytes("v 1 2 3\nv 4 5 6\n".encode("utf-16"))
+    assert len(read(path)) == 2

@@ -73,7 +73,12 @@ def test_a_count_in_front() -> None:
     for start in (0, 1):
         assert roles(count + start, POINTS) == "number x y z"
         assert roles(count + start, POINTS, COLORS) == "number x y z r g b"
-    assert roles(count + 2, POINTS) == "x y z intensity"
+    assert roles(count * 3 + 100, POINTS) == "number x y z"  # ids of points that were cut out
+    assert roles(count / 50, POINTS) == "x y z intensity"
+    assert roles(1716383012.5 + count / 50, POINTS) == "time x y z"
+    assert roles(count + 2, POINTS[:, 0], np.zeros(50), POINTS[:, 1]) == "x y z intensity"  # a profile
+    assert roles(count[:, None], POINTS, COLORS[:, :2] * 3) == "number x y z intensity column_6"
+    assert roles(count, POINTS, unit_rows(), suffix=".xyzn") == "number x y z nx ny nz"
     assert roles(count, count, count, POINTS[:, 0]) == "x y z intensity"  # a line of points
     assert roles(count, POINTS[:, 1:], COLORS) == "x y z r g b"
 
@@ -156,3 +161,31 @@ def test_names_of_columns_of_moments() -> None:
     found = columns.moment_columns(["Frame", "time [ms]", "ID", "x", "y", "z"])
     assert found == (0, 1, 2, 1e-3)
     assert not columns.moment_columns(["x", "y", "z", "GPS Time"]).can_split
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "coordsX coordsY coordsZ", "PosX PosY PosZ", "X-Koordinate Y-Koordinate Z-Koordinate",
+        "Koordinate_X Koordinate_Y Koordinate_Z", "x-wert y-wert z-wert", "Rechtswert Hochwert Höhe",
+        "Rechts Hoch Hoehe", "Ost Nord Höhe", "E N H", "east north up", "Abscisse Ordonnée Altitude",
+        "coordonnée_X coordonnée_Y coordonnée_Z", "_x _y _z", "x0 y0 z0", "X Y Höhe", "Pos.X Pos.Y Pos.Z",
+        "Points:0 Points:1 Points:2", "Points_0 Points_1 Points_2", "p_x p_y p_z",
+    ],
+)  # fmt: skip
+def test_positions_as_people_call_them(names: str) -> None:
+    assert columns.canonical_names(names.split()) == ["x", "y", "z"]
+
+
+@pytest.mark.parametrize(
+    ("names", "roles"),
+    [
+        ("x y z Rot Grün Blau", "x y z red green blue"), ("x y z Rouge Vert Bleu", "x y z red green blue"),
+        ("x y z colorR colorG colorB", "x y z red green blue"),
+        ("x y z NormalX NormalY NormalZ", "x y z nx ny nz"), ("x y z u v", "x y z u v"),
+        ("x y u v", "x y u v"),
+        ("lat lon alt", "lat lon alt"),
+    ],
+)  # fmt: skip
+def test_other_columns_as_people_call_them(names: str, roles: str) -> None:
+    assert columns.canonical_names(names.split()) == roles.split()

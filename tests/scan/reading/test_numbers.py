@@ -118,10 +118,72 @@ def test_rows_that_cannot_be_read(text: str, reason: str) -> None:
 
 
 def test_counts_between_rows() -> None:
-    counts: list[int] = []
-    table = parse_numbers(["1 2 3\n", "2\n", "4 5 6\n", "7 8 9\n"], (0, 1, 2), counts=counts)
+    loose = numbers.LooseLines()
+    table = parse_numbers(["1 2 3\n", "2\n", "4 5 6\n", "7 8 9\n"], (0, 1, 2), loose=loose)
     assert len(table) == 3
-    assert counts == [2]
+    assert loose.counts == [2]
+
+
+@pytest.mark.parametrize("text", ["END", "];", "\x1a", "\0\0\0", "Total: 2 points"])
+def test_text_below_the_rows_is_left_out_and_counted(text: str) -> None:
+    loose = numbers.LooseLines()
+    rows = ["1,2,3\n"] * 5000
+    assert len(parse_numbers([*rows, text, "\n"], (0, 1, 2), Dialect("comma"), loose=loose)) == 5000
+    assert [line for line, _ in loose.behind] == [text]
+    for more in (["4,5,6\n"], rows):  # in the same part of the table, and in a later one
+        with pytest.raises(InputError, match="row 5,001"):
+            parse_numbers(
+                [*rows, f"{text}\n", *more], (0, 1, 2), Dialect("comma"), loose=numbers.LooseLines()
+            )
+
+
+def test_a_damaged_row_is_no_text() -> None:
+    for last in ("7,8\n", "7,8,nine\n"):
+        with pytest.raises(InputError, match="row 3"):
+            parse_numbers(
+                ["1,2,3\n", "4,5,6\n", last], (0, 1, 2), Dialect("comma"), loose=numbers.LooseLines()
+            )
+
+
+def test_empty_cells_that_lack_at_the_end_are_absent() -> None:
+    table = parse_numbers(["1,2,3\n", "4,5,6,7\n"], (0, 1, 2, 3), Dialect("comma"))
+    np.testing.assert_array_equal(table, [[1, 2, 3, np.nan], [4, 5, 6, 7]])
+
+
+@pytest.mark.parametrize(
+    ("word", "decimal", "number"),
+    [
+        ("1'000.5", ".", 1000.5), ("1 000,5", ",", 1000.5), ("-12 345", ".", -12345),
+        ("1.234.567,5", ",", 1234567.5), ("1,000.5", ".", 1000.5),
+    ],
+)  # fmt: skip
+def test_marks_of_thousands(word: str, decimal: str, number: float) -> None:
+    assert numbers.value(word, decimal) == number
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("\u22121.5;2", ["-1.5", "2"]), ("1\u202f000,5;2", ["1000,5", "2"]), ("1\u00a02", ["1 2"]),
+        ("[1; 2]", ["1", "2"]), ("(-1;2),", ["-1", "2"]), ("x [mm];y [mm]", ["x [mm]", "y [mm]"]),
+    ],
+)  # fmt: skip
+def test_signs_and_brackets_around_rows(line: str, words: list[str]) -> None:
+    assert numbers.split_line(line, Dialect("semicolon")) == words
+
+
+@pytest.mark.parametrize("line", ["; text", "! text", "* text", "/* text */", "REM text", "-- text", "# 1"])
+def test_comments_of_other_programs(line: str) -> None:
+    assert numbers.is_comment(line)
+
+
+@pytest.mark.parametrize("line", [";abc;1;2", ";1;2", "-1 2 3", "* 2 3", "--;2;3", "remark,1,2"])
+def test_rows_that_look_like_comments(line: str) -> None:
+    assert not numbers.is_comment(line)
+
+
+def test_bars_separate_values() -> None:
+    assert numbers.dialect_of(["x|y|z\n", "1,5|2|3\n", "4|5|6\n"]) == Dialect("bar", ",")
 
 
 def test_commas_that_are_both() -> None:

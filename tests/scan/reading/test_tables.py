@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from viewer.errors import InputError
+from viewer.errors import EmptyFrame, InputError
 from viewer.scan import formats
 from viewer.scan.open import open_scan
 from viewer.scan.reading.corrections import Corrections
@@ -32,6 +32,14 @@ def save(path: Path, text: str, encoding: str = "utf-8") -> Path:
         "id;label;x;y;z\n1;a;1,0;2,0;3,0\n2;b;4,0;5,0;6,0\n3;c;7,0;8,0;10,0\n",
         "//X Y Z\n3\n1 2 3\n4 5 6\n7 8 10\n",
         "640 480\n1 2 3\n4 5 6\n7 8 10\n",
+        "1|2|3\n4|5|6\n7|8|10\n",
+        "[1, 2, 3]\n[4, 5, 6]\n[7, 8, 10]\n",
+        "; made by hand\n1 2 3\n! good\n4 5 6\n/* end */\n7 8 10\n",
+        "1 2 3\n4 5 6\n7 8 10\nEND\n",
+        "x y z\n1 1 2 3\n2 4 5 6\n3 7 8 10\n",  # of R, which writes no name for the rows
+        '"x" "y" "z"\n"1" 1 2 3\n"2" 4 5 6\n"3" 7 8 10\n',
+        "\tx\ty\tz\n0\t1\t2\t3\n1\t4\t5\t6\n2\t7\t8\t10\n",
+        "x,y,z\na,1,2,3\nb,4,5,6\nc,7,8,10\n",
         "x [mm] y [mm] z [mm]\n1 2 3\n4 5 6\n7 8 10\n",
         '"x","y","z"\n"1","2","3"\n"4","5","6"\n"7","8","10"\n',
     ],
@@ -41,6 +49,69 @@ def test_heads_of_other_programs(text: str, encoding: str, tmp_path: Path) -> No
     cloud = formats.read(save(tmp_path / "scan.txt", text, encoding))
     np.testing.assert_allclose(cloud.world(), ROWS)
     assert cloud.colors is None
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "x(mm);y(mm);z(mm)", "x {mm};y {mm};z {mm}", "x / mm;y / mm;z / mm", "x-mm;y-mm;z-mm", "Xmm;Ymm;Zmm",
+        "X_mm;Y_mm;Z_mm", "x in mm;y in mm;z in mm", "X [Millimeter];Y [Millimeter];Z [Millimeter]",
+        "x;y;z\nmm;mm;mm", "x;y;z\n[mm];[mm];[mm]",
+    ],
+)  # fmt: skip
+def test_units_in_the_names_and_below_them(names: str, tmp_path: Path) -> None:
+    with open_scan(save(tmp_path / "scan.csv", f"{names}\n1;2;3\n4;5;6\n")) as timeline:
+        np.testing.assert_allclose(timeline.pose(0).cloud.world(), ROWS[:2])
+        assert timeline.unit == "mm"
+
+
+def messages(file: Path) -> str:
+    with open_scan(file) as timeline:
+        timeline.pose(0)
+        return " ".join(message.text for message in timeline.messages)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("x [mm],y [mm],z [m]\n1,2,3\n", "several units (m, mm)"),
+        ("x y z\n1 2 3 255 0 0\n4 5 6 0 255 0\n", "3 names of columns, but the rows have 6 values"),
+        ("x y z r g b\n1 2 3\n4 5 6\n", "6 names of columns, but the rows have 3 values"),
+        ("1 2 3\n4 5 6 7\n", "3 to 4 values"),
+        ("x,y,z\n1,2,3\n4,5,6\nTotal: 2 points\n", "1 lines of text below the rows"),
+    ],
+)
+def test_what_does_not_fit_together_is_reported(text: str, words: str, tmp_path: Path) -> None:
+    assert words in messages(save(tmp_path / "scan.csv", text))
+    assert "values" not in messages(save(tmp_path / "plain.csv", "x,y,z,\n1,2,3,\n4,5,6,\n"))
+
+
+def test_columns_of_text_are_in_the_record(tmp_path: Path) -> None:
+    with open_scan(
+        save(tmp_path / "scan.csv", "name,x,y,z,color\na,1,2,3,#ff0000\nb,4,5,6,#00ff00\n")
+    ) as scan:
+        scan.pose(0)
+        texts = scan.reading.unused
+    assert texts == ("column 'name', which holds text", "column 'color', which holds text")
+
+
+@pytest.mark.parametrize("text", ["x y z\n", "# nothing\n", "0\n", "\n\n"])
+def test_a_table_without_rows_is_an_empty_frame_of_a_sequence(text: str, tmp_path: Path) -> None:
+    for number, content in enumerate(["1 2 3\n", text, "4 5 6\n"]):
+        save(tmp_path / f"f{number}.xyz", content)
+    with open_scan(tmp_path) as timeline:
+        with pytest.raises(EmptyFrame):
+            timeline.pose(1)
+        assert (list(timeline.empty), len(timeline.drawn(1).cloud)) == ([1], 0)
+        assert "empty picture for frame 2" in timeline.messages[-1].text
+    with pytest.raises(InputError, match="no rows of numbers"):
+        formats.read(tmp_path / "f1.xyz")
+
+
+def test_a_table_that_lacks_the_rows_it_promises_is_damaged(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the count above them is 7") as refused:
+        formats.read(save(tmp_path / "scan.pts", "7\n"))
+    assert not isinstance(refused.value, EmptyFrame)
 
 
 def test_numbers_that_are_not_finite_in_the_first_row(tmp_path: Path) -> None:
@@ -55,6 +126,9 @@ def test_numbers_that_are_not_finite_in_the_first_row(tmp_path: Path) -> None:
     [
         ("1 PINHOLE 640 480 525 525 319.5 239.5\n", "a list of cameras"),
         ("# IMAGE_ID, ...\n1 0.8 0.6 0 0 1 2 3 1 a.jpg\n10 20 -1 30 40 5\n", "a list of camera poses"),
+        ("#   FRAME_ID, RIG_ID, ...\n1 1 1 0 0 0 .1 .2 .3 1 CAMERA 1 1\n", "a list of camera poses"),
+        ("x y z qx qy qz qw\n1 2 3 0 0 0 1\n4 5 6 0 0 0 1\n", "camera poses"),
+        ("ply\nformat ascii 1.0\nelement vertex 1\nend_header\n1 2 3\n", "a PLY file"),
         ("525.0 525.0 319.5 239.5\n", "intrinsics of a camera"),
         ("525.0 525.0 319.5 239.5 0.1 -0.2 0 0 0\n", "intrinsics of a camera"),
         ("640 480 525.0 525.0 319.5 239.5\n", "intrinsics of a camera"),

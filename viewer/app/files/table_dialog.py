@@ -24,7 +24,9 @@ from ..playing.playback import Playback
 
 TITLE = "Read table"
 AUTO = "auto"  # choice that leaves a decision to Scan4D
-SEPARATORS = {"blank": "blanks", "tab": "tabs", "comma": "commas", "semicolon": "semicolons"}
+SEPARATORS = {
+    "blank": "blanks", "tab": "tabs", "comma": "commas", "semicolon": "semicolons", "bar": "bars",
+}  # fmt: skip
 DECIMALS = {".": "point (1.5)", ",": "comma (1,5)"}
 _ROLE_TITLES = {
     "-": "not read",

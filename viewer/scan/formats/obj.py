@@ -11,6 +11,7 @@ from contextlib import suppress
 from io import TextIOWrapper
 from itertools import islice
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ from ...errors import InputError
 from ..admission import admit, opened
 from ..contents import PointContents, TextureContents
 from ..faces import Faces
+from ..reading import numbers
+from ..reading.numbers import PLAIN, Dialect
+from ..reading.sequence import Decided
 from ._columns import batches, bounded_lines, parse_table, whole_numbers
 from ._mtl import Material, read_materials
 from ._topology import topology_of
@@ -29,6 +33,7 @@ SUFFIXES = (".obj",)
 _CORNERS_AT_ONCE = 1 << 18
 _FACES_AT_ONCE = 1 << 12
 _ROWS_AT_ONCE = 1 << 14
+_VERTICES_LOOKED_AT = 200
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
 _HEAD = 1 << 16  # characters in which `mtllib` stands
 # Numbers of a vertex -> where its red, green and blue begin; 4, 7 and 8 numbers have a weight behind z.
@@ -38,11 +43,12 @@ _JOINING = 3  # times the bytes of textured corners: in pieces, joined, and with
 _BLANKS = {" ", "\t"}
 
 
-def contents(path: Path, frame: int = 0) -> PointContents:
+def contents(path: Path, frame: int, decided: Decided) -> PointContents:
     """The vertices (`v x y z [w] [r g b]`), their normals (`vn`) and textures. Raises InputError."""
     with opened(path) as stream:
-        text = TextIOWrapper(stream, "utf-8-sig", errors="surrogateescape")
-        positions, colors = _vertices(text)
+        text = _text_of(stream)
+        dialect = _dialect_of_vertices(text, decided)
+        positions, colors = _vertices(text, dialect)
         columns = dict(zip("xyz", positions.T, strict=True))
         normals = _normals(text, len(positions))
         if normals is not None:
@@ -60,8 +66,27 @@ def contents(path: Path, frame: int = 0) -> PointContents:
 def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
     """The faces of an OBJ file, in pieces. Raises InputError or ValueError where they cannot be used."""
     with opened(path) as stream:
-        text = TextIOWrapper(stream, "utf-8-sig", errors="surrogateescape")  # closes the stream when it goes
+        text = _text_of(stream)
         yield from _faces(text)
+
+
+def _text_of(stream: BinaryIO) -> TextIOWrapper:
+    """A file as text, which closes the stream when it goes. Names of other encodings stay as they are."""
+    encoding = numbers.encoding_of(stream.read(_HEAD))
+    stream.seek(0)
+    return TextIOWrapper(stream, "utf-8-sig" if encoding == "cp1252" else encoding, errors="surrogateescape")
+
+
+def _dialect_of_vertices(text: TextIOWrapper, decided: Decided) -> Dialect:
+    """How the numbers of the vertices are written; the decimal mark is put into the record."""
+    head = [*islice(_lines(text, "v"), _VERTICES_LOOKED_AT)]
+    stated = decided.corrections.get("decimal")
+    is_plain = stated is None and not any("," in line for line in head)
+    dialect = PLAIN if is_plain else numbers.dialect_of(head, PLAIN.separator, stated)
+    if head:
+        _, decimal = dialect.decisions(decided.corrections)
+        decided.note(decimal)
+    return dialect
 
 
 def _remarks(text: TextIOWrapper) -> tuple[str, ...]:
@@ -71,16 +96,20 @@ def _remarks(text: TextIOWrapper) -> tuple[str, ...]:
     return tuple(line.lstrip("# ") for line in lines if line.startswith("#"))
 
 
-def _vertices(text: TextIOWrapper) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _vertices(
+    text: TextIOWrapper, dialect: Dialect
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Positions and colours, (N, 3) each; None where no vertex has a colour. Those without one are white."""
     try:
-        table = parse_table(_lines(text, "v"))
+        table = numbers.parse_numbers(_lines(text, "v"), dialect=dialect)
     except InputError:  # as a rule, since some vertices have colours and others have none
-        table = _uneven_rows(text)
+        table = _uneven_rows(text, dialect)
     if table.shape[1] < 3:
         raise InputError(_bad_width(table.shape[1]))
     if (at := _COLORS_AT.get(table.shape[1])) is None:
         return table[:, :3], None
+    if table.shape[1] == 7 and _is_opaque(table[:, 6]) and not _is_opaque(table[:, 3]):
+        at = 3  # x y z r g b a
     colors = table[:, at : at + 3]
     if not (is_bare := np.isnan(colors).all(axis=1)).any():
         return table[:, :3], colors
@@ -91,7 +120,12 @@ def _vertices(text: TextIOWrapper) -> tuple[NDArray[np.float64], NDArray[np.floa
     return table[:, :3], colors
 
 
-def _uneven_rows(text: TextIOWrapper) -> NDArray[np.float64]:
+def _is_opaque(column: NDArray[np.float64]) -> bool:
+    """Whether a column is 1 everywhere, as weights and full opacity are."""
+    return bool((column == 1).all())
+
+
+def _uneven_rows(text: TextIOWrapper, dialect: Dialect) -> NDArray[np.float64]:
     """Vertices of which some have colours: (N, 7) x y z w r g b, NaN where there is none."""
     parts = [np.empty((0, 7))]
     for lines in batches(_lines(text, "v"), _ROWS_AT_ONCE):
@@ -99,12 +133,12 @@ def _uneven_rows(text: TextIOWrapper) -> NDArray[np.float64]:
         part = np.full((len(lines), 7), np.nan)
         for width in np.unique(widths):
             rows = np.flatnonzero(widths == width)
-            numbers = parse_table([lines[row] for row in rows])
-            if len(numbers) != len(rows) or not 3 <= numbers.shape[1] <= _MOST_NUMBERS:
+            found = numbers.parse_numbers((lines[row] for row in rows), dialect=dialect)
+            if len(found) != len(rows) or not 3 <= found.shape[1] <= _MOST_NUMBERS:
                 raise InputError(_bad_width(int(width)))
-            part[rows, :3] = numbers[:, :3]
-            if (at := _COLORS_AT.get(numbers.shape[1])) is not None:
-                part[rows, 4:] = numbers[:, at : at + 3]
+            part[rows, :3] = found[:, :3]
+            if (at := _COLORS_AT.get(found.shape[1])) is not None:
+                part[rows, 4:] = found[:, at : at + 3]
         parts.append(part)
     return np.concatenate(parts)
 
@@ -163,10 +197,10 @@ def _texture(text: TextIOWrapper, path: Path) -> TextureContents | None:
     if not any(material.image for material in materials.values()):
         return None
     uv = parse_table(_lines(text, "vt"), (0, 1))
-    numbers = {name: number for number, name in enumerate(materials)}
+    number_of = {name: number for number, name in enumerate(materials)}
     pieces, taken, held = [np.empty((0, 3), np.int64)], uv.nbytes, path.stat().st_size
     for rows in batches(_textured_polygons(text), _FACES_AT_ONCE):
-        pieces.append(_textured(rows, numbers))
+        pieces.append(_textured(rows, number_of))
         taken += _JOINING * pieces[-1].nbytes
         admit(held, taken)
     vertices, corners, used = np.concatenate(pieces).T
@@ -215,7 +249,7 @@ def _textured_polygons(text: TextIOWrapper) -> Iterator[_Row]:
             yield line.split()[1:], material, vertices, positions
 
 
-def _textured(rows: list[_Row], numbers: dict[str, int]) -> NDArray[np.int64]:
+def _textured(rows: list[_Row], number_of: dict[str, int]) -> NDArray[np.int64]:
     """Vertex, row of uv and material of each corner, (C, 3); -1 where there is none."""
     words = [word for corners, *_ in rows for word in corners]
     sizes = [len(corners) for corners, *_ in rows]
@@ -228,7 +262,7 @@ def _textured(rows: list[_Row], numbers: dict[str, int]) -> NDArray[np.int64]:
         split = [word.split("/", 2) for word in words]
         found[:, 0] = [int(parts[0]) for parts in split]
         found[:, 1] = [int(parts[1]) if len(parts) > 1 and parts[1] else 0 for parts in split]
-    found[:, 2] = np.repeat([numbers.get(material, -1) for _, material, _, _ in rows], sizes)
+    found[:, 2] = np.repeat([number_of.get(material, -1) for _, material, _, _ in rows], sizes)
     so_far = np.repeat([(vertices, positions) for *_, vertices, positions in rows], sizes, axis=0)
     stated = found[:, :2]
     found[:, :2] = np.where(stated < 0, stated + so_far, stated - 1)

@@ -18,7 +18,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import InputError, shortened
 from ..admission import MOST_FRAMES, check_count, opened
 from ..contents import PointContents, Stated, TextHead
 from ..points import PointCloud
@@ -48,18 +48,22 @@ def _whole(path: Path, decided: Decided) -> PointContents:
     """The columns of a table, all moments of it."""
     with _text_of(path, decided) as (text, encoding):
         head = head_of(bounded_lines(text), decided.corrections)
-        _check_points(head.instead)
+        _check_points(head.instead, head.hint)
         text.seek(0)
         lines = islice(bounded_lines(text), head.skip, None)
-        counts: list[int] = []
-        table = numbers.parse_numbers(lines, head.columns, head.dialect, counts=counts)
+        loose = numbers.LooseLines()
+        table = numbers.parse_numbers(lines, head.columns, head.dialect, loose=loose)
     if head.names is None:
         _check_points(cameras_in_table(table))
     _note_writing(head, encoding, decided)
-    promised = None if head.promised is None else head.promised + sum(counts)
+    _report_doubts(head, path, decided)
+    promised = None if head.promised is None else head.promised + sum(loose.counts)
     if promised not in (None, len(table)):
         what = f"the count above its rows is {promised:,}, but there are {len(table):,} rows"
         decided.report("contradiction", f"{path.name}: {what}. Scan4D reads all rows")
+    if loose.behind:
+        what = f"{path.name}: Scan4D leaves out {len(loose.behind)} lines of text below the rows, such as"
+        decided.report("contradiction", f"{what} '{shortened(loose.behind[0][0].strip())}'")
     names = _names(head, table, path, decided)
     return PointContents(
         columns=named(zip(names, table.T, strict=True)),
@@ -144,10 +148,10 @@ def _head(path: Path, decided: Decided) -> TableHead:
         return head_of(bounded_lines(text), decided.corrections)
 
 
-def _check_points(instead: str | None) -> None:
+def _check_points(instead: str | None, hint: str = NAMES_HELP) -> None:
     """Raise InputError where a table holds something else than points."""
     if instead is not None:
-        raise InputError(f"looks like {instead}, not like points", hint=NAMES_HELP)
+        raise InputError(f"looks like {instead}, not like points", hint=hint)
 
 
 def _note_writing(head: TableHead, encoding: Decision, decided: Decided) -> None:
@@ -155,6 +159,20 @@ def _note_writing(head: TableHead, encoding: Decision, decided: Decided) -> None
     skip = decided.corrections.decision("skip") or Decision("skip", head.skip)
     separator, decimal = head.dialect.decisions(decided.corrections)
     decided.note(encoding, separator, decimal, skip)
+    for name in head.unused:
+        if name:
+            decided.note_unused(f"column '{shortened(name)}', which holds text")
+
+
+def _report_doubts(head: TableHead, path: Path, decided: Decided) -> None:
+    """Report what does not fit together in the head of a table."""
+    for doubt in head.doubts:
+        decided.report("contradiction", f"{path.name}: {doubt}")
+    units = columns.units_in_names(head.names or ())
+    if len(units) > 1:
+        listed = ", ".join(sorted(unit or "none" for unit in units))
+        what = f"{path.name}: the names of x, y and z state several units ({listed})"
+        decided.report("unit", f"{what}. Scan4D uses the numbers as they are, in an unknown unit")
 
 
 def _names(head: TableHead, table: NDArray[np.float64], path: Path, decided: Decided) -> list[str]:
@@ -187,7 +205,9 @@ def _moments(path: Path, decided: Decided) -> columns.Moments | None:
         text.seek(0)
         lines = islice(bounded_lines(text), head.skip, None)
         chosen = [at for at in found[:3] if at is not None]
-        table = numbers.parse_numbers(lines, [head.columns[at] for at in chosen], head.dialect, counts=[])
+        table = numbers.parse_numbers(
+            lines, [head.columns[at] for at in chosen], head.dialect, loose=numbers.LooseLines()
+        )
     by_index = dict(zip(chosen, table.T, strict=True))
     frame, time, id = (None if at is None else by_index[at] for at in found[:3])
     moments = columns.moments_of(frame, time, id, found.seconds)

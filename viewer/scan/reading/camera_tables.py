@@ -15,6 +15,12 @@ _MODELS = {  # of COLMAP
     "SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "OPENCV_FISHEYE", "FULL_OPENCV", "FOV",
     "SIMPLE_RADIAL_FISHEYE", "RADIAL_FISHEYE", "THIN_PRISM_FISHEYE",
 }  # fmt: skip
+_ANNOUNCED = {
+    ("CAMERA_ID", "MODEL"): "a list of cameras (COLMAP)",
+    ("IMAGE_ID", "QW"): "a list of camera poses (COLMAP)",
+    ("FRAME_ID", "RIG_ID"): "a list of camera poses (COLMAP)",
+    ("RIG_ID", "NUM_SENSORS"): "a list of cameras (COLMAP)",
+}
 _QUATERNION = {"qx", "qy", "qz", "qw"}
 _LAYOUTS = ((4, 4), (3, 4), (3, 3))  # of a matrix, the most certain one first
 
@@ -44,7 +50,15 @@ def cameras_in_names(names: Sequence[str]) -> str | None:
         return "intrinsics of a camera (fx, fy, cx, cy)"
     if plain >= _QUATERNION and any("time" in name or name in ("frame", "t") for name in plain):
         return "a camera trajectory (times, positions and quaternions)"
+    if plain >= _QUATERNION and all(name.strip("tp_") in ("", "x", "y", "z") for name in plain - _QUATERNION):
+        return "camera poses (positions and quaternions)"
     return None
+
+
+def cameras_in_comment(text: str) -> str | None:
+    """The cameras that a comment above a table announces, as COLMAP writes it; None for none."""
+    words = text.replace(",", " ").replace("[", " ").split()[:3]
+    return next((what for start, what in _ANNOUNCED.items() if tuple(words[: len(start)]) == start), None)
 
 
 def cameras_in_table(table: NDArray[np.float64]) -> str | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..units import is_length
+from ..units import is_length, plain_unit
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
 
@@ -19,10 +20,18 @@ KEY = "columns"
 # --- names --------------------------------------------------------------------------------------
 
 _AXES, _PARTS = ("x", "y", "z"), ("red", "green", "blue", "alpha")
-_POSITION_BASES = ("points", "point", "position", "positions", "pos", "coordinates", "coordinate", "coords",
-                   "coord", "vertices", "vertex", "location", "xyz")  # fmt: skip
-_NORMAL_BASES = ("normals", "normal", "n", "norm", "pointnormals", "vertexnormals")
+_POSITION_BASES = (
+    "points", "point", "position", "positions", "pos", "coordinates", "coordinate", "coords", "coord",
+    "vertices", "vertex", "location", "loc", "xyz", "koordinate", "koordinaten", "koord", "punkt", "wert",
+    "coordonnee", "coordonnees", "coordinata", "coordenada", "p",
+)  # fmt: skip
+_NORMAL_BASES = ("normals", "normal", "n", "norm", "pointnormals", "vertexnormals", "normale")
 _COLOR_BASES = ("rgb", "rgba", "colors", "color", "colours", "colour", "col", "diffuse", "vertexcolors")
+_PLANE = (
+    ("easting", "northing"), ("east", "north"), ("e", "n"), ("rechtswert", "hochwert"), ("rechts", "hoch"),
+    ("ostwert", "nordwert"), ("ost", "nord"), ("abscisse", "ordonnee"), ("est", "nord"),
+)  # fmt: skip
+_HEIGHTS = ("elevation", "height", "hohe", "hoehe", "hauteur", "altitude", "altezza")
 
 
 def _of_bases(bases: Iterable[str], *ends: Sequence[str]) -> list[tuple[str, ...]]:
@@ -32,17 +41,18 @@ def _of_bases(bases: Iterable[str], *ends: Sequence[str]) -> list[tuple[str, ...
 # What programs call the columns of one attribute, as `plain_name` returns it; the first complete set counts.
 _POSITIONS = [
     *_of_bases(_POSITION_BASES, _AXES, "012"),
-    ("x_coord", "y_coord", "z_coord"), ("xcoord", "ycoord", "zcoord"), ("x_coordinate", "y_coordinate",
-    "z_coordinate"), ("x coordinate", "y coordinate", "z coordinate"), ("posx", "posy", "posz"),
-    ("easting", "northing", "elevation"), ("easting", "northing", "height"), ("easting", "northing", "z"),
-    ("east", "north", "height"), ("rechtswert", "hochwert", "höhe"),
+    ("posx", "posy", "posz"), ("coordx", "coordy", "coordz"),
+    *((*plane, height) for plane in _PLANE for height in ("z", *_HEIGHTS, "up", "h", "u")),
+    *(("x", "y", height) for height in _HEIGHTS),
+    ("x0", "y0", "z0"), ("x0", "x1", "x2"),
 ]  # fmt: skip
 _NORMALS = [*_of_bases(_NORMAL_BASES, _AXES, "012"), ("normalx", "normaly", "normalz")]
 _COLORS = [
     ("rf", "gf", "bf", "af"),
     ("rf", "gf", "bf"),
     *_of_bases(_COLOR_BASES, "rgba", "rgb", _PARTS, _PARTS[:3], "0123", "012"),
-]
+    ("rot", "grun", "blau"), ("rot", "gruen", "blau"), ("rouge", "vert", "bleu"),
+]  # fmt: skip
 # The names that `cloud_from_columns` knows, and whether a file has them.
 _KNOWN = {
     _AXES: [_AXES],
@@ -58,16 +68,19 @@ _LENGTHS = {
 
 _FRAMES = {"frame", "frames", "frame_id", "frameid", "frame id", "frame_no", "frame no", "frame_number",
            "framenumber", "frame number", "frame_index", "frameindex", "frame index", "frame #",
-           "frame_nr"}  # fmt: skip
-_TIMES = {"time", "times", "t", "timestamp", "timestamps", "time_stamp", "seconds", "sec", "zeit",
+           "frame_nr", "frame nr", "bild", "bild nr", "bildnr", "bildnummer", "trame"}  # fmt: skip
+_TIMES = {"time", "times", "t", "timestamp", "timestamps", "time_stamp", "seconds", "sec", "zeit", "temps",
+          "zeitstempel", "tiempo", "elapsed_time", "relative_time",
           "time step", "timestep", "time_step"}  # fmt: skip
 _IDS = {"id", "ids", "point_id", "pointid", "point id", "vertex_id", "marker_id", "marker", "point_number",
         "pointnumber", "point number", "point_index", "track_id"}  # fmt: skip
 _LABELS = {"label", "name", "landmark", "marker", "description"}
 
-_IN_BRACKETS = re.compile(r"\s*[\[(]\s*([^\])]*?)\s*[\])]$")
-_BEHIND = re.compile(r"(?:\s*/\s*|\s+in\s+)(\w+)$")
-_SUFFIX = re.compile(r"(.+?)[ _](\w+)")
+_IN_BRACKETS = re.compile(r"\s*[\[({<]\s*([^\])}>]*?)\s*[\])}>]$")
+_BEHIND = re.compile(r"(?:\s*/\s*|\s+in\s+|\s*[-,]\s*)(\w+)$")
+_SUFFIX = re.compile(r"(.+?)[ _](\w+)|([xyz])([nµμuck]m|mm)")
+_CAPITAL = re.compile(r"(?<=[a-z])(?=[A-Z]$)")  # before the component of "coordsX"
+_AXIS_FIRST = re.compile(r"([xyz])[ _-]?(\w+)")
 _COMPONENT = re.compile(r"(.+?)\s*(?:[:_. \[]+)([0-3xyzrgba]|red|green|blue|alpha)\]?")
 _SECONDS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9}
 
@@ -84,24 +97,29 @@ def plain_name(name: str) -> PlainName:
 
     The number of a component follows `_`, whatever a program writes: "points_0" for `Points:0`, `Points[0]`.
     """
-    text = name.strip().strip("\"'").lstrip("#/% \t").strip().casefold()
+    text = name.strip().strip("\"'").lstrip("#/%!;*_' \t").strip()
+    text = unicodedata.normalize("NFKD", _CAPITAL.sub("_", text).casefold())
+    text = "".join(letter for letter in text if not unicodedata.combining(letter))
     unit = None
     if (match := _IN_BRACKETS.search(text)) and match.start() and not match[1].isdecimal():
-        text, unit = text[: match.start()], match[1] or None
+        text, unit = text[: match.start()], plain_unit(match[1]) or None
     elif (match := _BEHIND.search(text)) and match.start() and _is_unit(match[1]):
-        text, unit = text[: match.start()], match[1]
-    elif (match := _SUFFIX.fullmatch(text)) and _is_unit(match[2]):
-        base = _component_form(match[1])
+        text, unit = text[: match.start()], plain_unit(match[1])
+    elif (match := _SUFFIX.fullmatch(text)) and _is_unit(word := match[2] or match[4]):
+        base = _component_form(match[1] or match[3])
         if base in _LENGTHS or base in _TIMES:
-            return PlainName(base, match[2])
+            return PlainName(base, plain_unit(word))
     return PlainName(_component_form(text.strip()), unit)
 
 
 def _is_unit(word: str) -> bool:
-    return is_length(word) or word in _SECONDS
+    return is_length(plain_unit(word)) or word in _SECONDS
 
 
 def _component_form(text: str) -> str:
+    match = _AXIS_FIRST.fullmatch(text)
+    if match and match[2] in _POSITION_BASES + _NORMAL_BASES:
+        return f"{match[2]}_{match[1]}"
     match = _COMPONENT.fullmatch(text)
     return f"{match[1]}_{match[2]}" if match else text
 
@@ -142,12 +160,17 @@ def has_positions(names: Sequence[str]) -> bool:
 
 def unit_in_names(names: Sequence[str]) -> str | None:
     """The unit of length in the names of x, y and z, such as "mm" of `x [mm]`; None where they differ."""
-    units = {
+    units = units_in_names(names)
+    return units.pop() if len(units) == 1 else None
+
+
+def units_in_names(names: Sequence[str]) -> set[str | None]:
+    """All units in the names of x, y and z; None stands for a name without one."""
+    return {
         plain_name(name).unit
         for name, canonical in zip(names, canonical_names(names), strict=True)
         if canonical.lower() in _AXES
     }
-    return units.pop() if len(units) == 1 else None
 
 
 # --- columns without names ----------------------------------------------------------------------
@@ -171,6 +194,8 @@ _BY_SUFFIX = {
 _UNIT_SHARE, _UNIT_WITHIN = 0.99, 1e-3  # rows of normals, and how far their length is from 1
 _SAMPLE = 1 << 16  # rows whose lengths and decimals are looked at
 _LEAST = 3  # rows that count 1, 2, 3
+_SINCE_1970 = 1e9  # seconds, and more of smaller units
+_LEAST_INCREASING = 10  # rows that make an increasing column a number or a time
 _RELATED = 0.5  # correlation of a row or column of a grid with a coordinate
 
 
@@ -190,7 +215,9 @@ def decide(
         return stated
     by_suffix = _BY_SUFFIX.get(suffix)
     if by_suffix is not None and width >= len(by_suffix):
-        roles = [*by_suffix, *_left_over(width, by_suffix)]
+        fronts = [front for front, _ in _fronts(table) if len(front) + len(by_suffix) == width]
+        roles = [*(fronts[0] if fronts else ()), *by_suffix]
+        roles += _left_over(width, roles)
         return Decision(KEY, roles, "file", suffix, f"The suffix {suffix} states them.")
     finite = np.isfinite(table).all(axis=1)
     found = _candidates(table if finite.all() else table[finite], suffix == ".pts")
@@ -221,12 +248,18 @@ def _candidates(table: NDArray[np.float64], intensity_first: bool) -> list[_Cand
     for front, why in _fronts(table):
         behind = _behind(front, table, intensity_first)
         candidate = _Candidate(behind.roles, why, behind.is_complete)
-        found.insert(len(found) if plain.is_complete and not behind.is_complete else 0, candidate)
+        is_less = plain.is_complete and not behind.is_complete
+        is_less = is_less or (front == ["time"] and table[0, 0] < _SINCE_1970)  # or x of a line of points
+        found.insert(len(found) if is_less else 0, candidate)
     if table.shape[1] == 6:
         first = found[0].roles
         if first[3:] == _NORMAL or first[3:] == _RGB:
             other = _RGB if first[3:] == _NORMAL else _NORMAL
             found.append(_Candidate([*_AXES, *other], "", True))
+    if table.shape[1] == 7 and {*found[0].roles[3:]} == {*_RGB, "intensity"}:
+        is_first = found[0].roles[3] == "intensity"
+        others = [*_RGB, "intensity"] if is_first else ["intensity", *_RGB]
+        found.append(_Candidate([*_AXES, *others], "", True))
     found.append(_Candidate([*_AXES, *_left_over(table.shape[1], [*_AXES])], "", False))
     return found
 
@@ -242,6 +275,18 @@ def _fronts(table: NDArray[np.float64]) -> Iterator[tuple[list[str], str]]:
             yield ["number"], f"The first column counts {first[0]:g}, {first[1]:g}, {first[2]:g} and so on."
     elif width >= 5 and _is_grid(table):
         yield ["row", "column"], "The first two columns count the rows and columns of a grid."
+    elif count >= _LEAST_INCREASING and _increases(first) and not _is_profile(table[:, 1:4]):
+        is_whole = bool((first == np.rint(first)).all())
+        yield ["number" if is_whole else "time"], "The first column increases from row to row."
+
+
+def _increases(column: NDArray[np.float64]) -> bool:
+    return bool((np.diff(column) > 0).all())
+
+
+def _is_profile(three: NDArray[np.float64]) -> bool:
+    """Whether the three columns behind an increasing one may be y, z and another of one line of points."""
+    return any((column == column[0]).all() or _increases(column) or _increases(-column) for column in three.T)
 
 
 def _is_grid(table: NDArray[np.float64]) -> bool:
@@ -264,7 +309,7 @@ def _behind(front: list[str], table: NDArray[np.float64], intensity_first: bool)
     """x, y and z behind the columns in front, and then blocks of colours and normals."""
     width = table.shape[1]
     roles = [*front, *_AXES]
-    roles += ["intensity"][: intensity_first and width > len(roles)]
+    roles += ["intensity"][: intensity_first and width > len(roles) and width != 6]
     whys, is_complete = [], True
     missing = {"r", "nx", "intensity"} - {*roles}
     while (at := len(roles)) < width:
@@ -275,6 +320,7 @@ def _behind(front: list[str], table: NDArray[np.float64], intensity_first: bool)
         if kind in missing:
             roles += _RGB if kind == "r" else _NORMAL
             whys.append(why)
+            is_complete = is_complete and why not in _WEAK
         elif roles[-1] == "b" and any((three[:, 0] == full).all() for full in (1, 255)):
             roles.append("a")
         else:
@@ -282,6 +328,9 @@ def _behind(front: list[str], table: NDArray[np.float64], intensity_first: bool)
             roles.append("intensity" if "intensity" in missing else f"column_{at + 1}")
         missing -= {*roles[at:]}
     return _Candidate(roles, " ".join(dict.fromkeys(whys)), is_complete)
+
+
+_WEAK = ("Three numbers with signs are normals.", "Numbers up to 1 are normals.")  # of any length
 
 
 def _block(three: NDArray[np.float64], width: int) -> tuple[str | None, str]:
@@ -302,7 +351,7 @@ def _block(three: NDArray[np.float64], width: int) -> tuple[str | None, str]:
     if low >= 0 and 1.001 < high <= 65535 and width == 6 and (is_whole or high <= 255):
         return "r", "Numbers of 0 and more are colors."
     if np.abs(three).max() <= 1.001 or width == 6:
-        return "nx", "Three numbers with signs are normals." if low < 0 else "Numbers up to 1 are normals."
+        return "nx", _WEAK[0] if low < 0 else _WEAK[1]
     return None, ""
 
 

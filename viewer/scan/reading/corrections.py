@@ -112,7 +112,7 @@ class Key:
 
 CORRECTED = {
     "columns": Key(_columns, f"a role for each column, with x, y and z, from {' '.join(ROLES)} or a name"),
-    "separator": _words("blank, tab, comma or semicolon", "blank", "tab", "comma", "semicolon"),
+    "separator": _words("blank, tab, comma, semicolon or bar", "blank", "tab", "comma", "semicolon", "bar"),
     "decimal": _words("'.' or ','", ".", ","),
     "skip": Key(_lines, "a number of lines"),
     "encoding": _words("utf-8, utf-16 or latin-1", "utf-8", "utf-16", "latin-1"),

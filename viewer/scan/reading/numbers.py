@@ -7,7 +7,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import chain, islice
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from ...errors import InputError, shortened
 from ...task import checkpoint
 from .record import Decision
 
-SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "blank": None}
+SEPARATORS = {"semicolon": ";", "tab": "\t", "comma": ",", "bar": "|", "blank": None}
 COMMENTS = ("#", "//", "%")
 HEAD = 1 << 16  # bytes that tell how a text is written
 _LOOKED_AT = 200  # lines, of which the last ones tell the separator and the decimal mark:
@@ -78,12 +78,16 @@ def decoded(data: bytes) -> str:
 
 # --- numbers ------------------------------------------------------------------------------------
 
-ABSENT = {"", "-", "--", "na", "n/a", "#n/a", "#nv", "nan", "-nan", "none", "null"}  # in place of a number
+ABSENT = {  # in place of a number; spreadsheets write the words in capitals
+    "", "-", "--", "---", "?", "*", ".", "na", "n/a", "<na>", "nan", "-nan", "none", "null", "nil", "missing",
+    "#n/a", "#nv", "#value!", "#wert!", "#div/0!", "#num!", "#zahl!", "#ref!", "#bezug!", "#name?", "#null!",
+}  # fmt: skip
 _FORTRAN = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)[dD][+-]?\d+", re.ASCII)
 _NOT_FINITE = re.compile(r"([+-]?)(?:1[.,]#(qnan|snan|ind|nan|inf|j)\d*|nan\(\w*\))", re.IGNORECASE)
 _COMMA = re.compile(r"[+-]?(?:\d*,\d+|\d+)(?:[eEdD][+-]?\d+)?", re.ASCII)
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d*|[+-]?\d{1,3}(?:,\d{3}){2,}", re.ASCII)
 _GERMAN_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:\.\d{3})+(?:,\d*)?", re.ASCII)
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:[' ]\d{3})+(?:[.,]\d*)?")  # thousands of Switzerland and France
 _LIKE_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}", re.ASCII)
 
 
@@ -109,6 +113,8 @@ def value(word: str, decimal: str = ".") -> float:
 
 def point_form(word: str, decimal: str = ".") -> str:
     """A number with a decimal point and without marks of thousands; other words as they are."""
+    if ("'" in word or " " in word) and _GROUPED.fullmatch(word):
+        word = word.replace("'", "").replace(" ", "")
     if decimal == ",":
         if _COMMA.fullmatch(word):
             return word.replace(",", ".")
@@ -136,7 +142,7 @@ def is_numeral(word: str, decimal: str = ".") -> bool:
 class Dialect:
     """How the rows of a table are written.
 
-    separator:   "blank", "tab", "comma", "semicolon", or the character itself
+    separator:   "blank", "tab", "comma", "semicolon", "bar", or the character itself
     decimal:     "." or ","
     needs_blank: whether a comma separates only where a blank follows, as in "1,25, 2,50"
     is_certain:  False where each comma could be a mark of thousands
@@ -171,7 +177,8 @@ PLAIN = Dialect()
 _WHY = {".": "", ",": "All rows have the same number of values only with decimal commas."}
 _CANDIDATES = (
     Dialect("semicolon"), Dialect("semicolon", ","), Dialect("tab"), Dialect("tab", ","),
-    Dialect("comma"), Dialect("comma", ","), Dialect(), Dialect("blank", ","),
+    Dialect("comma"), Dialect("comma", ","), Dialect("bar"), Dialect("bar", ","), Dialect(),
+    Dialect("blank", ","),
 )  # fmt: skip
 _SPACED = Dialect("comma", ",", needs_blank=True)
 _BETWEEN = re.compile(r"[ \t]*,[ \t]+")
@@ -179,8 +186,13 @@ _WORDS = re.compile(r'"[^"]*"|\S+')
 
 
 def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
-    """The words of a line, without quotes and blanks around them, as the file spells them."""
-    line = line.strip()
+    """The words of a line, without quotes and blanks around them, as the file spells them.
+
+    Brackets around the line, as in `[1, 2, 3]`, go too. Signs that are not ASCII become those that are.
+    """
+    line = with_plain_signs(line).strip(" \r\n" if dialect.separator == "tab" else None)
+    if line[:1] in _OPENING and _IN_BRACKETS.match(line):
+        line = line.strip("()[]{};, \t")
     if dialect.needs_blank:
         words = _BETWEEN.split(line)
     elif dialect.delimiter is None:
@@ -195,17 +207,32 @@ def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
     return [word.strip().strip("\"'").strip() for word in words]
 
 
+def with_plain_signs(text: str) -> str:
+    """A text with ASCII signs for minus, blanks and apostrophes, and numbers without blanks of thousands that
+    are not ASCII."""
+    if text.isascii():
+        return text
+    return _THIN_GROUPS.sub(lambda match: re.sub(r"\D", "", match[0]), text).translate(_PLAIN_SIGNS)
+
+
+_PLAIN_SIGNS = str.maketrans(dict(zip("\u2212\u2013\u00a0\u202f\u2009\u2019", "--   '", strict=True)))
+_THIN_GROUPS = re.compile(r"(?<![\d.,])\d{1,3}(?:[\u00a0\u202f\u2009]\d{3})+(?!\d)")
+_OPENING = ("(", "[", "{")
+_IN_BRACKETS = re.compile(r"[(\[{\s]+[-+.\d]")
+
+
 def without_comment(line: str) -> str:
     """A line without the comment at its end, which begins with `#`, `//` or `%` behind a blank."""
     return _COMMENT.split(line, maxsplit=1)[0]
 
 
-_COMMENT = re.compile(r"(?:^|(?<=\s))(?:#(?!N/A|NV|n/a|nv)|//|%)")
+_COMMENT = re.compile(r"(?:^|(?<=\s))(?:#(?!N/A|NV|n/a|nv|[A-Z/0]+[!?])|//|%)")
+_REMARK = re.compile(r"\s*(?:/\*|\*/|!|;\s*[^\W\d][^;]*$|\*\s*[^\W\d]|rem\b|--\s)", re.IGNORECASE)
 
 
 def is_comment(line: str) -> bool:
-    """Whether a whole line is a comment."""
-    return line.lstrip().startswith(COMMENTS)
+    """Whether a whole line is a comment, also one of other programs: `; text`, `! text`, `/* text */`."""
+    return line.lstrip().startswith(COMMENTS) or _REMARK.match(line) is not None
 
 
 def dialect_of(lines: Iterable[str], separator: str | None = None, decimal: str | None = None) -> Dialect:
@@ -274,7 +301,7 @@ def _is_spaced(sample: Sequence[str], separator: str | None, decimal: str | None
         return False
     fits = all(_COMMA.fullmatch(word) for words in rows for word in words)
     marked = sum("," in word for words in rows for word in words)
-    return fits and 2 * marked > sum(map(len, rows))
+    return fits and 4 * marked > sum(map(len, rows))  # others may be whole numbers, such as colours
 
 
 def _could_be_thousands(dialect: Dialect, sample: Sequence[str]) -> bool:
@@ -283,10 +310,11 @@ def _could_be_thousands(dialect: Dialect, sample: Sequence[str]) -> bool:
     return bool(numbers) and all(_LIKE_THOUSANDS.fullmatch(word) for word in numbers)
 
 
-def check_commas(rows: Iterable[Sequence[str]]) -> None:
+def check_commas(rows: Iterable[Sequence[str]], is_twice: bool = False) -> None:
     """Raise InputError where commas separate values, and seem to be decimal marks as well: "1,25,2,50,-3,75".
 
     Then every second value is a whole number without a sign, as long in all rows, and one begins with 0.
+    is_twice: whether there are twice as many values as names, so that the last two do not count.
     """
     table = [[*words] for words in rows]
     width = len(table[0]) if table else 0
@@ -298,7 +326,7 @@ def check_commas(rows: Iterable[Sequence[str]]) -> None:
     if not has_digits or any("." in word for words in table for word in words):
         return
     same = all(len({len(word) for word in column}) == 1 for column in columns)
-    if same and any(len(word) > 1 and word.startswith("0") for word in behind):
+    if is_twice or (same and any(len(word) > 1 and word.startswith("0") for word in behind)):
         raise InputError(
             "uses commas as separators and, it seems, as decimal marks too",
             hint=(
@@ -337,18 +365,35 @@ def _cell(word: str, decimal: str) -> str:
     return plain if plain != word and is_numeral(plain) else word
 
 
+@dataclass
+class LooseLines:
+    """Lines of a table that are no rows.
+
+    counts: lines of one whole number, which begin blocks of rows. behind: lines of text below the last row,
+    each with the error that it is where rows follow.
+    """
+
+    counts: list[int] = field(default_factory=list)
+    behind: list[tuple[str, InputError]] = field(default_factory=list)
+
+    def check_end(self) -> None:
+        """Raise InputError where rows follow the lines of text."""
+        if self.behind:
+            raise self.behind[0][1]
+
+
 def parse_numbers(
     lines: Iterable[str],
     columns: Sequence[int] | None = None,
     dialect: Dialect = PLAIN,
     rows: int | None = None,
-    counts: list[int] | None = None,
+    loose: LooseLines | None = None,
 ) -> NDArray[np.float64]:
     """Numbers from lines of text, (N, C) float64; blank lines and comments (`#`, `//`, `%`) are skipped.
 
     columns: which to take; None: all, and then every row must have the same number (0 rows: 3).
     rows: how many to read at most. What is allocated follows the text, not `rows`.
-    counts: lines of one whole number, which begin blocks of rows, are appended to it; None: they are errors.
+    loose: gets the lines that are no rows; None: these are errors.
     Raises InputError where something is not a number or a row is too short.
     """
     width = len(columns) if columns is not None else 3
@@ -356,9 +401,11 @@ def parse_numbers(
     done, lines = 0, iter(lines)
     while batch := _batch(lines, _ROWS_AT_ONCE if rows is None else min(_ROWS_AT_ONCE, rows - done)):
         checkpoint(done / rows if rows else None)
-        part = _parse_rows(batch, columns, dialect, done, counts)
+        part = _parse_rows(batch, columns, dialect, done, loose)
         if not len(part):
             continue
+        if loose is not None and loose.behind and loose.behind[0][0] not in batch:
+            loose.check_end()
         if not done:
             table = np.empty((0, part.shape[1]))
         if part.shape[1] != table.shape[1]:
@@ -394,10 +441,13 @@ def _parse_rows(
     columns: Sequence[int] | None,
     dialect: Dialect,
     before: int,
-    counts: list[int] | None,
+    loose: LooseLines | None,
 ) -> NDArray[np.float64]:
     """The rows of a few lines, (N, C), `before` rows below the first of the table: by numpy where it can."""
     text = "".join(batch)
+    if not text.isascii():
+        batch = [with_plain_signs(line) for line in batch]
+        text = "".join(batch)
     if text.isspace():
         return np.empty((0, 0))
     if any(mark in text for mark in COMMENTS):
@@ -408,7 +458,7 @@ def _parse_rows(
     plain, delimiter = batch, dialect.delimiter
     if dialect.decimal == ",":
         if "." in text or '"' in text:
-            return _parse_line_by_line(batch, columns, dialect, before, counts)
+            return _parse_line_by_line(batch, columns, dialect, before, loose)
         if dialect.needs_blank:
             text, delimiter = _BETWEEN.sub(";", text), ";"
         plain = text.replace(",", ".").split("\n")
@@ -418,7 +468,7 @@ def _parse_rows(
             plain, usecols=columns, delimiter=delimiter, comments=None, quotechar=quote, ndmin=2
         )
     except ValueError:  # numpy knows fewer numbers, no comments, and counts rows from the first of these
-        return _parse_line_by_line(batch, columns, dialect, before, counts)
+        return _parse_line_by_line(batch, columns, dialect, before, loose)
 
 
 def _parse_line_by_line(
@@ -426,25 +476,53 @@ def _parse_line_by_line(
     columns: Sequence[int] | None,
     dialect: Dialect,
     before: int,
-    counts: list[int] | None,
+    loose: LooseLines | None,
 ) -> NDArray[np.float64]:
     """The rows of a few lines, (N, C), word by word; arguments as those of `_parse_rows`."""
     rows: list[list[float]] = []
     for line in batch:
         words = split_line(without_comment(line), dialect)
-        if not any(words):
+        if not any(words) or is_comment(line):
             continue
-        if counts is not None and len(words) == 1 and words[0].isdecimal() and len(words[0]) < 19:
-            counts.append(int(words[0]))
+        if loose is not None and len(words) == 1 and words[0].isdecimal() and len(words[0]) < 19:
+            loose.counts.append(int(words[0]))
             continue
         number = before + len(rows) + 1
-        if columns is not None and len(words) <= max(columns, default=0):
-            raise InputError(f"row {number:,} has {len(words)} values, but column {max(columns) + 1} is read")
-        if rows and columns is None and len(words) != len(rows[0]):
-            raise _uneven(number - 1, len(words), len(rows[0]))
-        at = range(len(words)) if columns is None else columns
-        rows.append([_number(words[column], dialect.decimal, number, column + 1) for column in at])
+        try:
+            row = _parse_row(words, columns, dialect, number, len(rows[0]) if rows else None)
+        except InputError as error:
+            if loose is None or _begins_as_row(words, columns, dialect.decimal):
+                raise
+            loose.behind.append((line, error))
+            continue
+        if loose is not None:
+            loose.check_end()
+        rows.append(row)
     return np.array(rows, np.float64).reshape(len(rows), -1 if rows else 0)
+
+
+def _parse_row(
+    words: list[str], columns: Sequence[int] | None, dialect: Dialect, number: int, width: int | None
+) -> list[float]:
+    """The numbers of a row. number: of the row, from 1. width: of the rows above. Raises InputError."""
+    if columns is None:
+        if width is not None and len(words) != width:
+            raise _uneven(number - 1, len(words), width)
+        columns = range(len(words))
+    last = max(columns, default=0)
+    if len(words) <= last:
+        if len(words) < 3 or dialect.delimiter is None:
+            raise InputError(f"row {number:,} has {len(words)} values, but column {last + 1} is read")
+        words = [*words, *[""] * (last + 1 - len(words))]  # programs leave out empty cells at the end
+    return [_number(words[column], dialect.decimal, number, column + 1) for column in columns]
+
+
+def _begins_as_row(words: Sequence[str], columns: Sequence[int] | None, decimal: str) -> bool:
+    """Whether the first value of a line is a number, or stands for one, as in a row that is damaged."""
+    first = columns[0] if columns else 0
+    if len(words) <= first:
+        return len(words) > 1
+    return words[first].lower() in ABSENT or is_numeral(words[first], decimal)
 
 
 def _number(word: str, decimal: str, row: int, column: int) -> float:

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from ...errors import InputError, shortened
+from ...errors import EmptyFrame, InputError, shortened
 from ...files import open_plain
 from ..admission import MOST_COLUMNS, check_count, whole_number
+from ..units import is_length, plain_unit
 from . import numbers
-from .camera_tables import cameras_in_names, cameras_in_words
+from .camera_tables import cameras_in_comment, cameras_in_names, cameras_in_words
 from .columns import decide, has_positions
 from .corrections import NOTHING_CORRECTED, Corrections
 from .numbers import ABSENT, PLAIN, Dialect, dialect_of, is_comment, is_numeral, split_line
@@ -23,7 +24,14 @@ _LOOKED_AT = 100  # lines
 _SHOWN = 40  # lines of a preview
 _SPARSE = ["POINT3D_ID", "X", "Y", "Z", "R", "G", "B", "ERROR"]  # of COLMAP, before the track
 UNREAD = ("-", "label")  # roles of columns that are not read
-NAMES_HELP = "If the numbers are points, put a line of names above them, such as: x y z"
+NAMES_HELP = (
+    "If the numbers are points, put a line of names above them, such as: x y z, or state them with "
+    "--read columns='x y z'"
+)
+_FIRST_WORDS = {  # of files of another format -> what they are, and their suffix
+    "ply": ("a PLY file", ".ply"), "off": ("an OFF mesh", ".off"), "solid": ("an STL mesh", ".stl"),
+    "dsaa": ("a grid of heights (Surfer)", ".grd"), "# .pcd": ("a PCD file", ".pcd"),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,6 +46,9 @@ class TableHead:
     remarks:  lines above the rows
     rows:     words of the first rows
     instead:  what the table holds where it is no table of points, such as cameras; None where it may be one
+    hint:     what to do in that case
+    doubts:   messages about rows that do not fit the names, or each other
+    unused:   names of columns of text
     """
 
     skip: int
@@ -48,6 +59,9 @@ class TableHead:
     remarks: tuple[str, ...] = ()
     rows: tuple[tuple[str, ...], ...] = ()
     instead: str | None = None
+    hint: str = NAMES_HELP
+    doubts: tuple[str, ...] = ()
+    unused: tuple[str, ...] = ()
 
 
 def head_of(lines: Iterable[str], corrections: Corrections = NOTHING_CORRECTED) -> TableHead:
@@ -101,6 +115,7 @@ class _Search:
         self.unnamed: tuple[int, str, list[str]] | None = None  # the last line that is neither
         self.promised: int | None = None
         self.above: list[str] = []
+        self.instead: str | None = None
         self.body = self._body([split_line(line, dialect) for _, line in above.numeric])
 
     def _body(self, rows: Sequence[Sequence[str]]) -> tuple[int, set[int]]:
@@ -133,11 +148,15 @@ class _Search:
                 self._take_text(number, line)
             self.above.append(line.strip())
         if self.unnamed is not None and not self.names:
-            raise InputError(_not_names(*self.unnamed))
-        raise InputError(f"holds no rows of numbers in its first {MOST_ABOVE:,} lines")
+            raise InputError(_not_names(*self.unnamed), hint=NAMES_HELP)
+        what = f"holds no rows of numbers in its first {MOST_ABOVE:,} lines"
+        if self.promised:
+            raise InputError(f"{what}, but the count above them is {self.promised:,}")
+        raise EmptyFrame(what)
 
     def _take_comment(self, line: str) -> None:
-        text = line.lstrip("#/% \t")
+        text = line.lstrip("#/%!;* \t")
+        self.instead = self.instead or cameras_in_comment(text)
         if "POINT3D_ID" in text:
             self.remark = _SPARSE
         elif has_positions(words := split_names(text)):
@@ -146,8 +165,12 @@ class _Search:
     def _take_text(self, number: int, line: str) -> None:
         words = split_names(line)
         check_count(len(words), MOST_COLUMNS, "columns")
+        units = [plain_unit(word.strip("[](){}<> ")) for word in words]
         if has_positions(words):
             self.names = words
+        elif len(units) == len(self.names or ()) and all(not one or is_length(one) for one in units):
+            named = zip(self.names or (), units, strict=True)
+            self.names = [f"{name} [{one}]" if one else name for name, one in named]
         else:
             self.unnamed = number, line, words
 
@@ -176,8 +199,16 @@ class _Search:
         elif names is None and len(self.remark) == len(words):
             names = self.remark
         self._check_names(names, words)
+        doubts = []
+        if names is not None and not is_sparse:
+            names, doubt = _fitted(names, rows, self.dialect)
+            doubts = [doubt] if doubt else []
+        elif names is None and (doubt := _uneven_rows(rows)):
+            doubts = [doubt]
         columns = self._columns(names, words, rows)
-        instead = cameras_in_words(rows) or (cameras_in_names(names) if names else None)
+        instead = self.instead or cameras_in_words(rows) or (cameras_in_names(names) if names else None)
+        other = next((kind for start, kind in _FIRST_WORDS.items() if self._begins_with(start)), None)
+        instead = other[0] if other else instead
         if any(text.lower().startswith("ncols") for text in self.above):
             instead = "a grid of heights (ESRI ASCII)"
         if (stated := self.corrections.get("columns")) is not None:
@@ -195,7 +226,14 @@ class _Search:
             tuple(self.above[-_SHOWN:]),
             tuple(map(tuple, rows)),
             instead,
+            NAMES_HELP if other is None else f"Give it the suffix {other[1]}",
+            tuple(doubts),
+            () if names is None else tuple(name for at, name in enumerate(names) if at not in columns),
         )
+
+    def _begins_with(self, start: str) -> bool:
+        first = self.lines[0][1].strip().lower()
+        return first == start or first.startswith(f"{start} ")
 
     def _columns(
         self, names: list[str] | None, words: Sequence[str], rows: Sequence[Sequence[str]]
@@ -206,7 +244,9 @@ class _Search:
                 what = f"has {len(words)} columns, but --read columns= names {len(stated)}"
                 raise InputError(what, hint="Give a role for each column, and '-' for one to leave out")
             return [at for at, role in enumerate(stated) if role not in UNREAD]
-        known = words if names is None else words[: len(names)]
+        width = max(map(len, rows)) if self.dialect.delimiter else len(words)
+        width = width if names is None else len(names)
+        known = [*words, *[""] * (width - len(words))][:width]
         return [at for at, word in enumerate(known) if self._is_number(word) or self._may_be(at, rows)]
 
     def _check_names(self, names: list[str] | None, words: Sequence[str]) -> None:
@@ -221,7 +261,7 @@ class _Search:
 
     def _may_be(self, at: int, rows: Sequence[Sequence[str]]) -> bool:
         """Whether a column whose first value is absent holds numbers below it."""
-        column = [row[at] for row in rows if at < len(row)]
+        column = [row[at] if at < len(row) else "" for row in rows if len(row) > 1]
         filled = [word for word in column if word.lower() not in ABSENT]
         return (
             bool(column)
@@ -231,9 +271,49 @@ class _Search:
         )
 
 
+def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
+    """How many values each row has, without empty cells at its end; counts of rows are left out."""
+    widths = [max((at for at, word in enumerate(row, 1) if word), default=0) for row in rows]
+    return [width for width in widths if width > 1]
+
+
+def _fitted(names: list[str], rows: Sequence[Sequence[str]], dialect: Dialect) -> tuple[list[str], str]:
+    """The names of all columns, and a message where their number is not that of the values.
+
+    R and pandas write no name for the column in front, which numbers the rows or names them.
+    """
+    widths = _widths(rows) or [len(names)]
+    width = max(widths)
+    if {*widths} == {len(names) + 1} and _is_unnamed_front([row[0] for row in rows if len(row) > 1], dialect):
+        return ["number", *names], ""
+    if dialect == Dialect("comma") and width > len(names):
+        numbers.check_commas([row for row in rows if len(row) > 1], is_twice=width == 2 * len(names))
+    if width in (len(names), 0) or (width < len(names) and not any(names[width:])):
+        return names, ""
+    which = "Scan4D reads those with names" if width > len(names) else "Check which columns are there"
+    return names, f"there are {len(names)} names of columns, but the rows have {width} values. {which}"
+
+
+def _is_unnamed_front(front: Sequence[str], dialect: Dialect) -> bool:
+    """Whether the first words of rows count up by 1, or are no numbers."""
+    if not any(is_numeral(word, dialect.decimal) for word in front):
+        return True
+    if len(front) < 2 or not all(is_numeral(word, dialect.decimal) for word in front):
+        return False
+    counts = [numbers.value(word, dialect.decimal) for word in front]
+    return all(after - before == 1 for before, after in pairwise(counts))
+
+
+def _uneven_rows(rows: Sequence[Sequence[str]]) -> str:
+    widths = _widths(rows)
+    if not widths or min(widths) == max(widths):
+        return ""
+    return f"its rows have {min(widths)} to {max(widths)} values. Scan4D reads as many as the first row has"
+
+
 def split_names(line: str) -> list[str]:
     """The names of columns in a line, by its own separator; units in brackets belong to names before them."""
-    line = line.strip().lstrip("#/% \t")
+    line = line.strip().lstrip("#/%!* \t")
     separator = next((name for name, mark in numbers.SEPARATORS.items() if mark and mark in line), "blank")
     words = split_line(line, Dialect(separator))
     if separator != "blank":
@@ -249,7 +329,8 @@ def split_names(line: str) -> list[str]:
 
 def _are_sparse(rows: Sequence[Sequence[str]]) -> bool:
     """Whether rows are points of COLMAP: id, position, colour, error, and then pairs of whole numbers."""
-    if len({len(words) for words in rows}) < 2:
+    rows = [words for words in rows if any(words)]
+    if len({len(words) for words in rows}) < 2 and not _has_tracks(rows):
         return False
     return all(
         len(words) >= 8
@@ -259,6 +340,13 @@ def _are_sparse(rows: Sequence[Sequence[str]]) -> bool:
         and all(map(is_numeral, words[1:8]))
         for words in rows
     )
+
+
+def _has_tracks(rows: Sequence[Sequence[str]]) -> bool:
+    """Whether rows of one length may have ids that differ, positions with decimals, and pairs behind."""
+    if not rows or len(rows[0]) < 10 or len({words[0] for words in rows}) < max(len(rows), 2):
+        return False
+    return all(any("." in word for word in words[1:4]) and words[7] and "." in words[7] for words in rows)
 
 
 def _not_names(number: int, line: str, words: Sequence[str]) -> str:
@@ -278,7 +366,7 @@ class TablePreview(NamedTuple):
     lines:     at most 40, as they are
     cells:     words of the first rows
     roles:     one for each column of `cells`; empty where there is a problem
-    separator: "blank", "tab", "comma" or "semicolon"
+    separator: "blank", "tab", "comma", "semicolon" or "bar"
     decimal:   "." or ","
     skip:      lines above the first row
     problem:   why it cannot be read; empty where it can
