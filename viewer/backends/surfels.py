@@ -27,6 +27,7 @@ from ..splatting import passes
 from ..splatting.amplify import FEEDS, Points, amplify
 from ..splatting.fastest import instancing_for
 from ..splatting.gaps import GapRadii
+from ..splatting.local import NEAREST_ALONE, Layer, layer_of, surface_param
 from ..splatting.splat_culling import draw_unhidden, may_cull
 from ..splatting.splats import FRAGMENT, SURFEL, Splats
 from ..splatting.subpixel import average, splat_subpixel, subpixel_share
@@ -82,6 +83,7 @@ class Params:
         group="Surface",
         unless={"passes": ("one_blended", "one_no_depth", "sorted")},
     )
+    surface: str = surface_param("nearest", "Surface", when={"passes": ("auto", "one", "two", "two_large")})
     radius: str = param(
         "auto",
         "auto: the scan's own radii, enlarged if they leave gaps; without any, the size of the gaps around "
@@ -167,7 +169,11 @@ class Surfels(Backend):
 
     def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
         """Two passes, and one, where normals are stored."""
-        return () if pose.views or pose.overview.normals is None else with_levels(pose, {}, {"passes": "one"})
+        return (
+            ()
+            if pose.views or pose.overview.normals is None
+            else with_levels(pose, {}, {"passes": "one", "surface": "nearest"})
+        )
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Splat in as many passes as are asked for; complete where all points are drawn in their size."""
@@ -175,7 +181,7 @@ class Surfels(Backend):
         if not len(pose.cloud):
             surface.clear()
             return False
-        params = _with_passes(params, frame, surface)
+        params, layer = _with_passes(params, pose, frame, surface)
         if frame.moving and frame.share < 1:
             params = replace(params, radius_scale=_UNEVEN * params.radius_scale)
         instancing = _instancing(params, surface)
@@ -183,7 +189,7 @@ class Surfels(Backend):
         sizes, known = _sizes(pose, frame, surface)
 
         def draw_points(points: Points) -> bool:
-            _splat(points, surface, params, instancing, sizes.uniform)
+            _splat(points, surface, params, instancing, layer.of(_splats(params, sizes.uniform)))
             return "tiles" in surface.stats.skipped  # as there are many large ones among these
 
         reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
@@ -193,7 +199,7 @@ class Surfels(Backend):
         stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
         if stays and params.passes in _HIDING and may_cull(pose):
             points = Points(pose, sizes.own, len(pose.cloud), buffers=sizes.buffers)
-            splats = _splats(params, sizes.uniform)
+            splats = layer.of(_splats(params, sizes.uniform))
             limits = replace(
                 splats, radius_scale=larger * splats.radius_scale, least_radius=larger * splats.least_radius
             )
@@ -204,7 +210,7 @@ class Surfels(Backend):
             if points.count > most and _mean_share(points, surface, params, splats) < 1:
                 points = _as_many(most, points, pose, frame, surface, (larger * margin, larger * reach))
             draw_points(replace(points, buffers=sizes.buffers))
-        return surface.stats.is_sample or not known
+        return surface.stats.is_sample or not (known and layer.known)
 
 
 def _as_many(
@@ -256,15 +262,20 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
     return _Sizes(own, uniform, max(uniform, pose.cloud.longest_reach() if own else 0.0)), known
 
 
-def _with_passes(params: Params, frame: FrameView, surface: Surface) -> Params:
-    """The parameters with the passes that "auto" stands for."""
-    if params.passes != "auto":
-        return params
-    return replace(params, passes="two" if passes.blends(frame, surface) else "one", enlarge=1.0)
+def _with_passes(params: Params, pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[Params, Layer]:
+    """The parameters with the passes that "auto" stands for, two where the local surface takes these; and
+    what is shown of layers."""
+    if params.passes == "auto":
+        params = replace(params, passes="two" if passes.blends(frame, surface) else "one", enlarge=1.0)
+    if params.passes not in _HIDING:
+        return params, NEAREST_ALONE
+    layer = layer_of(pose, frame, surface, blends=params.passes in _TWO)
+    if layer.is_local and params.passes == "one":
+        params = replace(params, passes="two", enlarge=1.0)
+    return params, layer
 
 
-def _splat(points: Points, surface: Surface, params: Params, instancing: str, uniform_radius: float) -> None:
-    splats = _splats(params, uniform_radius)
+def _splat(points: Points, surface: Surface, params: Params, instancing: str, splats: Splats) -> None:
     share = _mean_share(points, surface, params, splats)
     if share == 1 or (share > 0 and params.passes == "one"):
         _draw_subpixel(points, surface, params, instancing, replace(splats, mean_share=share))
@@ -336,7 +347,7 @@ def _draw_two(points: Points, surface: Surface, params: Params, instancing: str,
     """Visibility, then blending."""
     if params.passes == "two_large":
         points, splats = splats.larger(points), replace(splats, enlarge=1.0)
-    if splats.enlarge == 1 and splats.epsilon == 0:
+    if splats.enlarge == 1 and splats.epsilon == splats.layer == 0:
         surface.stats.skipped["second pass"] = "no splat is enlarged or blended"
         _draw_nearest(points, surface, instancing, splats)
     elif instancing == "tiles":
@@ -351,7 +362,8 @@ def _instancing(params: Params, surface: Surface) -> str:
 
     def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
         points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {name: partial(_splat, points, surface, like, name, 0.0) for name in _VARIANTS}
+        splats = _splats(like, 0.0)
+        return {name: partial(_splat, points, surface, like, name, splats) for name in _VARIANTS}
 
     return instancing_for(
         surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _VARIANTS, variants

@@ -163,6 +163,8 @@ class Storage(IntEnum):
     RANGE_NORMALS = 0
     RANGE_ROWS = 1
     TILE_COUNTS = 4
+    # Depths of the local surface, beside a Surface's depths, rows, colours, normals and lists.
+    LOCAL_DEPTHS = 6
     # Sums of splats, beside a Surface's colours, normals and lists.
     SUMS = 0
     # Tiles of splats, beside bins, prefix sums and a Surface's depths, rows and lists.

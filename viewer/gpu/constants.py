@@ -11,6 +11,7 @@ EMPTY = 255  # the level of a pixel that shows nothing
 UNKNOWN = 3e38  # a radius, or a normal's length, that is not less says nothing
 LEAST_RADIUS = 0.7072  # pixels: a smaller disc or ball may miss all pixel centres
 BEHIND = 2.0**64  # what depth-buffer values are divided by of splats that fill, behind all others
+LAYER_SLOPE = 6.0  # scan units along the view axis at most for one across a layer of splats
 GROUP = 256  # invocations of a work group
 GROUP_LIMIT = 65535  # work groups that every driver allows along one dimension
 STEEPEST = grid_normals.STEEPEST  # depth step between samples of one surface, in their lateral spacing

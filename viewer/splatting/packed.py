@@ -18,6 +18,7 @@ from ..picture.surface import Surface
 from .amplify import Points, amplify
 from .fastest import instancing_for
 from .lists import TileLists
+from .local import NEAREST_ALONE, Layer, begin_local, settle_depths
 from .passes import blend, blend_by_tiles
 from .splats import FRAGMENT, SURFEL, Splats
 from .tiles import FALLBACK, show_all, show_smaller, show_with, tile_lists
@@ -25,6 +26,7 @@ from .tiles import FALLBACK, show_all, show_smaller, show_with, tile_lists
 VARIANTS = ("tiles", "tbo", "pull")  # how packed points become splats
 _SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it
 _SPARE = 4  # times the rows that there is room for, beyond which room is given up
+_EPSILON = 1.0  # radii of the nearest splat that another may lie behind it and be blended with it
 _FALLOFF = 4.0  # of the Gaussian mask, which ends where the splat does
 
 
@@ -36,15 +38,15 @@ def draw_splats(
     radius_scale: float = 1.0,
     two: bool = False,
     refine: bool = True,
-    epsilon: float = 1.0,
+    layer: Layer = NEAREST_ALONE,
 ) -> None:
     """Draw points whose `buffers` have "splats" and "looks".
 
     instancing: one of `VARIANTS`, or "auto", what is fastest on this device. radius_scale: factor on radii.
-    two: whether splats that overlap are blended, those at most epsilon radii behind the nearest; else the
-    nearest alone is seen. refine: whether splats of points that others hide are made as small as those.
+    two: whether splats that overlap are blended, else the nearest alone is seen. refine: whether splats of
+    points that others hide are made as small as those. layer: how layers are shown, with `two`.
     """
-    splats = _splats(radius_scale, epsilon)
+    splats = layer.of(_splats(radius_scale, _EPSILON))
     _draw(points, surface, splats, _instancing(surface, instancing, two), two, refine)
     if not two:
         take_normals(points.array("splats"), surface)
@@ -77,6 +79,7 @@ def _draw(points: Points, surface: Surface, splats: Splats, variant: str, two: b
         lists = tile_lists(points, surface, splats, looks=two, numbered=refine)
     if lists is not None:
         _draw_by_tiles(points, surface, lists, splats, two, refine)
+        settle_depths(surface, splats)
         return
     feed = FALLBACK if variant == "tiles" else variant
     amplify(points, surface, feed, SURFEL, FRAGMENT, splats)
@@ -85,6 +88,7 @@ def _draw(points: Points, surface: Surface, splats: Splats, variant: str, two: b
         amplify(points, surface, feed, SURFEL, FRAGMENT, splats)
     if two:
         blend(points, surface, feed, splats)
+    settle_depths(surface, splats)
 
 
 def _draw_by_tiles(
@@ -100,6 +104,7 @@ def _draw_by_tiles(
             large = replace(large, buffers=points.buffers)
             show_with(points, large, surface, lists, splats)
     if two:
+        begin_local(surface, splats)
         blend_by_tiles(points, surface, lists, large, splats)
 
 

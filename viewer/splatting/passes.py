@@ -24,6 +24,7 @@ from ..picture.surface import Surface
 from ..scan.ranges import robust_range
 from .amplify import Points, draw_shapes, usable_feed
 from .lists import ALL, NOT_HIDDEN, TOWARDS, TileLists
+from .local import begin_local, bind_local, settle_depths
 from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
 from .tiles import FALLBACK, LIMIT, fill_away, run, show, show_all, splat_first, tile_lists
@@ -59,12 +60,14 @@ def two_passes(points: Points, surface: Surface, feed: str, splats: Splats) -> N
     blend(points, surface, feed, splats)
     if splats.enlarge > 1:
         _close(points, surface, splats)
+    settle_depths(surface, splats)
 
 
 def blend(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
     """The second pass: what each splat gives, added up over what `surface` holds, by the rasteriser."""
+    begin_local(surface, splats)
     _add(points, splats.larger(points), surface, feed, splats)
-    _resolve(points, surface, over=False)
+    _resolve(points, surface, splats, over=False)
 
 
 def _draw_fill(larger: Points, feed: str, splats: Splats) -> None:
@@ -86,7 +89,8 @@ def _add(points: Points, larger: Points, surface: Surface, feed: str, splats: Sp
             gpu.ctx.depth_func = ">="
             gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE
             with gl.kept_depth():
-                draw_shapes(larger, feed, SURFEL, "surfels/passes/add.frag", splats)
+                macros = {"LOCAL": int(splats.layer > 0)}
+                draw_shapes(larger, feed, SURFEL, "surfels/passes/add.frag", splats, macros)
     return sums
 
 
@@ -110,7 +114,7 @@ def splat_over(points: Points, surface: Surface, feed: str, splats: Splats, test
         gpu.ctx.depth_func = ">"
         gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         draw_shapes(points, feed, SURFEL, "surfels/passes/over.frag", splats)
-    _resolve(points, surface, over=True)
+    _resolve(points, surface, splats, over=True)
 
 
 def _farthest_first(points: Points, surface: Surface) -> Points:
@@ -139,7 +143,10 @@ def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
 def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
     """Draw the picture of `two_passes` by tiles; splats that are too large for these are rasterised."""
     by_tiles = _two_by_tiles if splats.enlarge == 1 else _enlarged_by_tiles
-    if not by_tiles(points, surface, splats):
+    begin_local(surface, splats)
+    if by_tiles(points, surface, splats):
+        settle_depths(surface, splats)
+    else:
         two_passes(points, surface, FALLBACK, splats)
 
 
@@ -211,6 +218,7 @@ def blend_by_tiles(
     defines = {
         **{"FILL": 0, "LARGE": int(large is not None), **points.defines},
         **bind_looks(points, surface),
+        **bind_local(surface, splats),
     }
     if away and large is None:
         alone = {**defines, "FOUND": 1, "TAKE": 0, "AWAY": 0, "PARTLY": 0}
@@ -248,9 +256,8 @@ def _sums(points: Points, surface: Surface) -> Iterator[gl.Sums]:
 def _limit(points: Points, surface: Surface, splats: Splats) -> None:
     """Set the depth buffer to how far behind the visible splat others still count."""
     gpu = surface.gpu
-    program = gpu.program(
-        ("present/present.vert", "surfels/passes/limit.frag"), points.defines, params=splats
-    )
+    defines = {**points.defines, "LOCAL": int(splats.layer > 0)}
+    program = gpu.program(("present/present.vert", "surfels/passes/limit.frag"), defines, params=splats)
     bind_visible(points, program)
     surface.depths.bind(Texture.DEPTHS)
     gpu.ctx.enable_only(moderngl.DEPTH_TEST)
@@ -259,13 +266,14 @@ def _limit(points: Points, surface: Surface, splats: Splats) -> None:
         triangle.render(moderngl.TRIANGLES, vertices=3)
 
 
-def _resolve(points: Points, surface: Surface, over: bool) -> None:
-    """Turn sums into the surface's own colours and normals."""
+def _resolve(points: Points, surface: Surface, splats: Splats, over: bool) -> None:
+    """Turn sums into the surface's own colours and normals. over: splats were drawn over each other."""
     gpu = surface.gpu
     sums = surface.cached(_new_sums)
     with gpu.timers.measure("resolve"):
         defines = bind_looks(points, surface)
-        program = gpu.compute("surfels/passes/resolve.comp", {**defines, "OVER": int(over)})
+        defines |= {"OVER": int(over), **(bind_local(surface, splats) if not over else {})}
+        program = gpu.compute("surfels/passes/resolve.comp", defines, params=splats)
         sums.bind_images(Texture.COLOR_SUMS, Texture.NORMAL_SUMS)
         surface.bind_textures()
         surface.covered.clear()

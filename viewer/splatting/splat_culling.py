@@ -22,6 +22,7 @@ from ..gpu import gl
 from ..gpu.bindings import Storage, Texture
 from ..gpu.chunks import chunk_size
 from ..gpu.compact import IndexList, list_flagged
+from ..gpu.constants import LAYER_SLOPE
 from ..gpu.context import Gpu, Program
 from ..gpu.pose import GpuPose
 from ..picture.surface import Surface
@@ -66,7 +67,10 @@ def splat_margins(splats: Splats, largest: float, slack: float, trusts: bool, sp
         radius_scale=splats.radius_scale,
         uniform_radius=splats.uniform_radius,
         least_radius=splats.least_radius,
-        behind=splats.epsilon * splats.radius_scale * max(largest, splats.uniform_radius),
+        behind=max(
+            splats.epsilon * splats.radius_scale * max(largest, splats.uniform_radius),
+            LAYER_SLOPE * splats.layer,
+        ),
         pixels_behind=splats.epsilon * splats.least_radius,
         cull_back=splats.cull_back,
         trusts=trusts,

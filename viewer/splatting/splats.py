@@ -21,8 +21,9 @@ class Splats:
     off. falloff: of the mask exp(-falloff t), t the squared distance, 1 where it is cut off; at most 4.
 
     For blending: enlarge: factor on the splats of the second pass. epsilon: how far behind the visible splat
-    others still count, in its radii. mean_share: of the mean, where splats of about a pixel are averaged; the
-    rest is the visible one's.
+    others still count, in its radii. layer: how far behind the nearest splat others of its layer lie, along
+    its normal, scan units; 0: the picture shows the depth of the nearest. mean_share: of the mean, where
+    splats of about a pixel are averaged; the rest is the visible one's.
     """
 
     radius_scale: float
@@ -34,6 +35,7 @@ class Splats:
     enlarge: float
     epsilon: float
     mean_share: float = 0.0
+    layer: float = 0.0
 
     def larger(self, points: Points) -> Points:
         """The points as the second pass draws them."""

@@ -149,9 +149,12 @@ def show(
     """
     if not found:
         surface.clear()
-    defines = {**_SHOWN, "FOUND": int(found), "FARTHEST": farthest, "AWAY": int(away)}
+    defines: dict[str, object] = {
+        **_SHOWN, "FOUND": int(found), "FARTHEST": farthest, "AWAY": int(away),
+    }  # fmt: skip
     if farthest == LIMIT:
-        run("show", surface, lists, {**defines, **points.defines}, points, splats)
+        defines |= {**points.defines, "LOCAL": int(splats.layer > 0)}
+        run("show", surface, lists, defines, points, splats)
     else:
         run("show", surface, lists, defines, splats=splats)
 

@@ -1,6 +1,7 @@
 // How far behind the visible splat others still count (Slomp 2014, V-B): visibility, pushed away from the eye.
 #include "surfels/splat.glsl"
 #include "amplify/radii.glsl"
+#include "surfels/passes/layer.glsl"
 
 // Of the splat that a pixel shows at this depth, scan units.
 float visible_radius(float depth, uint row) {

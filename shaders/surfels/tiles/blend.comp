@@ -11,6 +11,9 @@
 #include "surfels/passes/look.glsl"
 #include "surfels/passes/store.glsl"
 #include "common/split.glsl"
+#if LOCAL
+layout(std430, binding = STORAGE_LOCAL_DEPTHS) writeonly buffer LocalDepths { uint local_depths[]; };
+#endif
 
 // A float holds the sums of so many discs exactly, an integer those of a whole list (TileLists): the order of a
 // tile's list, which changes from frame to frame, does not show.
@@ -30,6 +33,10 @@ int total[PIXELS];
 uvec3 light[PIXELS];
 ivec3 normal[PIXELS];
 vec3 visible[PIXELS];  // normals
+#if LOCAL
+float front[PIXELS], per_key[PIXELS];  // surfels/passes/layer.glsl
+int layer_total[PIXELS];
+#endif
 float mask_scale;
 
 #if TAKE
@@ -71,7 +78,13 @@ float visible_look(int k, out vec3 rgb, out vec3 n) {
 void blend_block(usamplerBuffer list, int first, int last) {
     float weight_sum[PIXELS];
     vec3 light_sum[PIXELS], normal_sum[PIXELS];
+#if LOCAL
+    float layer_sum[PIXELS];
+#endif
     for (int k = 0; k < PIXELS; ++k) {
+#if LOCAL
+        layer_sum[k] = 0.0;
+#endif
         weight_sum[k] = 0.0;
         light_sum[k] = normal_sum[k] = vec3(0.0);
     }
@@ -92,6 +105,9 @@ void blend_block(usamplerBuffer list, int first, int last) {
                 weight_sum[k] += weight;
                 light_sum[k] += weight * rgb;
                 normal_sum[k] += turned(weight, n, visible[k]) * n;
+#if LOCAL
+                layer_sum[k] += weight * layer_steps(front[k], here, per_key[k]);
+#endif
             }
         } while (found != uvec4(0u));
         first += RUN;
@@ -100,6 +116,9 @@ void blend_block(usamplerBuffer list, int first, int last) {
         total[k] += int(weight_sum[k]);
         light[k] += uvec3(light_sum[k]);
         normal[k] += ivec3(normal_sum[k]);
+#if LOCAL
+        layer_total[k] += int(layer_sum[k]);
+#endif
     }
 }
 
@@ -148,7 +167,15 @@ void main() {
         bool is_shown = shown[k] != NOTHING;
         vec3 rgb;
         float radius = visible_look(k, rgb, visible[k]);
-        precise float behind = depth + epsilon * splat_radius(radius, depth);
+        float reach = epsilon * splat_radius(radius, depth);
+#if LOCAL
+        vec2 center = vec2(pixel + off(k)) + 0.5;
+        reach = max(reach, layer_depth(visible[k], center));
+        front[k] = stored_depth(is_shown ? depth : view_near);
+        per_key[k] = steps_per_key(front[k], is_shown ? depth : view_near, visible[k], center);
+        layer_total[k] = 0;
+#endif
+        precise float behind = depth + reach;
         float least = stored_depth(behind);
         limit[k] = is_shown ? least : 1.0;
 #if PARTLY
@@ -159,7 +186,11 @@ void main() {
         vec4 sums = texelFetch(color_sums, pixel + off(k), 0);
         total[k] = int(sums.a);
         light[k] = uvec3(sums.rgb);
-        normal[k] = ivec3(texelFetch(normal_sums, pixel + off(k), 0).xyz);
+        vec4 sums_beside = texelFetch(normal_sums, pixel + off(k), 0);
+        normal[k] = ivec3(sums_beside.xyz);
+#if LOCAL
+        layer_total[k] = int(sums_beside.a);
+#endif
 #endif
     }
 #if PARTLY
@@ -181,6 +212,10 @@ void main() {
             vec3 mean_light = means_of(light[k], count), mean_normal = means_of(normal[k], count);
             vec3 rgb, n;
             visible_look(k, rgb, n);
+#if LOCAL
+            float steps = means_of(ivec3(layer_total[k], 0, 0), count).x;
+            local_depths[index_of(k)] = floatBitsToUint(depth_of_steps(front[k], steps, per_key[k]));
+#endif
             store_mean(index_of(k), mean_light, mean_normal, total[k] > 0, 1.0, rgb, visible[k]);
         }
 }

@@ -50,7 +50,11 @@ void main() {
 #if FARTHEST == 2
         bool is_shown = shown[k] != NOTHING;
         float depth = uintBitsToFloat(bits);
-        precise float behind = depth + epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
+        float reach = epsilon * visible_radius(depth, is_shown ? shown[k] : 0u);
+#if LOCAL
+        reach = max(reach, LAYER_SLOPE * layer);
+#endif
+        precise float behind = depth + reach;
         bits = is_shown ? floatBitsToUint(behind) : bits;
 #endif
         most = max(most, in_picture(k) ? bits : 0u);

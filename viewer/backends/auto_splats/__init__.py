@@ -15,6 +15,7 @@ from ...params import param
 from ...picture.surface import Surface
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
+from ...splatting.local import layer_of, surface_param
 from ...splatting.packed import VARIANTS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .grids import border_of
@@ -86,6 +87,7 @@ class Params:
         choices=("one", "two"),
         group=_SPLATS,
     )
+    surface: str = surface_param("nearest", _SPLATS)
     elliptical: bool = param(
         False,
         "Stretch splats along the direction in which neighbours lie farther apart; off: round splats",
@@ -156,7 +158,7 @@ class AutoSplats(Backend):
 
     def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
         """Two passes, and one, of bare points; with normals, surfels draw about the same in less time."""
-        return () if pose.views or self.suits(pose) is None else ({}, {"passes": "one"})
+        return () if pose.views or self.suits(pose) is None else ({}, {"passes": "one", "surface": "nearest"})
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
@@ -176,16 +178,18 @@ class AutoSplats(Backend):
         if not found.is_whole:
             draw_depths(_points(pose, found, params), surface, instancing=instancing, radius_scale=scale)
             found.find_late(pose, surface, search)
+        layer = layer_of(pose, frame, surface, blends=params.passes == "two")
         draw_splats(
             _points(pose, found, params),
             surface,
             instancing=instancing,
             radius_scale=scale,
-            two=params.passes == "two",
+            two=params.passes == "two" or layer.is_local,
             refine=params.refine,
+            layer=layer,
         )
         give_value(found, surface, params.radius_scale)
-        return surface.stats.share < 1
+        return surface.stats.share < 1 or not layer.known
 
 
 def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:

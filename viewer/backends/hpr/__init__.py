@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from ...gpu.pose import GpuPose
 from ...params import param
 from ...picture.surface import Surface
+from ...splatting.local import surface_param
 from ...visibility.candidates import UNLIMITED
 from ...visibility.search import DEPTH, HULL, MODES, MOST_SECTORS, QUALITY, SearchSettings, SeenPicture
 from .. import AROUND_ALL, NO_DETAIL, Backend, FrameView, Limit
@@ -69,6 +70,7 @@ class Params:
         group=_SHOWN,
         when={"output": ("splats", "reconstruction")},
     )
+    surface: str = surface_param("nearest", _SHOWN, when={"output": ("splats",)})
     mode: str = param(
         MODES[0],
         "hull: a point is visible if it lies on the convex hull of the flipped points; combined: a "

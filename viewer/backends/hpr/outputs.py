@@ -6,6 +6,7 @@ from ...gpu.pose import GpuPose
 from ...look import wants_normals
 from ...picture.surface import Surface
 from ...splatting.amplify import Points
+from ...splatting.local import layer_of
 from ...splatting.packed import draw_splats, take_normals
 from ...splatting.squares import draw_squares
 from ...visibility.calibration import EyeCalibration
@@ -38,7 +39,9 @@ def show_visible(
     elif params.output == "splats":
         buffers = {name: splats[name] for name in ("splats", "looks")}
         points = Points(pose, use_radii=True, count=len(pose.cloud), buffers=buffers, elliptical=False)
-        draw_splats(points, surface, radius_scale=params.radius_scale, two=True)
+        layer = layer_of(pose, frame, surface, blends=True)
+        draw_splats(points, surface, radius_scale=params.radius_scale, two=True, layer=layer)
+        return surface.stats.share < 1 or not layer.known
     else:
         pixels = params.point_size if params.output == "points" else 1
         draw_squares(pose, surface, pixels, frame.share, seen.visible)

@@ -25,6 +25,7 @@ from ...scan.octree.traverse import Cut, Sight, Traversal
 from ...scan.points import NOTHING, PointCloud
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
+from ...splatting.local import NEAREST_ALONE, layer_of, surface_param
 from ...splatting.passes import blends
 from ...view import View
 from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, Backend, Derives, FrameView, Limit
@@ -113,6 +114,7 @@ class Params:
         group="Octants",
         when={"shape": ("discs",)},
     )
+    surface: str = surface_param("nearest", "Octants", when={"shape": ("discs",)})
     least: float = param(
         0.75,
         "Smallest half edge of a cube, in radii of the disc that would replace it. Larger cubes "
@@ -232,16 +234,23 @@ class Voxels(Backend):
         if not points.count:
             surface.clear()
             return not shown.cut.complete
+        layer = NEAREST_ALONE
         if params.shape == "discs":
             two = blends(frame, surface) if params.passes == "auto" else params.passes == "two"
+            layer = layer_of(pose, frame, surface, blends=two)
             draw_discs(
-                points, surface, instancing=params.instancing, radius_scale=params.radius_scale, two=two
+                points,
+                surface,
+                instancing=params.instancing,
+                radius_scale=params.radius_scale,
+                two=two or layer.is_local,
+                layer=layer,
             )
         else:
             draw_cubes(points, surface, params.instancing)
         if params.shape == "flat_cubes":
             shade_flat(points, surface)
-        return coarse or not shown.cut.complete
+        return coarse or not (shown.cut.complete and layer.known)
 
 
 def _report(cut: Cut, octree: Octree, params: Params, stats: Stats) -> None:

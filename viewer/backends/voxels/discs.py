@@ -10,6 +10,7 @@ from ...gpu.pose import GpuPose
 from ...picture.surface import Surface
 from ...splatting.amplify import FEEDS, Points, amplify
 from ...splatting.fastest import instancing_for
+from ...splatting.local import NEAREST_ALONE, Layer
 from ...splatting.passes import tiled_two_passes, two_passes
 from ...splatting.splats import FRAGMENT, SURFEL, Splats
 from ...splatting.subpixel import average, splat_subpixel, subpixel_share
@@ -20,18 +21,25 @@ VARIANTS = (TILES, *FEEDS)
 
 
 def draw_discs(
-    points: Points, surface: Surface, *, instancing: str, radius_scale: float, two: bool = False
+    points: Points,
+    surface: Surface,
+    *,
+    instancing: str,
+    radius_scale: float,
+    two: bool = False,
+    layer: Layer = NEAREST_ALONE,
 ) -> None:
     """The nearest disc of each pixel; where discs are about a pixel, the mean of those close behind it.
 
     Points: with normals and radii. instancing: "auto", TILES, or a feed, which then brings all of them. two:
-    whether larger discs are blended with those close behind them, too.
+    whether larger discs are blended with those close behind them, too. layer: what is shown of layers, with
+    `two`.
     """
     splats = _splats(radius_scale)
     share = subpixel_share(points, surface, splats)
     variant = _instancing(surface, instancing, two)
     if two and share < 1:
-        _draw(points, surface, splats, variant, two)
+        _draw(points, surface, layer.of(splats), variant, two)
         return
     if share > 0:
         splats = _splats(radius_scale, share)

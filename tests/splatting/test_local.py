@@ -1,0 +1,224 @@
+"""The local surface: the mean of a layer as plainly computed; without bias under noise, and the nearest splat
+without it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scenes import BUFFERS, sphere
+
+from viewer.backends import backend
+from viewer.bench.scenes.defects import noisy
+from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
+from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
+from viewer.gpu.constants import LAYER_SLOPE, NOTHING
+from viewer.mesh.reference import pixel_rays
+from viewer.picture.surface import Surface
+from viewer.scan.noise import Noise, noise_of
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
+from viewer.scan.spacing import typical_spacing
+from viewer.splatting.local import Layer
+from viewer.view import View
+
+Draw = Callable[..., Surface]
+Floats = NDArray[np.float64]
+SIZE = (96, 72)
+COUNT = 3000
+FALLOFF, EPSILON = 4.0, 1.0  # defaults of surfels
+BARE = ("auto_splats", "voxels")
+SPLATS = [
+    pytest.param(name, {"passes": passes}, marks=pytest.mark.backend(name), id=f"{name} {passes}")
+    for name in ("surfels", *BARE)
+    for passes in ("one", "two")
+]
+LOCAL = {"surface": "local"}
+
+
+def noisy_sphere(spacings: float, count: int = COUNT) -> PointCloud:
+    """A unit sphere whose points lie off it, with the normals and radii of those on it."""
+    return noisy(spacings)(sphere(count), np.random.default_rng(1))
+
+
+def looking_at(cloud: PointCloud, projection: str = "perspective") -> Camera:
+    return Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3).projected(projection)
+
+
+def true_depths(view: View) -> Floats:
+    """Depths (H, W) of the unit sphere, +inf beside it."""
+    starts, steps = pixel_rays(view, np.arange(view.size[0] * view.size[1]))
+    starts = starts + view.origin
+    a, b = (steps**2).sum(axis=1), (starts * steps).sum(axis=1)
+    inside = b**2 - a * ((starts**2).sum(axis=1) - 1)
+    depth = (-b - np.sqrt(np.maximum(inside, 0))) / a
+    return np.where(inside > 0, depth, np.inf).reshape(view.size[::-1])
+
+
+def plain(cloud: PointCloud, view: View, layer: Layer) -> tuple[Floats, NDArray[np.uint32]]:
+    """Depth and row of each pixel, (H, W): all discs of all pixels in float64.
+
+    The row is that of the nearest disc. The depth is the mean of the discs that lie behind it by no more than
+    the thickness of the layer; discs that are only close behind in depth count as the nearest.
+    """
+    starts, steps = pixel_rays(view, np.arange(view.size[0] * view.size[1]))
+    assert cloud.normals is not None
+    assert cloud.radii is not None
+    centers, normals = cloud.positions.astype(np.float64), cloud.normals.astype(np.float64)
+    facing = steps @ normals.T
+    depths = ((centers * normals).sum(axis=1) - starts @ normals.T) / facing
+    away = starts[:, None] + depths[..., None] * steps[:, None] - centers
+    t = (away**2).sum(axis=2) / cloud.radii.astype(np.float64) ** 2
+    depths = np.where(t <= 1, depths, np.inf)
+    row, pixels = depths.argmin(axis=1), np.arange(len(depths))
+    nearest = depths[pixels, row]
+    is_shown = np.isfinite(nearest)
+    slope = np.minimum(1 / np.maximum(np.abs(facing[pixels, row]), 1e-9), LAYER_SLOPE)
+    thick = layer.thickness * slope
+    weights = np.rint(31 * np.exp(-FALLOFF * layer.smoothing * np.minimum(t, 1)))
+    with np.errstate(invalid="ignore"):
+        behind = depths - nearest[:, None]
+    reach = np.maximum(thick, EPSILON * cloud.radii[row])
+    weights = np.where(behind <= reach[:, None], weights, 0)
+    voted = np.where(behind <= thick[:, None], depths, nearest[:, None])
+    # In perspective, values that are linear in the picture are averaged.
+    values = 1 / voted if view.perspective else voted
+    mean = (weights * np.where(weights > 0, values, 0)).sum(axis=1) / weights.sum(axis=1).clip(1)
+    mean = 1 / np.where(is_shown, mean, 1) if view.perspective else mean
+    shape = view.size[::-1]
+    return np.where(is_shown, mean, np.inf).reshape(shape), np.where(is_shown, row, NOTHING).reshape(shape)
+
+
+def surfels(draw: Draw, cloud: PointCloud, camera: Camera, **params: object) -> Surface:
+    given = {"passes": "two", "enlarge": 1.0, "radius": "own", **LOCAL, **params}
+    return draw(cloud, camera, SIZE, "surfels", params=given)
+
+
+@pytest.mark.backend("surfels")
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+@pytest.mark.parametrize("instancing", ["tiles", "gs"])
+def test_the_depth_is_the_mean_of_the_layer(draw: Draw, projection: str, instancing: str) -> None:
+    cloud = noisy_sphere(0.3, 600)
+    cloud = replace(cloud, radii=np.full(len(cloud), 1.2 * typical_spacing(cloud), np.float32))
+    layer = Layer(noise_of(cloud))
+    assert layer.is_local
+    camera = looking_at(cloud, projection)
+    found = surfels(draw, cloud, camera, instancing=instancing)
+    depth, row = plain(cloud, found.view, layer)
+    same = found.row == row
+    assert same.mean() > 0.995, "other discs are the nearest"
+    both = same & np.isfinite(depth)
+    error = np.abs(found.depth[both] - depth[both]) / layer.thickness
+    assert np.quantile(error, 0.99) < 0.01
+    nearest = surfels(draw, cloud, camera, instancing=instancing, surface="nearest")
+    np.testing.assert_array_equal(nearest.row, found.row)
+    assert np.mean(found.depth[both] - nearest.depth[both]) > 0.1 * layer.thickness
+
+
+@pytest.mark.parametrize(("name", "params"), SPLATS)
+@pytest.mark.parametrize("noise", [0.3, 0.6])
+def test_noise_does_not_move_the_surface(
+    draw: Draw, name: str, params: dict[str, object], noise: float
+) -> None:
+    cloud = noisy_sphere(noise, 20_000)
+    spacing = typical_spacing(sphere(20_000))
+    cloud = replace(cloud, radii=None, normals=None if name in BARE else cloud.normals)
+    size, camera = (240, 180), looking_at(cloud)
+
+    def bias(surface: str) -> float:
+        drawn = draw(cloud, camera, size, name, params={**params, "surface": surface})
+        true = true_depths(drawn.view)
+        both = np.isfinite(true) & np.isfinite(drawn.depth)
+        error = (drawn.depth[both] - true[both]) / spacing
+        return float(error[np.abs(error) < 4].mean())
+
+    assert bias("nearest") < -0.3
+    # Where the normals of splats are estimated from few noisy points, splats lean at the outline.
+    most = 0.3 if name == "auto_splats" else 0.05
+    assert abs(bias("local")) < most * max(1.0, noise / 0.3)
+
+
+@pytest.mark.parametrize(("name", "params"), SPLATS)
+def test_without_noise_it_is_the_nearest_splat(draw: Draw, name: str, params: dict[str, object]) -> None:
+    cloud = sphere(COUNT)
+    cloud = replace(cloud, radii=None, normals=None if name in BARE else cloud.normals)
+    nearest, local = (
+        draw(cloud, looking_at(cloud), SIZE, name, params={**params, "surface": surface})
+        for surface in ("nearest", "local")
+    )
+    for channel, values in nearest.arrays().items():
+        np.testing.assert_array_equal(values, local.arrays()[channel], channel)
+    assert "too little noise" in local.stats.chosen["surface"]
+
+
+@pytest.mark.backend("surfels")
+@pytest.mark.parametrize("enlarge", [1.0, 2.0])
+def test_feeds_give_the_same_bits(draw: Draw, enlarge: float) -> None:
+    cloud = noisy_sphere(0.3)
+    first, *others = (
+        surfels(draw, cloud, looking_at(cloud), instancing=feed, enlarge=enlarge).arrays() for feed in BUFFERS
+    )
+    for other in others:
+        for channel, values in first.items():
+            np.testing.assert_array_equal(values, other[channel], channel)
+    tiles = surfels(draw, cloud, looking_at(cloud), instancing="tiles", enlarge=enlarge).arrays()
+    same = (tiles["id"] == first["id"]) & np.isfinite(first["depth"])
+    assert same.mean() > 0.98 * np.isfinite(first["depth"]).mean()
+    np.testing.assert_allclose(tiles["depth"][same], first["depth"][same], rtol=1e-4)
+
+
+@pytest.mark.backend("surfels")
+def test_the_order_of_points_does_not_matter(draw: Draw) -> None:
+    cloud = noisy_sphere(0.3)
+    order = np.random.default_rng(2).permutation(len(cloud))
+    shuffled = PointCloud.from_arrays(
+        cloud.world()[order], normals=cloud.normals[order], radii=cloud.radii[order], origin=cloud.origin
+    )
+    first, second = (surfels(draw, each, looking_at(cloud)) for each in (cloud, shuffled))
+    np.testing.assert_array_equal(order[second.row[second.row != NOTHING]], first.row[first.row != NOTHING])
+    # The noise is that of other points.
+    np.testing.assert_allclose(first.depth, second.depth, rtol=0.01)
+
+
+@pytest.mark.backend("surfels")
+def test_layers_that_lie_apart_stay_apart(draw: Draw) -> None:
+    """A noisy sphere in one that is half as large: the mean is that of the front alone."""
+    outer = noisy_sphere(0.2, 6000)
+    inner = PointCloud.from_arrays(0.5 * outer.world(), normals=outer.normals, radii=outer.radii)
+    both = PointCloud.from_arrays(
+        np.concatenate([outer.world(), inner.world()]),
+        normals=np.concatenate([outer.normals, inner.normals]),
+        radii=np.concatenate([outer.radii, inner.radii]),
+    )
+    camera = looking_at(outer)
+    alone, together = (surfels(draw, cloud, camera) for cloud in (outer, both))
+    shown = np.isfinite(alone.depth)
+    assert np.quantile(np.abs(alone.depth[shown] - together.depth[shown]), 0.95) < 0.02
+
+
+@pytest.mark.parametrize(("name", "params"), SPLATS)
+def test_the_background_estimates_the_noise(
+    renderer: Renderer, draw: Draw, name: str, params: dict[str, object]
+) -> None:
+    cloud = replace(noisy_sphere(0.3), radii=None)
+    request = Request(
+        Pose(0, 0.0, "noisy", cloud), looking_at(cloud), name, backend(name).params({**params, **LOCAL})
+    )
+    surface = Surface(renderer.gpu, SIZE)
+    while render_frame(renderer, request, surface, wait=False):
+        pass
+    finished = draw(cloud, looking_at(cloud), SIZE, name, params={**params, **LOCAL})
+    np.testing.assert_array_equal(surface.depth, finished.depth)
+
+
+def test_noise_tells_how_thick_layers_are() -> None:
+    assert not Layer(Noise(0.05, 1.0)).is_local
+    little, more, most = (Layer(Noise(deviation, 1.0)) for deviation in (0.051, 0.3, 2.0))
+    assert 0 < little.thickness < 0.1 < more.thickness < most.thickness
+    assert 1 > little.smoothing > more.smoothing >= most.smoothing == 0.5
+    assert not Layer(None).known
