@@ -115,7 +115,7 @@ def test_sums_that_cannot_be_held_are_refused(renderer: Renderer) -> None:
     with pytest.raises(InputError, match="do not fit into 32 bits"):
         FixedPoint((1.0,), (0.5,), 2**31)
     for limit, finest in ((0.0, 1.0), (np.inf, 1.0), (1.0, 0.0), (1.0, 2.0), (np.nan, 1.0)):
-        with pytest.raises(ValueError, match="step must be above 0"):
+        with pytest.raises(ValueError, match="must be above 0, and at most the"):
             FixedPoint((limit,), (finest,), 1)
     with pytest.raises(ValueError, match="must be 0 or more, not -1"):
         FixedPoint((1.0,), (1.0,), -1)

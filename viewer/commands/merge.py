@@ -119,9 +119,9 @@ def _tell_facts(args: Namespace, timeline: Timeline, facts: Sequence[dict[str, A
             f"{escaped(view['name'])} {view['kept']:,} of {view['pixels']:,}" for view in pose["views"]
         )
         tell(
-            f"pose {pose['pose']}: overlap {pose['overlap_before']:.1%} -> {pose['overlap_after']:.2%} of the"
-            f" area, {pose['ties']:.2%} kept from several views with tied weights; number of kept "
-            f"pixels: {kept}"
+            f"pose {pose['pose']}: several views show {pose['overlap_before']:.1%} of the area before "
+            f"merging, {pose['overlap_after']:.2%} after it, and {pose['ties']:.2%} because of tied "
+            f"weights; number of kept pixels: {kept}"
         )
     if args.report:
         save_json(args.report, {"scan": timeline.name, "unit": timeline.unit, "poses": facts})

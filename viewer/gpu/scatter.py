@@ -246,7 +246,7 @@ class FixedPoint:
 def _step(limit: float, finest: float, most: int) -> float:
     if not (0 < finest <= limit < np.inf):
         raise ValueError(
-            f"a channel's step must be above 0 and at most its limit: limit {limit}, step {finest}"
+            f"the step {finest} of a channel must be above 0, and at most the channel's limit {limit}"
         )
     step = float(2.0 ** np.ceil(np.log2(finest)))
     while most * round(float(np.float32(limit)) / step) > _LARGEST_SUM:

@@ -120,7 +120,7 @@ class ProjectionParams:
 
     neighbors: int = param(
         4,
-        "Samples within this distance from a sample of the nearer surface stay visible",
+        "Distance, in samples, from a sample of the nearer surface within which samples stay visible",
         low=0,
         high=100,
         unit="samples",

@@ -69,8 +69,8 @@ class Params:
     )
     growth: float = param(
         4.0,
-        "Stop the search with fewer than k neighbours if its area can grow by this factor without "
-        "reaching another point",
+        "Factor by which the search area can grow without reaching another point, for the search to "
+        "stop with fewer than k neighbours",
         low=1,
         high=100,
         group=_NEIGHBORS,

@@ -78,7 +78,7 @@ class Params:
     )
     occupancy: int = param(
         8,
-        "Octants with at most this many points are not divided",
+        "Largest number of points in an octant that Scan4D does not divide",
         low=1,
         high=1 << 20,
         affects="derive",
@@ -137,7 +137,7 @@ class Params:
     )
     pixel_threshold: float = param(
         1.0,
-        "Draw an octant instead of its children if its edge is shorter than this",
+        "Largest edge, in pixels, of an octant that is drawn instead of its children",
         low=0.25,
         high=64.0,
         unit="px",

@@ -47,7 +47,7 @@ def read(path: Path) -> LandmarkSet:
     except ValueError as error:
         raise InputError(f"is not JSON ({error})") from error
     if not isinstance(data, dict) or not isinstance(data.get("markups"), list):
-        raise InputError("has no list of markups", hint="Save the file as .mrk.json in 3D Slicer")
+        raise InputError("has no list of markups (landmarks)", hint="Save the file as .mrk.json in 3D Slicer")
     schema = data.get("@schema", _SCHEMA)
     if not isinstance(schema, str) or not _READ.search(schema):
         raise InputError(f"has the schema '{shortened(schema)}', but Scan4D reads markups 1.x")
