@@ -124,6 +124,11 @@ def point_form(word: str, decimal: str = ".") -> str:
     return word.replace(",", "") if "," in word and _THOUSANDS.fullmatch(word) else word
 
 
+def is_not_finite(word: str) -> bool:
+    """Whether a word is what Windows writes for a number that is not finite, such as `1.#QNAN`."""
+    return _NOT_FINITE.fullmatch(word) is not None
+
+
 def is_numeral(word: str, decimal: str = ".") -> bool:
     """Whether a word is a number as `value` reads them."""
     if "_" in word:  # which Python allows among digits

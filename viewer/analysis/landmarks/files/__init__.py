@@ -35,6 +35,7 @@ import numpy as np
 from ....errors import InputError, explained, shortened
 from ....files import open_plain, whole_file
 from ....scan.formats import one_message
+from ....scan.reading.numbers import decoded
 from ....task import checkpoint
 from ...track import Known
 from ..landmark_set import LandmarkSet, check_cells
@@ -59,7 +60,7 @@ def is_landmark_file(path: Path | str) -> bool:
         return False
     try:
         with open_plain(path) as stream:
-            head = stream.read(_HEAD).decode("utf-8-sig", "replace")
+            head = decoded(stream.read(_HEAD))
     except OSError:
         return False
     return not hasattr(module, "owns") or module.owns(head)

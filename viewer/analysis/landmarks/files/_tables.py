@@ -8,49 +8,91 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from io import StringIO
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ....csv_text import text_of_cell
 from ....errors import InputError, shortened
+from ....scan.reading.columns import canonical_names, plain_name
+from ....scan.reading.missing import SENTINELS
 from ....scan.reading.numbers import dialect_of, point_form
-from ....scan.units import conversion, usable_unit
+from ....scan.units import conversion, plain_unit, usable_unit
 from ...track import STATES, Known
 from ..landmark_set import LandmarkNotes, LandmarkSet, check_cells
-from ._text import at_line, count_of, number_of, read_all
+from ._text import at_line, count_of, is_number, number_of, read_all
 
 LONG_COLUMNS = ("kind", "frame", "time", "name", "x", "y", "z", "state", "value", "sigma", "unit")
 _KNOWN = {word: known for known, word in STATES.items()}
-_NAMES = ("name", "label", "landmark", "id")
+_NAMES = (
+    "name", "label", "landmark", "landmark name", "landmark_name", "point", "point name", "point_name",
+    "marker", "punkt", "bezeichnung", "landmarke", "nom", "nombre", "id",
+)  # fmt: skip
 _SPACES = (
     ("xyz", None),
     ("lps", "LPS"),
     ("ras", "RAS"),
 )  # columns of coordinates, and the axes that they state
 _SLICER = {"selected", "visible", "locked"}  # columns of 3D Slicer, whose lengths are millimetres
-_AXIS = re.compile(r"(.+)[ _.:]([xyz])", re.IGNORECASE | re.DOTALL)
-_FRAMES, _TIMES = ("frame", "frames"), ("time", "seconds", "t")
+_AXES = (  # names of the columns of a landmark: nose_x, x_nose and noseX
+    re.compile(r"(?P<name>.+)[ _.:](?P<axis>[xyz])", re.IGNORECASE | re.DOTALL),
+    re.compile(r"(?P<axis>[xyz])[ _.:](?P<name>.+)", re.IGNORECASE | re.DOTALL),
+    re.compile(r"(?P<name>.*[a-z0-9])(?P<axis>[XYZ])", re.DOTALL),
+)
+_UNIT = re.compile(r"\s*[\[(]\s*([^\W\d]+)\s*[\])]$")  # behind a name
+_SEPARATORS = ";\t|,"
+_FRAMES = ("frame", "frames", "bild", "bildnummer", "image", "trame")
+_TIMES = ("time", "seconds", "t", "zeit")
 _UNDEFINED = {"0", "false"}
 _HINT = "Give each row one value for each column that the first line names"
 
 
 def has_columns(head: str) -> bool:
     """Whether the first line of a text names the columns of landmarks."""
-    names = [name.strip().lower() for name in _cells(head.split("\n", 1)[0])]
+    head = _without_remarks(head)[1]
+    names = _plain(_cells(head.split("\n", 1)[0]))
     named = set(names) & {*_NAMES, "kind"}
     return bool(_space_of(names) and named) or len(_wide_columns(names)) > 0
 
 
+def _without_remarks(text: str) -> tuple[int, str]:
+    """How many lines stand above the first row (blank lines, comments and `sep=;`), and the text below."""
+    lines = text.splitlines(keepends=True)
+    above = 0
+    for line in lines:
+        if line.strip() and not line.startswith(("#", "//")) and not line.lower().startswith("sep="):
+            break
+        above += 1
+    return above, "".join(lines[above:])
+
+
 def _cells(line: str) -> list[str]:
     try:
-        return next(csv.reader([line], delimiter=_separator(line)), [])
+        return next(csv.reader([line], **_form(_separator(line))), [])
     except csv.Error:
         return []
 
 
 def _separator(line: str) -> str:
-    return max(",;\t", key=line.count)
+    best = max(_SEPARATORS, key=line.count)
+    return best if best in line else " "
+
+
+def _form(separator: str) -> dict[str, Any]:
+    """How csv.reader splits lines: several blanks count as one."""
+    return {"delimiter": separator, "skipinitialspace": separator == " "}
+
+
+def _plain(names: Sequence[str]) -> list[str]:
+    """Names of columns in lower case, without units; x, y and z for what programs call so beside names."""
+    plain = [plain_name(name).name for name in names]
+    if _first(plain, _NAMES) is not None:
+        found = canonical_names(names)
+        plain = [one if one in ("x", "y", "z") else name for one, name in zip(found, plain, strict=True)]
+    return plain
 
 
 def _space_of(names: Sequence[str]) -> tuple[str, str | None] | None:
@@ -60,32 +102,69 @@ def _space_of(names: Sequence[str]) -> tuple[str, str | None] | None:
 
 def read_table(path: Path) -> LandmarkSet:
     """The landmarks of either table, also of one with decimal commas. Raises InputError."""
-    text = read_all(path)
-    rows = _rows(text, _separator(text.split("\n", 1)[0]))
-    _, head = next(rows, (0, []))
+    above, text = _without_remarks(read_all(path))
+    rows = _rows(text, _separator(text.split("\n", 1)[0]), above)
+    first = next(rows, None)
+    line, head = first or (above + 1, [])
     if dialect_of(text.splitlines(keepends=True)).decimal == ",":
         rows = ((line, [point_form(cell.strip(), ",") or cell for cell in row]) for line, row in rows)
-    names = [name.strip().lower() for name in head]
+    if first is not None and _is_unnamed(head):
+        rows, head = chain([(line, _with_points(head))], rows), ["name", "x", "y", "z"]
+    second = next(rows, None)
+    if second is not None:
+        rows = chain([second], rows)
+        head = [""] * (len(second[1]) == len(head) + 1) + head  # R writes no name for the first column
+    names = _plain(head)
     if space := _space_of(names):
-        return _long(rows, names, *space)
+        if _first(names, _NAMES) is None and second is not None:
+            texts = (at for at, cell in enumerate(second[1][: len(head)]) if not _is_value(cell))
+            if (at := next(texts, None)) is not None:
+                names[at] = "name"
+        stated = {unit for name, own in zip(names, head, strict=True)
+                  if name in space[0] and (unit := plain_name(own).unit)}  # fmt: skip
+        return _long(rows, names, *space, unit=stated.pop() if len(stated) == 1 else None)
     if columns := _wide_columns(head):
-        return _wide(rows, names, columns)
+        return _wide(rows, names, columns, _unit_of(head))
     raise at_line(
         "has neither the columns x, y and z nor NAME_x, NAME_y and NAME_z",
-        1,
+        line,
         "The first line must name the columns; l, p and s or r, a and s are coordinates too",
     )
 
 
-def _rows(text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
-    """The rows that are not blank, each after the number of its last line."""
-    reader = csv.reader(StringIO(text, newline=""), delimiter=separator, strict=True)
+def _is_value(cell: str) -> bool:
+    return is_number(cell.strip()) or not cell.strip()
+
+
+def _with_points(row: Sequence[str]) -> list[str]:
+    """A row whose numbers have decimal points where they have commas."""
+    return [point_form(cell.strip(), ",") if "," in cell else cell for cell in row]
+
+
+def _is_unnamed(row: Sequence[str]) -> bool:
+    """Whether the first row is a landmark already: a name and three numbers."""
+    return (
+        len(row) == 4
+        and not _is_value(row[0])
+        and all(is_number(cell) and cell for cell in map(str.strip, _with_points(row[1:])))
+    )
+
+
+def _unit_of(head: Sequence[str]) -> str | None:
+    """The unit that the names of a table with columns for each landmark state, as `nose_x [mm]` does."""
+    units = {plain_unit(match[1]) for name in head if (match := _UNIT.search(name))} - {"s", "ms"}
+    return units.pop() if len(units) == 1 else None
+
+
+def _rows(text: str, separator: str, above: int) -> Iterator[tuple[int, list[str]]]:
+    """The rows that are not blank, each after the number of its last line. above: lines above the text."""
+    reader = csv.reader(StringIO(text, newline=""), strict=True, **_form(separator))
     try:
         for row in reader:
             if any(cell.strip() for cell in row):
-                yield reader.line_num, row
+                yield above + reader.line_num, row
     except csv.Error as error:
-        raise at_line(f"is not a row of the table: {error}", reader.line_num) from error
+        raise at_line(f"is not a row of the table: {error}", above + reader.line_num) from error
 
 
 def _first(names: Sequence[str], wanted: Sequence[str]) -> int | None:
@@ -114,24 +193,33 @@ class _Units:
 
 
 def _frame(word: str, line: int) -> int:
-    """The index of a frame that counts from 1."""
+    """The index of a frame that counts from 1; -1 for frame 0."""
     word = word.strip()
-    frame = count_of(word[:-2] if word.endswith(".0") else word, line, "the frame")
-    if frame < 1:
-        raise at_line("names frame 0, but frames are counted from 1", line)
-    return frame - 1
+    return count_of(word[:-2] if word.endswith(".0") else word, line, "the frame") - 1
+
+
+def _from_zero(frames: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[str]]:
+    """Indices of frames, and a remark where the file counts them from 0."""
+    if not len(frames) or frames.min() >= 0:
+        return frames, []
+    return frames + 1, ["The file counts frames from 0"]
 
 
 def _long(
-    rows: Iterator[tuple[int, list[str]]], columns: Sequence[str], coordinates: str, space: str | None
+    rows: Iterator[tuple[int, list[str]]],
+    columns: Sequence[str],
+    coordinates: str,
+    space: str | None,
+    unit: str | None,
 ) -> LandmarkSet:
-    """The landmarks of a table with a row each. coordinates: names of their columns. space: their axes."""
+    """The landmarks of a table with a row each. coordinates: names of their columns. space: their axes. unit:
+    that the names state."""
     name_at, kind_at = _first(columns, _NAMES), _first(columns, ("kind",))
     frame_at, time_at = _first(columns, _FRAMES), _first(columns, _TIMES)
     state_at, sigma_at, unit_at = (_first(columns, (name,)) for name in ("state", "sigma", "unit"))
     defined_at, about_at = _first(columns, ("defined",)), _first(columns, ("description",))
     axes = [columns.index(axis) for axis in coordinates]
-    units = _Units("mm" if space and {*columns} >= _SLICER else None)
+    units = _Units("mm" if space and {*columns} >= _SLICER else unit)
     abouts: dict[str, str] = {}
     times: dict[int, float] = {}
     numbers: dict[str, int] = {}
@@ -142,9 +230,13 @@ def _long(
         if kind_at is not None and row[kind_at].strip().lower() != "landmark":
             continue
         frame = 0 if frame_at is None else _frame(row[frame_at], line)
+        if frame < 0 and kind_at is not None:
+            raise at_line("names frame 0, but in tables of Scan4D frames are counted from 1", line)
         name = str(len(numbers) + 1) if name_at is None else text_of_cell(row[name_at].strip())
         factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
         place = [number_of(row[axis], line) * factor for axis in axes]
+        if place[0] in SENTINELS and place.count(place[0]) == 3:
+            place = [math.nan] * 3
         if defined_at is not None and row[defined_at].strip().lower() in _UNDEFINED:
             place = [math.nan] * 3
         if about_at is not None:
@@ -158,6 +250,8 @@ def _long(
     if not cells:
         raise InputError("holds no landmarks")
     frames_of, number_of_row, lines, states = np.array(cells).reshape(-1, 4).T
+    frames_of, remarks = _from_zero(frames_of)
+    times = {frame + bool(remarks): time for frame, time in times.items()}
     frames, rows_of = np.unique(frames_of, return_inverse=True)
     check_cells(len(frames), len(numbers))
     at = rows_of * len(numbers) + number_of_row
@@ -177,7 +271,9 @@ def _long(
         sigmas=values[:, 3].reshape(shape),
         times=np.array([times.get(frame, math.nan) for frame in frames.tolist()]),
         frames=None if frame_at is None else frames,
-        notes=LandmarkNotes(units.unit, [abouts.get(name, "") for name in numbers] if abouts else (), space),
+        notes=LandmarkNotes(
+            units.unit, [abouts.get(name, "") for name in numbers] if abouts else (), space, remarks
+        ),
     )
 
 
@@ -193,18 +289,24 @@ def _state(word: str | None, place: Sequence[float], line: int) -> int:
 
 def _wide_columns(names: Sequence[str]) -> dict[str, list[int]]:
     """Landmark -> its columns of x, y and z, for those that have all three."""
-    found: dict[str, dict[str, int]] = {}
-    for number, name in enumerate(names):
-        if match := _AXIS.fullmatch(name.strip()):
-            found.setdefault(text_of_cell(match[1]), {}).setdefault(match[2].lower(), number)
-    return {name: [axes[axis] for axis in "xyz"] for name, axes in found.items() if len(axes) == 3}
+    for form in _AXES:
+        found: dict[str, dict[str, int]] = {}
+        for number, name in enumerate(names):
+            if match := form.fullmatch(_UNIT.sub("", name.strip())):
+                found.setdefault(text_of_cell(match["name"]), {}).setdefault(match["axis"].lower(), number)
+        if complete := {name: axes for name, axes in found.items() if len(axes) == 3}:
+            return {name: [axes[axis] for axis in "xyz"] for name, axes in complete.items()}
+    return {}
 
 
 def _wide(
-    rows: Iterator[tuple[int, list[str]]], columns: Sequence[str], landmarks: dict[str, list[int]]
+    rows: Iterator[tuple[int, list[str]]],
+    columns: Sequence[str],
+    landmarks: dict[str, list[int]],
+    unit: str | None,
 ) -> LandmarkSet:
     frame_at, time_at, unit_at = (_first(columns, words) for words in (_FRAMES, _TIMES, ("unit",)))
-    units = _Units()
+    units = _Units(unit)
     frames: list[int] = []
     times: list[float] = []
     positions: list[list[list[float]]] = []
@@ -226,6 +328,7 @@ def _wide(
         )
     if not positions:
         raise InputError("holds no landmarks")
+    indices, remarks = _from_zero(np.array(frames))
     places = np.array(positions)
     known = np.where(np.isfinite(places).all(axis=2), Known.PLACED, Known.GAP)
     return LandmarkSet.of(
@@ -233,6 +336,6 @@ def _wide(
         places,
         known=known,
         times=np.array(times),
-        frames=None if frame_at is None else frames,
-        notes=LandmarkNotes(units.unit),
+        frames=None if frame_at is None else indices,
+        notes=LandmarkNotes(units.unit, remarks=remarks),
     )

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ....errors import InputError, shortened
 from ....files import open_plain, parsed_json
-from ....scan.reading.numbers import HEAD, decoded, encoding_of
+from ....scan.reading.numbers import ABSENT, HEAD, decoded, encoding_of, is_not_finite
 from ...track import Known
 from ..landmark_set import LandmarkSet
 
@@ -71,7 +71,7 @@ def number_of(word: str, line: int) -> float:
     """The number of a word; NaN where it says that there is none. Raises InputError for what is no number,
     and for one beyond 1e150."""
     word = word.strip()
-    if word.lower() in _ABSENT:
+    if word.lower() in ABSENT or is_not_finite(word):
         return math.nan
     if _REAL.fullmatch(word) is None:
         hint = "Use a decimal point" if re.fullmatch(r"-?\d+,\d+", word) else None

@@ -17,7 +17,7 @@ import numpy as np
 
 from ....errors import InputError, shortened
 from ....files import parsed_json
-from ....scan.units import conversion
+from ....scan.units import conversion, plain_unit
 from ...track import STATES, Known
 from ..landmark_set import LandmarkNotes, LandmarkSet
 from ._text import own_frames, own_number, read_all
@@ -172,7 +172,7 @@ def _unit(value: Any, where: str) -> str:
     word = value[0] if isinstance(value, list) and value else value
     if not isinstance(word, str):
         raise InputError(f"unknown coordinateUnits {shortened(value)}", where, "Known: mm, um")
-    return "µm" if word == "um" else word
+    return "µm" if word == "um" else plain_unit(word)
 
 
 def write(path: Path, landmarks: LandmarkSet) -> None:
