@@ -308,3 +308,171 @@ def test_a_mark_of_the_order_of_bytes_is_passed_over(tmp_path: Path) -> None:
     put(tmp_path)
     (tmp_path / "camera.json").write_bytes(b"\xef\xbb\xbf" + json.dumps(PINHOLE).encode())
     assert only(tmp_path).fx == 30
+
+
+PLACE = (1.0, 2.0, 3.0)  # of the camera at the second frame
+TIMES = (0.0, 0.2)
+
+
+def stray(folder: Path) -> None:
+    put(folder, stem="00000{}")
+    for n in range(2):
+        write_color(folder / f"confidence/00000{n}.png", np.full((HEIGHT, WIDTH), 2, np.uint8))
+    (folder / "camera_matrix.csv").write_text("1800.0, 0.0, 959.5\n0.0, 1800.0, 719.5\n0.0, 0.0, 1.0\n")
+    rows = "".join(f"{9 + n / 5}, 00000{n}, {n}, 2, 3, 0, 0, 0, 1\n" for n in range(2))
+    (folder / "odometry.csv").write_text(f"timestamp, frame, x, y, z, qx, qy, qz, qw\n{rows}")
+    (folder / "imu.csv").write_text("timestamp, a_x, a_y, a_z\n1, 2, 3, 4\n")
+
+
+def record3d(folder: Path, channels: str = "R", **more: Any) -> None:
+    OpenEXR = pytest.importorskip("OpenEXR")
+    (folder / "EXR_RGBD/depth").mkdir(parents=True)
+    for n in range(2):
+        header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+        depth = {channel: np.full((HEIGHT, WIDTH), 0.5, np.float32) for channel in channels}
+        OpenEXR.File(header, depth).write(str(folder / f"EXR_RGBD/depth/{n}.exr"))
+        write_color(folder / f"EXR_RGBD/rgb/{n}.jpg", halves(256, 192))
+    stored = {"K": [240, 0, 0, 0, 240, 0, 127.5, 95.5, 1], "w": 256, "h": 192, "dw": WIDTH, "dh": HEIGHT}
+    stored |= {"poses": [[0, 0, 0, 1, n, 2, 3] for n in range(2)], "fps": 5} | more
+    (folder / "EXR_RGBD/metadata.json").write_text(json.dumps(stored))
+
+
+def cameras_of_frames(folder: Path) -> None:
+    record3d(folder, perFrameIntrinsicCoeffs=[[99, 99, 127.5, 95.5], [240, 240, 127.5, 95.5]])
+
+
+def arkit_scenes_placed(folder: Path) -> None:
+    for n in range(2):
+        stem = f"41069021_{100 + n / 5:.3f}"
+        write_depth(folder / f"lowres_depth/{stem}.png", numbers(n))
+        write_color(folder / f"lowres_wide/{stem}.png", halves(WIDTH, HEIGHT))
+        (folder / "lowres_wide_intrinsics").mkdir(exist_ok=True)
+        (folder / f"lowres_wide_intrinsics/{stem}.pincam").write_text("32 24 30 30 15.5 11.5\n")
+    rows = "".join(f"{100 + n / 5 + 0.004} 0 0 0 {-n} -2 -3\n" for n in range(-1, 3))
+    (folder / "lowres_wide.traj").write_text(rows)
+
+
+def nerfstudio(folder: Path) -> None:
+    put(folder, color="images")
+    frames = []
+    for n in (1, 0):  # in any order
+        matrix = np.eye(4)
+        matrix[:3, 3] = n, 2, 3
+        name = {"file_path": f"images/00000{n}.jpg", "depth_file_path": f"depth/00000{n}.png"}
+        frames.append(name | {"transform_matrix": matrix.tolist()})
+    camera = {"fl_x": 30, "fl_y": 30, "cx": 16, "cy": 12, "w": WIDTH, "h": HEIGHT}
+    (folder / "transforms.json").write_text(json.dumps(camera | {"frames": frames}))
+
+
+def replica(folder: Path) -> None:
+    for n in range(2):
+        write_depth(folder / f"results/depth00000{n}.png", numbers(n))
+        write_color(folder / f"results/frame00000{n}.jpg", halves(WIDTH, HEIGHT))
+    (folder / "traj.txt").write_text("".join(f"1 0 0 {n} 0 1 0 2 0 0 1 3 0 0 0 1\n" for n in range(2)))
+    (folder / "cam_params.json").write_text(json.dumps({"camera": PINHOLE}))
+
+
+def scanner_app_beside_its_mesh(folder: Path) -> None:
+    for n in range(2):
+        write_depth(folder / f"depth_0000{n}.png", numbers(n))
+        write_color(folder / f"frame_0000{n}.jpg", halves(256, 192))
+        pose = [1, 0, 0, n, 0, 1, 0, 2, 0, 0, 1, 3, 0, 0, 0, 1]
+        stored = {"intrinsics": LARGE_ROWS, "cameraPoseARFrame": pose, "time": 7 + n / 5}
+        (folder / f"frame_0000{n}.json").write_text(json.dumps(stored))
+    (folder / "export.obj").write_text("v 0 0 0\n")
+
+
+TRAJECTORIES: dict[str, tuple[Callable[[Path], None], bool]] = {  # and whether they state times
+    "Stray Scanner": (stray, True),
+    "Record3D": (record3d, True),
+    "Record3D with time stamps": (lambda folder: record3d(folder, fps=30, frameTimestamps=[4, 4.2]), True),
+    "Record3D with three channels": (lambda folder: record3d(folder, "RGB"), True),
+    "Record3D with a camera a frame": (cameras_of_frames, True),
+    "ARKitScenes": (arkit_scenes_placed, True),
+    "nerfstudio": (nerfstudio, False),
+    "Replica": (replica, False),
+    "3D Scanner App": (scanner_app_beside_its_mesh, True),
+}
+
+
+@pytest.mark.parametrize("name", TRAJECTORIES)
+def test_one_file_states_where_the_camera_stood(tmp_path: Path, name: str) -> None:
+    write, has_times = TRAJECTORIES[name]
+    write(tmp_path)
+    with open_scan(tmp_path) as scan:
+        assert (len(scan), scan.unit) == (2, "m")
+        if has_times:
+            assert scan.times.tolist() == pytest.approx(TIMES)
+        (view,) = scan.pose(1).views
+        assert scan.reading["camera"].source == "neighbour"
+    assert (view.fx, view.fy, view.cx, view.cy) == pytest.approx((30, 30, 16, 12))
+    assert view.eye == pytest.approx(PLACE)
+    assert view.color is not None
+    assert np.median(view.depth) == pytest.approx(0.5, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("odometry.csv", "timestamp, frame, x, y\n1, 2, 3, 4\n"),
+        ("traj.txt", "1 2 3\n4 5 6\n"),
+        ("metadata.json", '{"poses": [[1, 2, 3]]}'),
+    ],
+)
+def test_a_damaged_trajectory_is_told(tmp_path: Path, name: str, text: str) -> None:
+    put(tmp_path)
+    (tmp_path / "camera.json").write_text(json.dumps(PINHOLE))
+    (tmp_path / name).write_text(text)
+    with pytest.raises(InputError, match="is not a list of camera poses") as caught:
+        find_source(tmp_path)
+    assert name in str(caught.value)
+
+
+def test_a_picture_without_a_pose_is_left_out(tmp_path: Path) -> None:
+    stray(tmp_path)
+    lines = (tmp_path / "odometry.csv").read_text().splitlines()
+    (tmp_path / "odometry.csv").write_text("\n".join(lines[:2]))
+    with open_scan(tmp_path) as scan:
+        assert scan.pose(0).views[0].eye == pytest.approx((0, 2, 3))
+        with pytest.raises(InputError, match=r"has no pose in odometry\.csv"):
+            scan.pose(1)
+
+
+def test_names_of_folders_and_partners_count_in_any_case_and_by_number(tmp_path: Path) -> None:
+    for n in range(2):
+        write_depth(tmp_path / f"Depth/depth_000{n}.png", numbers(n))
+        write_color(tmp_path / f"RGB/rgb_000{n}.png", halves(WIDTH, HEIGHT))
+    (tmp_path / "Intrinsics.json").write_text(json.dumps(PINHOLE))
+    with open_scan(tmp_path) as scan:
+        assert scan.pose(1).views[0].color is not None
+
+
+def test_depth_as_pgm(tmp_path: Path) -> None:
+    """ScanNet's own program writes it."""
+    text = numbers(1).astype(">u2").tobytes()
+    (tmp_path / "frame-000000.depth.pgm").write_bytes(b"P5\n32 24\n65535\n" + text)
+    write_matrix(tmp_path / "frame-000000.pose.txt", POSE)
+    lines = ["m_depthShift = 1000", "m_calibrationDepthIntrinsic = 30 0 15.5 0 0 30 11.5 0 0 0 1 0 0 0 0 1"]
+    (tmp_path / "_info.txt").write_text("\n".join(["m_depthWidth = 32", "m_depthHeight = 24", *lines]))
+    with open_scan(tmp_path) as scan:
+        (view,) = scan.pose(0).views
+    assert np.unique(view.depth) == pytest.approx(0.501)
+    assert view.fx == 30
+
+
+def test_a_recording_of_record3d_that_is_only_unpacked_is_told(tmp_path: Path) -> None:
+    (tmp_path / "rgbd").mkdir()
+    (tmp_path / "rgbd/0.depth").write_bytes(b"bvx-")
+    (tmp_path / "metadata").write_text(json.dumps({"K": BY_COLUMNS}))
+    with pytest.raises(InputError, match="Export them as EXR with RGB-D in Record3D"):
+        find_source(tmp_path)
+
+
+def test_far_values_of_pictures_are_left_out(tmp_path: Path) -> None:
+    depth = np.linspace(1, 2, 48, dtype=np.float32).reshape(4, 12)
+    depth[1] = 65504
+    np.save(tmp_path / "depth_0.npy", depth)
+    (tmp_path / "camera.json").write_text(json.dumps(CAMERA))
+    with open_scan(tmp_path) as scan:
+        assert scan.pose(0).count == 36
+        assert scan.reading["missing"].value == "65504"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -46,13 +47,15 @@ _MASKS = ("mask", "masks")
 _CAMERAS = ("cameras", "corrected_cameras", "camera", "frame", "lowres_wide_intrinsics")
 _CAMERA_SUFFIXES = (".json", ".pincam")
 _POSE_SUFFIX = ".txt"
+_ARKIT_POSE, _ARKIT_TIME = "cameraPoseARFrame", "time"  # fields of a picture's camera file
 
 
 @dataclass(frozen=True)
 class DepthPicture:
     """A depth picture, and the files of its partners, which may be missing.
 
-    camera: a file that states the camera of this picture alone, and perhaps its pose.
+    camera: a file that states the camera of this picture alone, and perhaps its pose. stated: cameras of this
+    picture alone in a file of all.
     """
 
     depth: Path
@@ -61,6 +64,7 @@ class DepthPicture:
     mask: Path | None = None
     confidence: Path | None = None
     camera: Path | None = None
+    stated: tuple[StatedCamera, ...] = field(default=(), kw_only=True)
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -87,7 +91,7 @@ def frames_of_pictures(
         picture, of_frame = pictures[index], decided.at(index)
 
         def camera_of(stored: NDArray, of_color: Size | None) -> DepthCamera:
-            own = () if picture.camera is None else own_cameras(picture.camera)
+            own = own_cameras(picture.camera) if picture.camera else picture.stated
             is_whole = stored.dtype.kind != "f"
             size = size_of_image(stored)
             return camera.of_picture(size, of_frame, is_whole=is_whole, of_color=of_color, own=own)
@@ -112,10 +116,10 @@ def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
     """
     if (of_depth := depth_folder(names)) is not None:
         return list(_in_folders(folder, names, of_depth))
-    there = set(names)
+    there = {name.lower(): name for name in names}
 
     def first(candidates: Iterator[str]) -> Path | None:
-        return next((folder / name for name in candidates if name in there), None)
+        return next((folder / there[name.lower()] for name in candidates if name.lower() in there), None)
 
     return [
         DepthPicture(
@@ -132,7 +136,13 @@ def named_pictures(folder: Path, names: Sequence[str]) -> list[DepthPicture]:
 
 def depth_folder(names: Sequence[str]) -> str | None:
     """The folder of depth pictures among the names in a folder."""
-    return next((name for name in DEPTH_FOLDERS if name in names), None)
+    return first_named(DEPTH_FOLDERS, names)
+
+
+def first_named(wanted: Sequence[str], names: Sequence[str]) -> str | None:
+    """The name among those of a folder that is the first one wanted, in upper or lower case."""
+    there = {name.lower(): name for name in names}
+    return next((there[name] for name in wanted if name in there), None)
 
 
 def depth_names(folder: Path, names: Sequence[str]) -> list[str]:
@@ -167,7 +177,7 @@ def pose_of_picture(picture: DepthPicture) -> NDArray[np.float64]:
             rows = [[float(stored[f"t_{row}{column}"]) for column in range(4)] for row in range(3)]
             matrix = np.array([*rows, [0, 0, 0, 1]])
         else:
-            matrix = np.array(stored["cameraPoseARFrame"], np.float64).reshape(4, 4)
+            matrix = np.array(stored[_ARKIT_POSE], np.float64).reshape(4, 4)
         return from_camera_to_world(matrix @ IMAGE_AXES)  # their cameras look along -z, +y is up
     except InputError as error:
         raise InputError(error.what, picture.camera, error.hint) from error
@@ -180,9 +190,23 @@ def states_a_pose(picture: DepthPicture) -> bool:
     if picture.camera is None or picture.camera.suffix.lower() != ".json":
         return False
     try:
-        return bool({"t_00", "cameraPoseARFrame"} & object_of(picture.camera).keys())
+        return bool({"t_00", _ARKIT_POSE} & object_of(picture.camera).keys())
     except InputError:  # reading the frame will say why
         return False
+
+
+def times_of_pictures(pictures: Sequence[DepthPicture]) -> NDArray[np.float64] | None:
+    """Seconds that the camera files of ARKit's pictures state, (T,); None where one states none."""
+    times = []
+    for picture in pictures:
+        try:
+            stored = object_of(picture.camera) if picture.camera else {}
+        except InputError:  # reading the frame will say why
+            return None
+        if _ARKIT_POSE not in stored or not isinstance(time := stored.get(_ARKIT_TIME), int | float):
+            return None
+        times.append(float(time))
+    return np.array(times) - times[0]
 
 
 def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
@@ -205,7 +229,7 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
 
 def _in_folders(folder: Path, names: Sequence[str], of_depth: str) -> Iterator[DepthPicture]:
     def partners(folders: Sequence[str], suffixes: Sequence[str]) -> dict[str, Path]:
-        found = next((name for name in folders if name in names), None)
+        found = first_named(folders, names)
         return {} if found is None else _by_stem(folder / found, suffixes)
 
     colors, poses = partners(_COLORS, COLOR_SUFFIXES), partners(_POSES, (_POSE_SUFFIX,))
@@ -214,15 +238,29 @@ def _in_folders(folder: Path, names: Sequence[str], of_depth: str) -> Iterator[D
     pictures = _by_stem(folder / of_depth, (DEPTH_SUFFIX,)) or _by_stem(
         folder / of_depth, OTHER_DEPTH_SUFFIXES
     )
+    all_partners = [_by_name_or_number(found) for found in (colors, poses, masks, confidences, cameras)]
     for stem, depth in pictures.items():
-        yield DepthPicture(
-            depth,
-            colors.get(stem),
-            poses.get(stem),
-            masks.get(stem),
-            confidences.get(stem),
-            cameras.get(stem),
-        )
+        yield DepthPicture(depth, *(partner(stem) for partner in all_partners))
+
+
+def _by_name_or_number(files: Mapping[str, Path]) -> Callable[[str], Path | None]:
+    """A function that finds the file of a depth picture's name, or else the only one with its numbers."""
+    by_number: dict[str, list[Path]] = {}
+    for stem, file in files.items():
+        by_number.setdefault(_numbers_in(stem), []).append(file)
+
+    def find(stem: str) -> Path | None:
+        if stem in files:
+            return files[stem]
+        alike = by_number.get(_numbers_in(stem), [])
+        return alike[0] if len(alike) == 1 and _numbers_in(stem) else None
+
+    return find
+
+
+def _numbers_in(stem: str) -> str:
+    """The numbers in a name: `depth_0001` and `rgb_0001` have the same."""
+    return " ".join(re.findall(r"\d+", stem))
 
 
 def _by_stem(folder: Path, suffixes: Sequence[str]) -> dict[str, Path]:

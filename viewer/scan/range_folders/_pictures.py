@@ -16,15 +16,17 @@ from ..admission import admit, opened, size_of
 from ..formats._pictures import COLOR_KINDS, DEPTH_KINDS, numbers_of_picture, opened_picture, srgb_of_picture
 from ..formats._stored import StoredArray
 from ..points import UNKNOWN_UNIT
+from ..pose import Scanned
 from ..range_view import RangeView, mask_of
 from ..reading.camera import DepthCamera, Size
 from ..reading.depths import lying_over, measured_depths, over_depth, size_of_image
+from ..reading.record import Decision
 from ..reading.sequence import Decided
 from ..units import usable_unit
 
 COLOR_SUFFIXES = (".png", ".jpg", ".jpeg")
 DEPTH_SUFFIX = ".png"
-OTHER_DEPTH_SUFFIXES = (".tif", ".tiff", ".npy", ".exr")
+OTHER_DEPTH_SUFFIXES = (".tif", ".tiff", ".npy", ".exr", ".pgm")
 
 _SIXTEEN_BITS = "I;16"  # as Pillow calls a grey picture of these
 _COLORED = ("RGB", "RGBA", "LA", "P")  # likewise
@@ -46,22 +48,40 @@ def is_depth(path: Path) -> bool:
     return head.startswith(_SIGNATURE) and head.endswith(_SIXTEEN_BIT_GREY)
 
 
-def read_depth(path: Path) -> NDArray:
-    """The numbers of a 16-bit grey PNG, of a TIFF, of a NPY or of an EXR, (H, W). Raises InputError.
+def read_depth(path: Path, decided: Decided) -> NDArray:
+    """The numbers of a 16-bit grey PNG or PGM, of a TIFF, of a NPY or of an EXR, (H, W). Raises InputError.
 
     Depth that an EXR has no number for is NaN.
     """
     if path.suffix.lower() == ".npy":
         return _read_npy(path)
     if path.suffix.lower() == ".exr":
-        views = formats.read(path)
+        views = _views_of_exr(path, decided)
         if not isinstance(views, tuple):
             raise InputError("holds points, but a depth picture is expected", path)
         return np.where(views[0].mask, views[0].depth, np.float32(np.nan))
-    with opened_picture(path, DEPTH_KINDS) as image:
+    with opened_picture(path, ("PPM",) if path.suffix.lower() == ".pgm" else DEPTH_KINDS) as image:
         if image.format == "PNG" and not image.mode.startswith(_SIXTEEN_BITS):
             raise InputError(f"is a picture of type {image.mode}, but a depth picture must be 16-bit grey")
         return numbers_of_picture(image)
+
+
+def _views_of_exr(path: Path, decided: Decided) -> Scanned:
+    """The views of an EXR among depth pictures, where R is depth if no channel says so. Raises InputError."""
+    try:
+        return formats.read(path, decided=Decided(decided.corrections))
+    except InputError:
+        if "depth-channel" in decided.corrections:
+            raise
+        try:
+            views = formats.read(path, decided=Decided(decided.corrections.amended({"depth-channel": "R"})))
+        except InputError:
+            views = None
+        if views is None:
+            raise
+    why = "The picture lies among depth pictures, and no channel of it is called depth"
+    decided.note(Decision("depth-channel", "R", "assumed", why=why, changes_numbers=True))
+    return views
 
 
 def _read_npy(path: Path) -> NDArray:
@@ -110,7 +130,7 @@ def depth_view(
     with the same aspect ratio count as they lie over the depth. Of whole numbers, 0 and 65535 mean that
     nothing was measured. Raises InputError.
     """
-    stored = read_depth(files.depth)
+    stored = read_depth(files.depth, decided)
     color = None if files.color is None else read_color(files.color)
     try:
         camera = camera_of(stored, None if color is None else size_of_image(color))

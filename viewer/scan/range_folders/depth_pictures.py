@@ -6,7 +6,7 @@ Most recorders write such folders. They differ in the name and in the form of th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +24,17 @@ from ._partners import (
     named_pictures,
     pose_of_picture,
     states_a_pose,
+    times_of_pictures,
 )
 from ._pictures import DEPTH_SUFFIX, is_depth
 from ._source import RangeFrames
+from ._trajectories import PlacedPictures, trajectory_of_folder
 
 TITLE = "depth pictures"
 GENERAL = True
 
 _DEPTH = "depth"  # in names
-_INNER = ("keyframes", "EXR_RGBD", "frames")  # folders that recorders put all pictures into
+_INNER = ("keyframes", "EXR_RGBD", "frames", "results")  # folders that recorders put all pictures into
 _HINT = (
     'Put a camera.json beside them: {"fx": 525, "fy": 525, "cx": 319.5, "cy": 239.5, "depth_scale": 1000}, '
     "or state it with --read camera=fx,fy,cx,cy"
@@ -48,23 +50,36 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
     pictures = named_pictures(base, inner)
     if not pictures:
         return None
-    if _has_scan_files(names):
+    if _has_scan_files({*names, *inner}) and not pictures[0].camera:
         camera = _camera_beside_scans(base, inner, pictures[0].depth, decided)
         if camera is None:
             return None
     else:
         camera = camera_of_folder(base, inner, decided.corrections)
+        if not camera.is_stated and base != folder:
+            camera = camera_of_folder(folder, names, decided.corrections)
         first = pictures[0].depth
         if not (camera.is_stated or pictures[0].camera or is_depth(first) or _is_no_png(first)):
             return None
         if not (camera.is_stated or pictures[0].camera or _say_depth(pictures, inner)):
             raise InputError("holds 16-bit pictures, but no file states their camera", folder, _HINT)
-    of_files = any(picture.pose for picture in pictures) or states_a_pose(pictures[0])
+    if any(picture.pose for picture in pictures) or states_a_pose(pictures[0]):
 
-    def pose(index: int) -> NDArray[np.float64]:
-        return pose_of_picture(pictures[index]) if of_files else UPRIGHT
+        def pose(index: int) -> NDArray[np.float64]:
+            return pose_of_picture(pictures[index])
 
-    return frames_of_pictures(folder, pictures, camera, pose, decided)
+        return frames_of_pictures(
+            folder, pictures, camera, pose, decided, recorded=times_of_pictures(pictures)
+        )
+    found = (
+        trajectory_of_folder(base, inner) or (base != folder and trajectory_of_folder(folder, names)) or None
+    )
+    if found is None:
+        return frames_of_pictures(folder, pictures, camera, lambda _: UPRIGHT, decided)
+    placed = PlacedPictures.of(found, pictures)
+    return frames_of_pictures(
+        folder, placed.with_cameras(), camera, placed.pose, decided, [found.file], placed.times
+    )
 
 
 def _camera_beside_scans(
@@ -99,12 +114,19 @@ def _with_pictures(folder: Path, names: Sequence[str]) -> tuple[Path, Sequence[s
     for name in _INNER:
         if name in names and depth_folder(names) is None and (folder / name).is_dir():
             inner = [path.name for path in (folder / name).iterdir()]
-            if depth_folder(inner) is not None:
+            if depth_folder(inner) is not None or any(_DEPTH in one.lower() for one in inner):
                 return folder / name, inner
     return folder, names
 
 
-def _has_scan_files(names: Sequence[str]) -> bool:
+def _has_scan_files(names: Iterable[str]) -> bool:
     """Whether there are scan files beside the pictures; text tables there are notes."""
     suffixes = {Path(name).suffix.lower() for name in names}
     return any(formats.is_known(suffix) for suffix in suffixes - formats.NOTES)
+
+
+def lacks(names: Sequence[str]) -> str:
+    """The depth of a recording of Record3D that is only unpacked."""
+    if {"metadata", "rgbd"} <= {*names}:
+        return "Record3D packs their depth in a form of its own. Export them as EXR with RGB-D in Record3D"
+    return ""

@@ -47,7 +47,7 @@ _OTHER_NAMES = (
     "info.txt", "_info.txt", "*_info.txt", "scene*.txt", "calib*.json", "calib*.yaml", "calib*.yml",
     "calib*.txt", "cameras.txt", "metadata.json", "metadata", "transforms.json", "*depth*metadata*.csv",
     "*metadata*depth*.csv", "*depth*metadata*.txt", "*metadata*depth*.txt", "*_metadata.csv",
-    "*_metadata.txt", "*intrinsic*.json", "*intrinsic*.txt", "*camera*.json",
+    "*_metadata.txt", "cam_params.json", "*intrinsic*.json", "*intrinsic*.txt", "*camera*.json",
 )  # fmt: skip
 FOLDERS = ("intrinsic", "intrinsics")  # which may hold these files instead
 
@@ -226,8 +226,9 @@ def _of_colmap(row: Sequence[str]) -> StatedCamera:
 def _of_numbers(rows: Sequence[Sequence[float]]) -> StatedCamera:
     numbers = [number for row in rows for number in row]
     is_matrix = [len(row) for row in rows] in ([3] * 3, [4] * 4, [4] * 3)
-    if is_matrix:
-        return _checked(_pinhole_of(np.array(rows)))
+    is_in_a_row = len(numbers) in (9, 12, 16) and not numbers[1] and numbers[0] > 0 and len(rows) == 1
+    if is_matrix or (is_in_a_row and numbers[8 if len(numbers) == 9 else 10] == 1):
+        return _checked(_pinhole_of(np.array(numbers).reshape(4 if len(numbers) == 16 else 3, -1)))
     if len(numbers) < 4:
         raise InputError(f"is not a calibration: it has {len(numbers)} numbers", hint=FORM)
     return _checked(dict(zip(PINHOLE, numbers, strict=False)) | {"distortion": numbers[4:]})
