@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ..image_poses import from_camera_to_world
-from ..reading.trajectory_files import CameraTrajectory, rows_of_pictures, trajectory_name, camera_trajectory
+from ..reading.trajectory_files import CameraTrajectory, camera_trajectory, rows_of_pictures, trajectory_name
 from ._partners import DepthPicture
 from ._texts import text_of
 
