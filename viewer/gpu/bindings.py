@@ -83,6 +83,12 @@ class Texture(IntEnum):
     USUAL = auto()
     COUNTS = auto()
     FOUND = auto()  # what a neighborhood tells
+    # Nodes of an octree, beside a pose.
+    NODE_MASKS = auto()  # which children there are
+    FIRST_CHILDREN = auto()
+    NODE_CELLS = auto()
+    NODE_OFFSETS = auto()  # of the surface in their cells
+    NODE_COLORS = auto()
     # Samples of range views.
     RANGE_DEPTHS = auto()
     RANGE_LOOKS = auto()
@@ -232,6 +238,22 @@ class Storage(IntEnum):
     SPREAD = 2
     LINE_WORDS = 1
     RANKS = 2
+    # The cut of an octree.
+    SIGHT = 0
+    CUT_TOTALS = 1
+    NODES = 2
+    CHILDREN = 3
+    SHOWN_NODES = 4
+    BLOCK_COUNTS = 5
+    BLOCK_STARTS = 6
+    NODE_CELLS = 2
+    # What is drawn of it, beside the view and the totals.
+    CUT_POSITIONS = 2
+    CUT_NORMALS = 3
+    CUT_RADII = 4
+    CUT_COLORS = 5
+    CUT_OCTANTS = 6
+    CUT_FACTS = 0
 
 
 @unique

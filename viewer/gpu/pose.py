@@ -90,6 +90,15 @@ class GpuPose:
         """The points with what was estimated of them."""
         return self._estimated or self.stored
 
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.cloud)
+
+    def has(self, name: str) -> bool:
+        """Whether the scan has this array of `PointCloud`, or it was estimated."""
+        return getattr(self.cloud, name) is not None
+
     def add_estimates(self, arrays: Mapping[str, Any]) -> None:
         """Add attributes that the scan lacks, by name."""
         self._estimated = replace(self.cloud, **arrays)
@@ -113,6 +122,16 @@ class GpuPose:
     def bounds(self) -> Bounds:
         """The pose's robust bounds; a box of two units if there is no point."""
         return self.pose.drawn_bounds()
+
+    @property
+    def whole_bounds(self) -> Bounds:
+        """The box around all points. Raises InputError where there is no point."""
+        return self.cloud.whole_bounds()
+
+    @property
+    def reaches(self) -> tuple[float, float]:
+        """How far splats reach, scan units: see `PointCloud.reaches`."""
+        return self.cloud.reaches()
 
     @property
     def sample(self) -> NDArray[np.float64]:
@@ -174,7 +193,7 @@ class GpuPose:
 
     def find(self, name: str) -> gl.BufferTexture | None:
         """The array on the GPU; None if the scan has none and none was estimated."""
-        return None if getattr(self.cloud, name) is None else self.array(name)
+        return self.array(name) if self.has(name) else None
 
     @property
     def samples(self) -> RangeSamples:
@@ -186,7 +205,7 @@ class GpuPose:
 
     def names_of(self, needs: Iterable[str]) -> list[str]:
         """The arrays that a backend with these needs reads, of those that are there, or "samples"."""
-        names = [name for name in needs if name != "views" and getattr(self.cloud, name) is not None]
+        names = [name for name in needs if name != "views" and self.has(name)]
         return [*names, _RANGES] if "views" in needs else ["positions", *names]
 
     def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import cast
+from typing import Protocol, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,15 +30,19 @@ class PointRows:
 
     has_positions = True  # whether the GPU has their positions as texels
     is_photograph = False  # whether their colours have the light that they were taken in
-    octants: NDArray[np.uint32] | None = None  # the number of each row's octant, if it is one
 
     def __init__(self, pose: GpuPose) -> None:
         self.pose = self.scanned = pose
 
     @property
+    def octants(self) -> NDArray[np.uint32] | None:
+        """The number of each row's octant, (n,); None where rows are none."""
+        return None
+
+    @property
     def count(self) -> int:
         """Number of rows."""
-        return len(self.pose.cloud)
+        return self.pose.count
 
     @property
     def point_count(self) -> int:
@@ -94,9 +98,10 @@ class PointRows:
     def of(self, name: str) -> Find | None:
         """Function that gives positions, normals, colors, ids or a scalar ('scalar:NAME') of rows; None if
         there are none."""
-        cloud, scalar = self.pose.cloud, name.partition("scalar:")[2]
-        values = cloud.scalars[scalar] if scalar else getattr(cloud, name)
-        return None if values is None else values.__getitem__
+        scalar, pose = name.partition("scalar:")[2], self.pose
+        if scalar:
+            return lambda rows: pose.cloud.scalars[scalar][rows]
+        return (lambda rows: getattr(pose.cloud, name)[rows]) if pose.has(name) else None
 
     def points(self, rows: NDArray) -> NDArray:
         """Rows of the scan's points that rows (n,) stand for."""
@@ -118,24 +123,38 @@ class PointRows:
         return ids.astype(np.intp), scan.world(points) - view.origin
 
 
+class Octants(Protocol):
+    """Octants that are drawn as points of a pose with the scan's origin."""
+
+    @property
+    def points(self) -> GpuPose:
+        """The octants as points."""
+
+    @property
+    def rows(self) -> NDArray[np.uint32]:
+        """(n,): the row of the scan's point by which each is known."""
+
+    @property
+    def octants(self) -> NDArray[np.uint32]:
+        """(n,): the number of each, 0xFFFFFFFF for a row that is none."""
+
+
 class OctantRows(PointRows):
-    """Rows of a pose of octants, which has the scan's origin.
+    """Rows of a pose of octants."""
 
-    stand_for: the row of the scan's point by which each is known. octants: the number of each, 0xFFFFFFFF
-    for a row that is none.
-    """
+    def __init__(self, octants: Octants, scanned: GpuPose) -> None:
+        super().__init__(octants.points)
+        self.scanned, self._octants = scanned, octants
 
-    def __init__(
-        self, pose: GpuPose, scanned: GpuPose, stand_for: NDArray[np.uint32], octants: NDArray[np.uint32]
-    ) -> None:
-        super().__init__(pose)
-        self.scanned, self._stand_for, self.octants = scanned, stand_for, octants
+    @property
+    def octants(self) -> NDArray[np.uint32]:
+        return self._octants.octants
 
     def _by_row(self, values: NDArray, zero: float) -> NDArray[np.float32]:
-        return as_float32(values[self._stand_for], zero)
+        return as_float32(values[self._octants.rows], zero)
 
     def points(self, rows: NDArray) -> NDArray:
-        return self._stand_for[rows]
+        return self._octants.rows[rows]
 
 
 class SampleRows(PointRows):

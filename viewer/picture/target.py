@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..gpu import gl
 from ..gpu.bindings import Storage, Texture
@@ -18,7 +17,7 @@ from ..scan.ranges import robust_range
 from ..view import View
 from .buffers import PictureBuffers
 from .coloring import Coloring
-from .rows import OctantRows, PointRows, SampleRows
+from .rows import OctantRows, Octants, PointRows, SampleRows
 from .sample import is_sampled, row_list, sample_of
 from .stats import Stats
 
@@ -92,11 +91,9 @@ class RenderTarget(PictureBuffers, Coloring):
             name for name, value in wanted.items() if name not in before or before[name] != value
         )
 
-    def show(self, pose: GpuPose, points: NDArray[np.uint32], octants: NDArray[np.uint32]) -> None:
-        """Say that rows are those of another pose with the same origin: for a backend that shows octants in
-        place of the points. points: the row of the point that each of them stands for, by whose index in the
-        file it is known. octants: the number of each, 0xFFFFFFFF where it is none."""
-        self._shown = OctantRows(pose, self.pose, points, octants), self.view
+    def show(self, octants: Octants) -> None:
+        """Say that rows are octants, for a backend that shows these in place of the points."""
+        self._shown = OctantRows(octants, self.pose), self.view
 
     def show_samples(self) -> None:
         """Say that rows are samples of the pose's range views, see `SampleRows`. Raises InputError if there

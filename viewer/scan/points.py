@@ -21,7 +21,7 @@ _CHUNK = 1 << 18  # points converted at a time, so that float64 copies stay smal
 _LARGEST = 1e18  # coordinates whose squares, and sums of them, float32 can hold
 _SMALLEST = 1e-18  # lengths whose squares it can hold
 _LONGEST_SPLAT = 1e6  # extents of the points: float32 cannot intersect a ray with much longer ones
-_SAMPLE = 1 << 13  # points that robust statistics look at
+SAMPLE = 1 << 13  # points that robust statistics look at
 _ARRAYS = ("positions", "normals", "colors", "radii", "axes", "ids", "remainders")
 _SCALAR = "scalar:"  # begins the names of scalars among those of all arrays
 
@@ -262,6 +262,11 @@ class PointCloud:
         """The farthest that any splat reaches from its point, scan units; 0 where there are no radii."""
         return 0.0 if self.radii is None else self.remember(PointCloud._find_longest_reach)
 
+    def reaches(self) -> tuple[float, float]:
+        """How far nine of ten splats reach at most, by a sample, and how far any does, scan units; unknown
+        radii aside. Found once. The cloud has radii."""
+        return self.remember(PointCloud._find_reaches)
+
     def remember(self, find: Callable[Concatenate[PointCloud, P], T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Find a small fact about the points, once for the same arguments."""
         key = (find, *args, *kwargs.items())
@@ -283,12 +288,13 @@ class PointCloud:
         reach = self.splat_reach()
         return float(reach.max(where=np.isfinite(reach), initial=0.0))
 
+    def _find_reaches(self) -> tuple[float, float]:
+        return usual_reach(strided(self.splat_reach())), self.longest_reach()
+
     def _find_bounds(self) -> Bounds:
         if not len(self):
             raise InputError("no points to fit a view to")
-        low, high = _quantile_box(self.positions)
-        margin = 0.5 * float((high - low).max())
-        low, high = low - margin, high + margin
+        low, high = robust_box(strided(self.positions))
         smallest, largest = np.full(3, np.inf), np.full(3, -np.inf)
         for start in range(0, len(self), _CHUNK):
             checkpoint()
@@ -357,7 +363,7 @@ def _are_same(ours: NDArray, theirs: NDArray) -> bool:
     """Whether two arrays hold the same bits; it ends at the first difference."""
     if ours.shape != theirs.shape or ours.dtype != theirs.dtype:
         return False
-    parts = [slice(0, _SAMPLE), *(slice(start, start + _CHUNK) for start in range(0, len(ours), _CHUNK))]
+    parts = [slice(0, SAMPLE), *(slice(start, start + _CHUNK) for start in range(0, len(ours), _CHUNK))]
     return all(ours[part].tobytes() == theirs[part].tobytes() for part in parts)
 
 
@@ -385,12 +391,26 @@ def choose_origin(points: NDArray) -> NDArray[np.float64]:
 
 def stride(count: int) -> int:
     """The step at which so many values are looked at by robust statistics."""
-    return max(1, count // _SAMPLE)
+    return max(1, count // SAMPLE)
 
 
 def strided(values: NDArray) -> NDArray:
     """Some thousands of the values (N, ...), spread evenly: what robust statistics look at."""
     return values[:: stride(len(values))]
+
+
+def usual_reach(sample: NDArray[np.float32]) -> float:
+    """How far nine of ten splats reach at most, going by some, (n,) scan units; 0 where none is known."""
+    known = sample[(sample > 0) & np.isfinite(sample)]
+    return float(np.quantile(known, 0.9)) if known.size else 0.0
+
+
+def robust_box(sample: NDArray) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The box that holds the body of points, going by some, (n, 3): the corners of the quantile box, grown on
+    every side by half of its longest edge."""
+    low, high = np.quantile(np.asarray(sample, np.float64), [0.02, 0.98], axis=0)
+    margin = 0.5 * float((high - low).max())
+    return low - margin, high + margin
 
 
 def _sample(points: NDArray) -> NDArray[np.float64]:

@@ -129,7 +129,7 @@ class Points:
         """Whether there are ellipses among them."""
         if self.packed:
             return self.use_radii and self.elliptical
-        given = "axes" in self.buffers if "radii" in self.buffers else self.pose.cloud.axes is not None
+        given = "axes" in self.buffers if "radii" in self.buffers else self.pose.has("axes")
         return self.use_radii and given
 
     def array(self, name: str) -> gl.BufferTexture:

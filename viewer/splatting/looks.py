@@ -23,7 +23,7 @@ class PackedLooks:
 
     def __init__(self, pose: GpuPose) -> None:
         gpu, colors, normals = pose.gpu, pose.find("colors"), pose.find("normals")
-        self._gpu, count = gpu, len(pose.cloud)
+        self._gpu, count = gpu, pose.count
         self.nbytes = 8 * max(count, 1)
         self.texels = gl.BufferTexture(gpu.buffer(reserve=self.nbytes), gl.RG32UI)
         program = gpu.compute(

@@ -312,9 +312,9 @@ def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:
 
 def bind_looks(points: Points, surface: Surface) -> dict[str, object]:
     """Bind what surfels/passes/look.glsl reads and store.glsl writes; the defines that say so."""
-    cloud = points.pose.cloud
+    has_colors = points.pose.has("colors")
     looks_of(points).bind(Texture.LOOKS)
-    if cloud.colors is not None:
+    if has_colors:
         surface.bind_own("color")
     surface.bind_own("normal")
-    return {"HAS_COLORS": int(cloud.colors is not None)}
+    return {"HAS_COLORS": int(has_colors)}

@@ -8,14 +8,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ..gpu.bindings import Storage
 from ..gpu.constants import LEAST_RADIUS
 from ..gpu.context import Gpu, Program
 from ..gpu.scatter import CellSums, FixedPoint, Visits, scatter
 from ..picture.surface import Surface
-from ..scan.points import PointCloud
 from ..srgb import LIGHT_STEPS
 from .amplify import Points
 from .gaps import GapRadii
@@ -23,7 +20,6 @@ from .passes import bind_looks
 from .splats import Splats, bind_visible
 
 _LARGEST_RADIUS = 8.0  # pixels: one invocation goes over all pixels of a disc
-_SAMPLE = 1 << 13
 # What a splat gives to a mean, as surfels/passes/averaged.glsl has it: one of it, its normal, its light.
 _LIMITS = (1.0, 2047.0, 2047.0, 2047.0)
 _COLORED_LIMITS = (*_LIMITS, *[float(LIGHT_STEPS)] * 3)
@@ -39,7 +35,7 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     Outliers count for what none may be.
     """
     pose, view = points.pose, surface.view
-    nearest = float(view.depths(pose.cloud.whole_bounds().corners() - pose.origin).min())
+    nearest = float(view.depths(pose.whole_bounds.corners() - pose.origin).min())
     usually_nearest = float(view.depths(pose.bounds.corners() - pose.origin).min())
     if view.perspective and min(nearest, usually_nearest) <= view.near:
         return 0.0
@@ -49,7 +45,7 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
             gaps = pose.cached(GapRadii)
             own = gaps.usual, gaps.largest
         else:
-            own = pose.cloud.remember(_radii_up_to)
+            own = pose.reaches
         usual, largest = max(usual, own[0]), max(largest, own[1])
     pixels = splats.radius_scale * math.sqrt(splats.mask_limit) * points.enlarged * view.scale
     if view.perspective:
@@ -57,14 +53,6 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     if largest * pixels > _LARGEST_RADIUS:
         return 0.0
     return min(max(2 - usual * pixels / LEAST_RADIUS, 0.0), 1.0)
-
-
-def _radii_up_to(cloud: PointCloud) -> tuple[float, float]:
-    """Radii that nine of ten do not exceed, going by a sample, and that none does; unknown ones aside."""
-    radii = cloud.splat_reach()
-    sample = radii[:: max(1, len(radii) // _SAMPLE)]
-    known = sample[(sample > 0) & np.isfinite(sample)]
-    return float(np.quantile(known, 0.9)) if known.size else 0.0, cloud.longest_reach()
 
 
 def _plain_sums(gpu: Gpu, size: tuple[int, int]) -> CellSums:

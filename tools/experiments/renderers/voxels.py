@@ -12,7 +12,7 @@ from experiments.pictures import draw, renderer, request, scene
 from experiments.script import Script
 from experiments.tables import Row
 from experiments.timing import by_turns
-from viewer.backends.voxels import sight_of
+from viewer.backends.voxels.cuts import sight_of
 from viewer.bench.judge import Judge
 from viewer.bench.scenes.subjects import Moment
 from viewer.camera import Camera

@@ -18,7 +18,7 @@ from experiments.slomp_2014.scans import FEED, PAPER, Scan, by_feed, feed_tables
 from experiments.suite import Part, Suite, pictures, row_of
 from experiments.tables import Column, Machines, Row, StoredRun, Table, code, columns, spaced
 from viewer.backends import backend
-from viewer.backends.voxels import sight_of
+from viewer.backends.voxels.cuts import sight_of
 from viewer.bench.plan import Contender, Group
 from viewer.bench.report.page import three_digits
 from viewer.bench.report.results import spread

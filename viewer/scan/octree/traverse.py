@@ -49,6 +49,38 @@ class Sight:
 
 
 @dataclass(frozen=True, eq=False)
+class CubeSight:
+    """A camera as it sees an octree's cube: positions are relative to the cube's lowest corner.
+
+    eye:    (3,) float64
+    back:   (3,) float64, opposite to the view's direction
+    planes: (p, 4) float64, inward unit normals and offsets
+    least:  scan units; nodes with such an edge are large enough wherever in the cube they are
+    """
+
+    eye: NDArray[np.float64]
+    back: NDArray[np.float64]
+    planes: NDArray[np.float64]
+    perspective: bool
+    scale: float
+    near: float
+    least: float
+
+    @classmethod
+    def of(cls, octree: Octree, sight: Sight, pixel_threshold: float) -> CubeSight:
+        """A camera's sight of an octree, whose nodes of a lesser edge, in pixels, are not divided."""
+        eye = np.asarray(sight.eye, np.float64) - octree.low
+        back = np.ascontiguousarray(sight.axes[2], np.float64)
+        planes = sight.planes()
+        planes[:, 3] -= planes[:, :3] @ eye
+        middle = float(back @ (eye - octree.edge / 2))
+        reach = max(middle + octree.edge * math.sqrt(3) / 2, sight.near) if sight.perspective else 1.0
+        scale = float(sight.scale)
+        least = pixel_threshold * reach / scale
+        return cls(eye, back, planes, sight.perspective, scale, float(sight.near), least)
+
+
+@dataclass(frozen=True, eq=False)
 class Cut:
     """Nodes that stand for all that a view shows of an octree: none holds another, nothing is left out.
 
@@ -151,14 +183,7 @@ class Traversal:
 
     def look(self, sight: Sight) -> None:
         """Begin anew, with another view."""
-        self._eye = np.asarray(sight.eye, np.float64) - self.octree.low
-        self._back = np.ascontiguousarray(sight.axes[2], np.float64)
-        self._planes = sight.planes()
-        self._planes[:, 3] -= self._planes[:, :3] @ self._eye
-        self._perspective, self._scale, self._near = sight.perspective, float(sight.scale), float(sight.near)
-        middle = float(self._back @ (self._eye - self.octree.edge / 2))
-        reach = max(middle + self.octree.edge * math.sqrt(3) / 2, self._near) if sight.perspective else 1.0
-        self._least = self._threshold * reach / self._scale  # edge that is large enough anywhere in the cube
+        self._sight = CubeSight.of(self.octree, sight, self._threshold)
         self._done: list[tuple[int, _Nodes]] = []
         self._outside = self._away = 0
         root = self._room("nodes", 0)
@@ -240,14 +265,15 @@ class Traversal:
         masks, first_child = _NO_MASKS, _NO_CHILDREN
         if not last:
             masks, first_child = self.octree.masks[level], self.octree.first_child[level]
-        least = self._threshold if self.octree.size(level) < self._least else 0.0  # 0: none is so small
+        sight = self._sight
+        least = self._threshold if self.octree.size(level) < sight.least else 0.0  # 0: none is so small
         followed, kept, outside, away = cut_kernels.descend(
             cut_kernels.Nodes(nodes.places, nodes.indices),
             self.octree.size(level),
             cut_kernels.LevelArrays(masks, first_child, *self._attributes()),
-            cut_kernels.SightArrays(self._planes, self._eye, self._back),
+            cut_kernels.SightArrays(sight.planes, sight.eye, sight.back),
             cut_kernels.SightLens(
-                self._perspective, self._scale, self._near, least, float(self._margins[level])
+                sight.perspective, sight.scale, sight.near, least, float(self._margins[level])
             ),
             cut_kernels.Nodes(children.places, children.indices),
             cut_kernels.Nodes(shown.places, shown.indices),
