@@ -16,7 +16,7 @@ from splat_scenes import assert_agree
 
 from viewer.analysis.pick import pick
 from viewer.backends import backend
-from viewer.backends.voxels import Params
+from viewer.backends.voxels import Params, cuts
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
@@ -290,12 +290,21 @@ def test_colours_stand_for_the_same_values_in_every_view(draw: Draw, color_by: s
         assert shown.color_range == points.color_range
 
 
-def test_octants_of_a_new_view_are_told_as_uploaded(renderer: Renderer) -> None:
+@pytest.mark.parametrize("by_shaders", [False, True])
+def test_uploaded_octants_are_counted(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, by_shaders: bool
+) -> None:
+    """Those of each new view, or, where shaders find these, the octree once."""
+    if not (by_shaders or renderer.gpu.software):
+        pytest.skip("graphics cards find octants by shaders alone")
+    monkeypatch.setattr(cuts, "ON_SOFTWARE", by_shaders)
     pose, surface = Pose(0, 0.0, "test", CLOUD), Surface(renderer.gpu, SIZE)
     request = Request(pose, CAMERAS["perspective"], "voxels", Params())
     for camera in (CAMERAS["perspective"], CAMERAS["close"]):
         render_frame(renderer, replace(request, camera=camera), surface)
-        assert surface.stats.upload_ms > 0
+        is_first = camera is CAMERAS["perspective"]
+        assert (surface.stats.upload_ms > 0) == (is_first or not by_shaders)
+        assert (surface.stats.uploaded_bytes > 0) == (is_first or not by_shaders)
         render_frame(renderer, replace(request, camera=camera), surface)
         assert surface.stats.upload_ms == 0
 

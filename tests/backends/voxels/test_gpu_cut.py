@@ -14,7 +14,6 @@ from viewer.backends import FrameView, backend
 from viewer.backends.voxels import Params, cuts
 from viewer.backends.voxels.cut_pose import CutPose
 from viewer.backends.voxels.cuts import OctreeCuts
-from viewer.backends.voxels.gpu_cut import GpuOctree
 from viewer.camera import Camera
 from viewer.drawing.renderer import Renderer
 from viewer.gpu.pose import GpuPose
@@ -204,12 +203,10 @@ def test_an_octree_is_uploaded_in_slices_and_drawn_meanwhile(
     cloud = CLOUDS["coloured"]
     camera = CAMERAS["whole"](cloud.bounds())
     octants, whole = Found(renderer, cloud, Params()), Found(renderer, cloud, Params())
-    counts, uploaded = [], 0
+    counts: list[int] = []
     while not (shown := octants.show(camera, budget_ms=0.0)).found.complete:
-        tree = octants.cuts._on_gpu
-        assert isinstance(tree, GpuOctree)
-        assert not counts or tree.uploaded - uploaded <= slice_bytes
-        uploaded = tree.uploaded
+        assert not counts or octants.pose.take_spent().nbytes <= slice_bytes
+        octants.pose.take_spent()
         counts.append(shown.points.count)
     assert counts[0] == 1, "the root first"
     assert counts == sorted(counts)

@@ -125,7 +125,9 @@ class OctreeCuts:
     def _find_on_gpu(self, pose: GpuPose, frame: FrameView, options: CutOptions) -> Shown:
         if self._on_gpu is None:
             self._on_gpu = GpuOctree(self._gpu, self.octree)
-        self._on_gpu.upload(frame.budget_ms)
+        if not self._on_gpu.is_complete:
+            with pose.preparing("upload"):
+                pose.spent.nbytes += self._on_gpu.upload(frame.budget_ms)
         return self._on_gpu.show(pose, self._strays(pose), sight_of(frame.view), options)
 
     def _find(

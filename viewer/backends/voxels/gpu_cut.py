@@ -87,7 +87,7 @@ class _Scratch:
 class GpuOctree:
     """The nodes of an octree with attributes, uploaded level by level. `show` finds those that a view shows.
 
-    Bit by bit and in the same order, these are the nodes that `Traversal` finds. uploaded: bytes so far.
+    Bit by bit and in the same order, these are the nodes that `Traversal` finds.
     """
 
     def __init__(self, gpu: Gpu, octree: Octree) -> None:
@@ -104,7 +104,6 @@ class GpuOctree:
         self._cells.buffer.write(bytes(_CELL_BYTES))  # the root's
         self._slices = deque(self._list_slices())
         self._ready = 0  # levels
-        self.uploaded = 0
         self._pool = ArrayPool(gpu, "colors" in self._texels)
         self.nbytes = _CELL_BYTES * self._count + sum(t.buffer.size for t in self._texels.values())
 
@@ -140,18 +139,26 @@ class GpuOctree:
             slices.append((level, None, 0, np.empty(0, np.uint8)))
         return slices
 
-    def upload(self, budget_ms: float | None = None) -> None:
-        """Upload for about so long: a slice at least, and the root with the first call; None: all."""
+    @property
+    def is_complete(self) -> bool:
+        """Whether all levels are there."""
+        return not self._slices
+
+    def upload(self, budget_ms: float | None = None) -> int:
+        """Upload for about so long: a slice at least, and the root with the first call; None: all. Returns
+        how many bytes."""
         end = math.inf if budget_ms is None else time.perf_counter() + budget_ms / 1e3
+        uploaded = 0
         while self._slices:
             level, texels, first, words = self._slices.popleft()
             if texels is not None:
                 texels.buffer.write(words, offset=first)
-                self.uploaded += len(words)
+                uploaded += len(words)
             else:
                 self._finish(level)
             if self._ready and time.perf_counter() >= end:
                 break
+        return uploaded
 
     def _finish(self, level: int) -> None:
         """Go on after all of a level is there."""
