@@ -58,6 +58,9 @@ class GpuPose:
     Automatic choices look at `stored`, so that they do not depend on what happened before. The first read of
     either merges the points of range views.
 
+    A GpuPose has more than 30 methods because it answers for a cloud: octants, which only the GPU has, give
+    the same facts without reading their arrays.
+
     pose: as it was given. spent: the work since the last picture, which the frame takes. origin: what
     positions on the GPU are relative to, (3,) scan units: the pose's origin, or that of the view drawn last.
     """

@@ -14,6 +14,7 @@ from viewer.backends import FrameView, backend
 from viewer.backends.voxels import Params, cuts
 from viewer.backends.voxels.cut_pose import CutPose
 from viewer.backends.voxels.cuts import OctreeCuts
+from viewer.backends.voxels.shown import ShownOctants
 from viewer.camera import Camera
 from viewer.drawing.renderer import Renderer
 from viewer.gpu.pose import GpuPose
@@ -78,7 +79,7 @@ class Found:
         octree = backend("voxels").derive(self.pose.pose, params, None)
         self.cuts = OctreeCuts(renderer.gpu, octree)  # type: ignore[arg-type]
 
-    def show(self, camera: Camera, budget_ms: float | None = None, share: float = 1.0) -> cuts.Shown:
+    def show(self, camera: Camera, budget_ms: float | None = None, share: float = 1.0) -> ShownOctants:
         """Those that a view shows."""
         view = View.of(camera, SIZE, self.pose.origin, self.pose.bounds)
         frame = FrameView(view, self.params, self.cuts, share, budget_ms, frozenset(), False, None)
@@ -97,7 +98,7 @@ def both(
     cloud: PointCloud,
     camera: Camera,
     **values: object,
-) -> tuple[cuts.Shown, cuts.Shown]:
+) -> tuple[ShownOctants, ShownOctants]:
     """What the CPU finds, and what shaders find."""
     if not renderer.gpu.software:
         pytest.skip("graphics cards find octants by shaders alone")
@@ -111,7 +112,7 @@ def both(
     return expected, found
 
 
-def assert_same(expected: cuts.Shown, found: cuts.Shown) -> None:
+def assert_same(expected: ShownOctants, found: ShownOctants) -> None:
     assert found.found == expected.found
     np.testing.assert_array_equal(found.octants, expected.octants)
     np.testing.assert_array_equal(found.rows, expected.rows)

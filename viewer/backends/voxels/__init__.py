@@ -28,7 +28,7 @@ from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, Backend, Derives, FrameView, L
 from .cubes import draw_cubes, shade_flat
 from .cuts import OctreeCuts
 from .discs import VARIANTS, draw_discs
-from .shown import Found
+from .shown import CutCounts
 
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
@@ -248,7 +248,7 @@ class Voxels(Backend):
         return coarse or not (found.complete and layer.known)
 
 
-def _report(found: Found, octree: Octree, params: Params, stats: Stats) -> None:
+def _report(found: CutCounts, octree: Octree, params: Params, stats: Stats) -> None:
     stopped = shortfall(octree, Stop(params.stop, params.delta))
     if stopped:
         stats.chosen["depth"] = stopped

@@ -17,7 +17,7 @@ from ...gpu.context import Gpu
 from ...gpu.pose import FORMATS, GpuPose
 from ...scan.octree import Octree
 from ...scan.points import NOTHING, SAMPLE, PointCloud, robust_box, stride, strided, usual_reach
-from .shown import Found, ScalarsOfRows, Strays, ids_of
+from .shown import CutCounts, ScalarsOfRows, StrayPoints, ids_of
 
 _BYTES = {"positions": 12, "normals": 12, "radii": 4, "colors": 4, "octants": 4}
 _KINDS = {"positions": "f4", "normals": "f4", "radii": "f4", "colors": "u1", "octants": "u4"}
@@ -95,8 +95,8 @@ class CutPose(GpuPose):
         octree: Octree,
         arrays: CutArrays,
         nodes: int,
-        strays: Strays,
-        found: Found,
+        strays: StrayPoints,
+        found: CutCounts,
         pool: ArrayPool,
     ) -> None:
         cloud = scanned.cloud

@@ -22,7 +22,7 @@ from ...scan.points import NOTHING, PointCloud
 from ...view import View
 from .. import FrameView
 from .gpu_cut import CutOptions, GpuOctree
-from .shown import Found, ScalarsOfRows, Shown, Strays, ids_of
+from .shown import CutCounts, ScalarsOfRows, ShownOctants, StrayPoints, ids_of
 
 ON_SOFTWARE = False  # whether software drivers find octants by shaders, too: for tests
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
@@ -65,7 +65,7 @@ class _Gathered:
     points: GpuPose
     rows: NDArray[np.uint32]
     octants: NDArray[np.uint32]
-    found: Found
+    found: CutCounts
 
 
 class OctreeCuts:
@@ -81,7 +81,7 @@ class OctreeCuts:
         self._on_gpu: GpuOctree | None = None
         self._asked: tuple[object, ...] = ()
         self._seen: tuple[object, ...] = ()
-        self._shown: Shown | None = None
+        self._shown: ShownOctants | None = None
 
     @property
     def nbytes(self) -> int:
@@ -98,7 +98,7 @@ class OctreeCuts:
             self._on_gpu.release()
         self._traversal = self._shown = self._on_gpu = None
 
-    def show(self, pose: GpuPose, frame: FrameView) -> Shown:
+    def show(self, pose: GpuPose, frame: FrameView) -> ShownOctants:
         """The nodes for a view, found anew where it or the parameters changed, else found further."""
         params: OctantSettings = frame.params
         threshold = params.pixel_threshold / math.sqrt(frame.share)  # four times the nodes at half the edge
@@ -122,7 +122,7 @@ class OctreeCuts:
         wanted = ON_SOFTWARE or not self._gpu.software
         return wanted and params.shape == "discs" and GpuOctree.fits(self._gpu, self.octree)
 
-    def _find_on_gpu(self, pose: GpuPose, frame: FrameView, options: CutOptions) -> Shown:
+    def _find_on_gpu(self, pose: GpuPose, frame: FrameView, options: CutOptions) -> ShownOctants:
         if self._on_gpu is None:
             self._on_gpu = GpuOctree(self._gpu, self.octree)
         if not self._on_gpu.is_complete:
@@ -132,7 +132,7 @@ class OctreeCuts:
 
     def _find(
         self, pose: GpuPose, frame: FrameView, options: CutOptions, asked: tuple[object, ...], is_new: bool
-    ) -> Shown:
+    ) -> ShownOctants:
         sight = sight_of(frame.view)
         if self._traversal is None or self._asked != asked:
             self._traversal = Traversal(
@@ -178,15 +178,15 @@ class OctreeCuts:
         numbers = cut.numbers(self.octree)
         octants = np.concatenate([numbers, np.full(len(strays.rows), NOTHING, np.uint32)])
         coarsest = int(cut.level[-1]) if len(cut) else self.octree.depth
-        found = Found(cut.complete, cut.outside, cut.facing_away, coarsest)
+        found = CutCounts(cut.complete, cut.outside, cut.facing_away, coarsest)
         return _Gathered(GpuPose(self._gpu, replace(pose.pose, points=shown)), rows, octants, found)
 
-    def _strays(self, pose: GpuPose) -> Strays:
+    def _strays(self, pose: GpuPose) -> StrayPoints:
         """The points outside the tree's cube. Their normals are those that the scan has: around them, none
         can be estimated, and without one they face the eye."""
         cloud, rows = pose.cloud, self.octree.strays
         stored = pose.stored.normals
-        return Strays(
+        return StrayPoints(
             rows=rows,
             positions=(cloud.world(rows) - pose.origin).astype(np.float32),
             radii=np.full(len(rows), self._usual, np.float32),

@@ -19,7 +19,7 @@ from ...gpu.pose import GpuPose
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.traverse import CubeSight, Sight
 from .cut_pose import ArrayPool, CutArrays, CutPose
-from .shown import Found, Shown, Strays
+from .shown import CutCounts, ShownOctants, StrayPoints
 
 _SLICE = 1 << 22  # bytes uploaded at a time
 _LEVELS = DEEPEST + 1
@@ -120,8 +120,8 @@ class GpuOctree:
         return self._starts[-1] if name in _INNER else self._count
 
     def _list_slices(self) -> list[_Slice]:
-        """What is uploaded, in order: (level, to what, from which byte on, bytes); at the end of each level
-        nothing to None."""
+        """Slices to upload, in order: (level, buffer, first byte there, bytes). The buffer is None at the end
+        of each level."""
         octree = self._octree
         slices: list[_Slice] = []
         for level in range(octree.depth + 1):
@@ -181,7 +181,7 @@ class GpuOctree:
         self._texels["first_child"].bind(Texture.FIRST_CHILDREN)
         self._cells.bind(Texture.NODE_CELLS)
 
-    def show(self, pose: GpuPose, strays: Strays, sight: Sight, options: CutOptions) -> Shown:
+    def show(self, pose: GpuPose, strays: StrayPoints, sight: Sight, options: CutOptions) -> ShownOctants:
         """The nodes that a view shows, of the levels that are there, and the strays, as points of a pose."""
         gpu, wanted = self._gpu, max(0, min(options.max_depth, self._octree.depth))
         depth = min(wanted, self._ready - 1)
@@ -200,11 +200,11 @@ class GpuOctree:
                 self._gather(scratch, arrays, count)
         levels = np.flatnonzero(counts)
         coarsest = int(levels[0]) if len(levels) else self._octree.depth
-        found = Found(depth == wanted, int(totals["outside"]), int(totals["facing_away"]), coarsest)
+        found = CutCounts(depth == wanted, int(totals["outside"]), int(totals["facing_away"]), coarsest)
         return CutPose(pose, self._octree, arrays, count, strays, found, self._pool)
 
     def _pack(self, pose: GpuPose, sight: Sight, options: CutOptions, depth: int) -> bytes:
-        """What voxels/tree/sight.glsl declares."""
+        """The view as voxels/tree/sight.glsl declares it."""
         octree, of = self._octree, CubeSight.of(self._octree, sight, options.pixel_threshold)
         words = np.zeros(1, _SIGHT)
         one = words[0]

@@ -12,8 +12,8 @@ from ...gpu.pose import GpuPose
 from ...picture.rows import Octants
 
 
-class Found(NamedTuple):
-    """What a view shows of an octree. complete: whether a later call would find the same. outside,
+class CutCounts(NamedTuple):
+    """Facts about the octants that a view shows. complete: whether a later call would find the same. outside,
     facing_away: octants left out with all their children, by cause. coarsest: the least level of those that
     are drawn; that of the leaves where none is."""
 
@@ -23,15 +23,15 @@ class Found(NamedTuple):
     coarsest: int
 
 
-class Shown(Octants, Protocol):
+class ShownOctants(Octants, Protocol):
     """Nodes that a view shows as points, and strays behind them."""
 
     @property
-    def found(self) -> Found:
-        """Which they are."""
+    def found(self) -> CutCounts:
+        """Facts about them."""
 
 
-class Strays(NamedTuple):
+class StrayPoints(NamedTuple):
     """The points outside the tree's cube, drawn as they are. rows: (n,), in the scan. positions: (n, 3),
     relative to the pose's origin. radii: (n,). normals: (n, 3), 0 where unknown. colors: (n, 4), or None."""
 
