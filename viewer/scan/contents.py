@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from .faces import Faces
 from .range_view import DepthKind
+from .texture import TexturedMesh
 
 
 class Deferred:
@@ -125,24 +126,35 @@ class TextHead:
     lines: tuple[str, ...]
 
 
-@dataclass(frozen=True, kw_only=True)
-class TextureContents:
-    """The textures of a mesh as the file names them.
+@dataclass(frozen=True)
+class Material:
+    """A material of a mesh.
 
-    images:    a picture a material, None where it has none; none of them is read
-    colors:    (M, 3) float64, 0..1, the diffuse colour of each material
-    uv:        (K, 2) float64, v up
-    vertices:  (C,) int64, the row of the point of each corner of a face
-    corners:   (C,) int64, the row of `uv` of each corner, -1 where it has none
-    materials: (C,) int64, the material of the face of each corner, -1 where it has none
+    color:      diffuse, 0..1; None where the file states none
+    image:      the picture of its colours, which is not read yet; None where it has none
+    scale, offset: of positions in the picture: u and v are multiplied, then moved
+    is_clamped: whether the picture's edge goes on beyond it; else the picture repeats
     """
 
-    images: tuple[Path | None, ...]
-    colors: NDArray[np.float64]
-    uv: NDArray[np.float64]
-    vertices: NDArray[np.int64]
-    corners: NDArray[np.int64]
-    materials: NDArray[np.int64]
+    color: tuple[float, float, float] | None = None
+    image: Path | None = None
+    scale: tuple[float, float] = (1.0, 1.0)
+    offset: tuple[float, float] = (0.0, 0.0)
+    is_clamped: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextureContents:
+    """The texture of a mesh as the file names it.
+
+    mesh:      its faces; frames with the same faces share one
+    materials: of the groups of faces, in their order
+    is_named:  False where the file names no picture, and one beside it has its name
+    """
+
+    mesh: TexturedMesh
+    materials: tuple[Material, ...]
+    is_named: bool = True
 
 
 @dataclass(kw_only=True)

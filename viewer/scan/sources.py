@@ -67,6 +67,7 @@ class FileSequence:
     def __init__(self, paths: Sequence[Path], name: str, decided: Decided | None = None) -> None:
         self.decided = decided or Decided()
         self.decided.other_colors = self._other_colors
+        self.decided.frames = len(paths)
         self.name = printable(name)
         self.files = tuple(paths)
         self._folder = Path(os.path.commonpath([path.parent for path in paths]))

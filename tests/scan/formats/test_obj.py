@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from viewer.errors import InputError
-from viewer.scan.formats import obj, read
+from viewer.scan.formats import _obj_lines, read
 from viewer.scan.open import open_scan
 
 VERTICES = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -89,7 +89,7 @@ def test_corners_in_several_parts_tell_the_same_normals(
     faces = "f 1//2 2//1 3//2\nf -1//1 2//2 1//-1\n" * 20
     path.write_text("v 1 2 3\nv 2 3 4\nv 5 5 5\nvn 0 0 1\nvn 1 0 0\n" + faces)
     whole = read(path).normals
-    monkeypatch.setattr(obj, "_CORNERS_AT_ONCE", 7)
+    monkeypatch.setattr(_obj_lines, "_FACES_AT_ONCE", 7)
     np.testing.assert_array_equal(read(path).normals, whole)
 
 

@@ -49,9 +49,9 @@ from ..reading.cloud import assemble, stored_colors
 from ..reading.hints import hint_for, hinted_suffix
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
-from ..reading.textures import paint
+from ..reading.textures import Pictures, paint
 from ..times import frame_in_words
-from ._pictures import picture_colors
+from ._pictures import picture_file, texture_colors
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
 _LONGEST_MESSAGE = 400  # characters
@@ -165,7 +165,7 @@ def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Sc
 def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, decided: Decided) -> Scanned:
     """The points or views that a module's answer comes to."""
     if isinstance(found, PointContents):
-        paint(found, decided, picture_colors)
+        paint(found, decided, Pictures(picture_file, texture_colors))
         scanned: Scanned = assemble(found, decided)
     else:
         scanned = found

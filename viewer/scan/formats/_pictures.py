@@ -5,9 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +30,7 @@ _BYTES = {
     "RGB": 13,
 }  # of memory for a pixel of a mode of Pillow's, with its copies
 _MOST_BYTES = 16  # the same of all other modes
+_MOST_REDUCED = 4
 _MOST_RATIO = 40  # of memory to the file: flat and masked pictures pack well
 _OF_NUMBERS = ("L", "I", "F", "1")  # modes of Pillow's, and those that begin with I;16
 _COMPRESSED = "libtiff"  # what decodes compressed TIFF, into the machine's order of bytes
@@ -39,10 +39,11 @@ _HINT = "Check that the file is complete. Scan4D cannot read 64-bit numbers: sav
 
 
 @contextmanager
-def opened_picture(path: Path, kinds: tuple[str, ...]) -> Iterator[Image]:
+def opened_picture(path: Path, kinds: tuple[str, ...], reduction: int = 1) -> Iterator[Image]:
     """A picture of one of these kinds, of which the header is read and the pixels are read when asked for.
 
-    Whatever is wrong with it is one InputError.
+    reduction: the caller wants JPEG in that part of its width and height. Whatever is wrong with the picture
+    is one InputError.
     """
     from PIL import Image
 
@@ -51,9 +52,8 @@ def opened_picture(path: Path, kinds: tuple[str, ...]) -> Iterator[Image]:
         # Pillow warns of odd tags and large pictures.
         with opened(path) as stream, QUIETLY, warnings.catch_warnings(action="ignore"), unsaid(LIBTIFF):
             image = Image.open(stream, formats=kinds)
-            admit(
-                size_of(stream), image.width * image.height * _BYTES.get(image.mode, _MOST_BYTES), _MOST_RATIO
-            )
+            pixels = image.width * image.height // (reduction**2 if image.format == "JPEG" else 1)
+            admit(size_of(stream), pixels * _BYTES.get(image.mode, _MOST_BYTES), _MOST_RATIO)
             yield image
     except Scan4DError as error:
         raise InputError(error.what, error.where or path, error.hint) from error
@@ -90,20 +90,50 @@ def srgb_of_picture(image: Image) -> NDArray[np.uint8]:
     return np.array(image if image.mode == "RGB" else image.convert("RGB"))
 
 
-def picture_colors(path: Path) -> NDArray[np.uint8]:
-    """The colours of a picture file, (H, W, 3), sRGB; the last one stays in memory, as frames often share it.
+class PictureFile(NamedTuple):
+    """A picture whose header is read. width, height: pixels. changed: differs where its file has changed."""
 
-    Raises InputError.
-    """
+    path: Path
+    width: int
+    height: int
+    changed: tuple[int, int]
+
+
+def picture_file(path: Path) -> PictureFile:
+    """Read the header of a picture of colours. Raises InputError."""
     try:
         status = path.stat()
     except OSError as error:
         what, hint = explained(error)
         raise InputError(what, path, hint) from error
-    return _colors_of_file(path, status.st_mtime_ns, status.st_size)
+    with opened_picture(path, TEXTURE_KINDS, _MOST_REDUCED) as image:
+        return PictureFile(path, image.width, image.height, (status.st_mtime_ns, status.st_size))
 
 
-@lru_cache(maxsize=1)
-def _colors_of_file(path: Path, *_changed: int) -> NDArray[np.uint8]:
-    with opened_picture(path, TEXTURE_KINDS) as image:
-        return srgb_of_picture(image)
+def texture_colors(path: Path, reduction: int = 1) -> NDArray[np.uint8]:
+    """The colours of a picture, (H, W, 3) sRGB, or (H, W, 4) where it is transparent in places.
+
+    reduction: 1, 2 or 4: the picture is that much smaller on either side. Raises InputError.
+    """
+    with opened_picture(path, TEXTURE_KINDS, reduction) as image:
+        wanted = -(-image.width // reduction), -(-image.height // reduction)
+        image.draft(None, wanted)  # JPEG: what is decoded is smaller
+        left = max(1, round(image.width / wanted[0]))
+        colors = _of_texture(image)
+        if left > 1:
+            colors = colors.reduce(left)
+        values = np.asarray(colors)
+        return values if values.shape[2] == 3 or (values[..., 3] < 255).any() else values[..., :3]
+
+
+def _of_texture(image: Image) -> Image:
+    """The picture as RGB or RGBA; numbers of 16 bit are grey values."""
+    from PIL import Image as images
+
+    if image.mode.startswith("I;16") or image.mode == "I":
+        return images.fromarray((np.asarray(image) // 257).clip(0, 255).astype(np.uint8)).convert("RGB")
+    if image.mode == "F":
+        raise InputError("is a picture of floating-point numbers, where Scan4D needs colours")
+    is_transparent = image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info
+    wanted = "RGBA" if is_transparent else "RGB"
+    return image if image.mode == wanted else image.convert(wanted)

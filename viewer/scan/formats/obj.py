@@ -1,14 +1,14 @@
 """OBJ: Wavefront's mesh format; its vertices are the points, with the common colour extension, and its
 faces tell the topology. Materials with pictures give the vertices their colours.
 
-Read here and not by a library because those at hand drop vertices that no triangle uses.
+Read here and not by a library because those at hand drop vertices that no triangle uses. In a sequence,
+frames often have the same faces: these are compared as bytes, and parsed once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import suppress
-from io import TextIOWrapper
+from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
@@ -17,69 +17,79 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from ..admission import admit, opened
-from ..contents import PointContents, TextureContents
+from ..admission import admit, opened, read_exactly, size_of
+from ..contents import Material, PointContents, TextureContents
 from ..faces import Faces
 from ..reading import numbers
 from ..reading.numbers import PLAIN, Dialect
 from ..reading.sequence import Decided
-from ._columns import batches, bounded_lines, parse_table, whole_numbers
-from ._mtl import Material, read_materials
+from ..texture import TexturedMesh
+from ._columns import batches
+from ._mtl import file_beside, read_materials
+from ._obj_lines import FaceRows, Keyword, ObjLines
 from ._topology import topology_of
 
 TITLE = "OBJ"
 SUFFIXES = (".obj",)
 
-_CORNERS_AT_ONCE = 1 << 18
-_FACES_AT_ONCE = 1 << 12
 _ROWS_AT_ONCE = 1 << 14
+_HEAD = 1 << 16  # bytes that tell the encoding
 _VERTICES_LOOKED_AT = 200
 _LOOK = 3000  # face corners that tell whether normals and vertices are numbered alike
-_HEAD = 1 << 16  # characters in which `mtllib` stands
+_REMARKS = 1000  # comments that are looked at
 # Numbers of a vertex -> where its red, green and blue begin; 4, 7 and 8 numbers have a weight behind z.
 _COLORS_AT = {6: 3, 7: 4, 8: 4}
 _MOST_NUMBERS = 8
-_JOINING = 3  # times the bytes of textured corners: in pieces, joined, and with their positions
-_BLANKS = {" ", "\t"}
+_WITH_LINES = 4  # times the bytes of the file: with its lines and numbers
+_JOINING = 4  # times the bytes of corners: in pieces, joined, and as a mesh
+_PICTURES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".tga")
 
 
-def contents(path: Path, frame: int, decided: Decided) -> PointContents:
+def contents(path: Path, frame: int = 0, decided: Decided | None = None) -> PointContents:
     """The vertices (`v x y z [w] [r g b]`), their normals (`vn`) and textures. Raises InputError."""
+    decided = decided or Decided()
     with opened(path) as stream:
-        text = _text_of(stream)
-        dialect = _dialect_of_vertices(text, decided)
-        positions, colors = _vertices(text, dialect)
+        lines = _lines(stream, decided.frames)
+        lines.dialect = _dialect_of_vertices(lines, decided)
+        positions, colors = _vertices(lines)
         columns = dict(zip("xyz", positions.T, strict=True))
-        normals = _normals(text, len(positions))
+        materials = _materials(lines, path, decided)
+        picture = None if materials else _picture_of_name(lines, path)
+        if picture is not None:
+            materials = {"": Material(image=picture)}
+        mesh = _shared_mesh(lines, len(positions), bool(materials), size_of(stream), decided)
+        normals = _normals(lines, mesh.normals, len(positions))
         if normals is not None:
             columns |= dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
         if colors is not None:
             columns |= dict(zip(("red", "green", "blue"), colors.T, strict=True))
         return PointContents(
             columns=columns,
-            remarks=_remarks(text),
-            topology=topology_of(len(positions), _faces(text)),
-            texture=_texture(text, path),
+            remarks=tuple(_remarks(lines)),
+            topology=mesh.topology,
+            texture=_texture(lines, mesh.textured, materials, picture is None),
         )
 
 
 def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
     """The faces of an OBJ file, in pieces. Raises InputError or ValueError where they cannot be used."""
     with opened(path) as stream:
-        text = _text_of(stream)
-        yield from _faces(text)
+        yield from map(_vertices_of, _lines(stream).faces())
 
 
-def _text_of(stream: BinaryIO) -> TextIOWrapper:
-    """A file as text, which closes the stream when it goes. Names of other encodings stay as they are."""
-    encoding = numbers.encoding_of(stream.read(_HEAD))
-    stream.seek(0)
-    return TextIOWrapper(stream, "utf-8-sig" if encoding == "cp1252" else encoding, errors="surrogateescape")
+def _lines(stream: BinaryIO, frames: int = 1) -> ObjLines:
+    held = size_of(stream)
+    admit(held, _WITH_LINES * held)
+    data = read_exactly(stream, held)
+    encoding = numbers.encoding_of(data[:_HEAD])
+    if encoding.startswith(("utf-16", "utf-32")):
+        data = data.decode(encoding, "replace").encode()
+    return ObjLines(data, held * frames)
 
 
-def _dialect_of_vertices(text: TextIOWrapper, decided: Decided) -> Dialect:
+def _dialect_of_vertices(lines: ObjLines, decided: Decided) -> Dialect:
     """How the numbers of the vertices are written; the decimal mark is put into the record."""
-    head = [*islice(_lines(text, "v"), _VERTICES_LOOKED_AT)]
+    head = [*islice(lines.texts(Keyword.VERTEX), _VERTICES_LOOKED_AT)]
     stated = decided.corrections.get("decimal")
     is_plain = stated is None and not any("," in line for line in head)
     dialect = PLAIN if is_plain else numbers.dialect_of(head, PLAIN.separator, stated)
@@ -89,21 +99,22 @@ def _dialect_of_vertices(text: TextIOWrapper, decided: Decided) -> Dialect:
     return dialect
 
 
-def _remarks(text: TextIOWrapper) -> tuple[str, ...]:
-    """The comments at the beginning of the file."""
-    text.seek(0)
-    lines = text.read(_HEAD).splitlines()
-    return tuple(line.lstrip("# ") for line in lines if line.startswith("#"))
+def _vertices_of(rows: FaceRows) -> Faces:
+    return Faces.of(rows.corners[:, 0], rows.sizes)
 
 
-def _vertices(
-    text: TextIOWrapper, dialect: Dialect
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _remarks(lines: ObjLines) -> Iterator[str]:
+    """The first comments of the file."""
+    for _, line in zip(range(_REMARKS), lines.others(b"#"), strict=False):
+        yield line.lstrip("# ")
+
+
+def _vertices(lines: ObjLines) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Positions and colours, (N, 3) each; None where no vertex has a colour. Those without one are white."""
     try:
-        table = numbers.parse_numbers(_lines(text, "v"), dialect=dialect)
+        table = lines.table(Keyword.VERTEX)
     except InputError:  # as a rule, since some vertices have colours and others have none
-        table = _uneven_rows(text, dialect)
+        table = _uneven_rows(lines)
     if table.shape[1] < 3:
         raise InputError(_bad_width(table.shape[1]))
     if (at := _COLORS_AT.get(table.shape[1])) is None:
@@ -125,15 +136,15 @@ def _is_opaque(column: NDArray[np.float64]) -> bool:
     return bool((column == 1).all())
 
 
-def _uneven_rows(text: TextIOWrapper, dialect: Dialect) -> NDArray[np.float64]:
+def _uneven_rows(lines: ObjLines) -> NDArray[np.float64]:
     """Vertices of which some have colours: (N, 7) x y z w r g b, NaN where there is none."""
     parts = [np.empty((0, 7))]
-    for lines in batches(_lines(text, "v"), _ROWS_AT_ONCE):
-        widths = np.array([len(line.split()) for line in lines])
-        part = np.full((len(lines), 7), np.nan)
+    for texts in batches(lines.texts(Keyword.VERTEX), _ROWS_AT_ONCE):
+        widths = np.array([len(text.split()) for text in texts])
+        part = np.full((len(texts), 7), np.nan)
         for width in np.unique(widths):
             rows = np.flatnonzero(widths == width)
-            found = numbers.parse_numbers((lines[row] for row in rows), dialect=dialect)
+            found = numbers.parse_numbers((texts[row] for row in rows), dialect=lines.dialect)
             if len(found) != len(rows) or not 3 <= found.shape[1] <= _MOST_NUMBERS:
                 raise InputError(_bad_width(int(width)))
             part[rows, :3] = found[:, :3]
@@ -147,145 +158,138 @@ def _bad_width(width: int) -> str:
     return f"a vertex has {width} numbers, expected 3, 4, 6, 7 or 8"
 
 
-def _faces(text: TextIOWrapper) -> Iterator[Faces]:
-    for rows in batches(_polygons(text), _FACES_AT_ONCE):
-        corners, sizes = whole_numbers([words for words, _ in rows])
-        vertices = np.repeat([vertices for _, vertices in rows], sizes)
-        yield Faces.of(np.where(corners < 0, corners + vertices, corners - 1), sizes)
+@dataclass(frozen=True, eq=False)
+class _NormalCorners:
+    """Which normals the vertices have. vertices, normals: (C,), a pair for each corner with a normal.
+    is_in_order: whether row k of the normals is that of vertex k."""
+
+    vertices: NDArray[np.int64]
+    normals: NDArray[np.int64]
+    is_in_order: bool
 
 
-def _polygons(text: TextIOWrapper) -> Iterator[tuple[list[str], int]]:
-    """The vertices of each face as written, and how many there are so far: negative ones count back."""
-    vertices = 0
-    text.seek(0)
-    for line in _unindented(text):
-        if line.startswith(("v ", "v\t")):
-            vertices += 1
-        elif line.startswith(("f ", "f\t")):
-            words = line.split()[1:]
-            yield [word.partition("/")[0] for word in words] if "/" in line else words, vertices
+@dataclass(frozen=True, eq=False)
+class _Mesh:
+    """Faces as the parts of the reader need them. textured: None where no material has a picture."""
+
+    topology: str | None
+    normals: _NormalCorners
+    textured: TexturedMesh | None
 
 
-def _normals(text: TextIOWrapper, count: int) -> NDArray[np.float64] | None:
+def _shared_mesh(lines: ObjLines, count: int, has_materials: bool, held: int, decided: Decided) -> _Mesh:
+    """The faces between `count` vertices; those of an earlier frame where the text of both is the same."""
+    sizes = count, *map(lines.count, (Keyword.NORMAL, Keyword.UV)), has_materials
+    groups = _groups(lines)
+    key = sizes, lines.order, groups.tobytes(), lines.raw(Keyword.FACE), lines.raw(Keyword.UV)
+    return decided.shared("obj", key, lambda: _mesh(lines, count, groups if has_materials else None, held))
+
+
+def _mesh(lines: ObjLines, count: int, groups: NDArray[np.int64] | None, held: int) -> _Mesh:
+    """groups: of each `usemtl`; None where no texture is wanted. held: bytes of the file."""
+    needs_corners = groups is not None or lines.count(Keyword.NORMAL) > 0
+    pieces: list[FaceRows] = []
+    taken = 0
+
+    def faces() -> Iterator[Faces]:
+        nonlocal taken
+        for rows in lines.faces():
+            if needs_corners:
+                pieces.append(rows)
+                taken += _JOINING * rows.corners.nbytes
+                admit(held, taken + _WITH_LINES * held)
+            yield _vertices_of(rows)
+
+    topology = topology_of(count, faces())
+    none = FaceRows(np.empty((0, 3), np.int64), np.empty(0, np.int64), np.empty(0, np.int64))
+    corners, sizes, at = (np.concatenate(parts) for parts in zip(none, *pieces, strict=True))
+    textured = None
+    if groups is not None and topology is not None:
+        textured = _textured_mesh(lines, FaceRows(corners, sizes, at), groups)
+    return _Mesh(topology, _normal_corners(lines, corners, count), textured)
+
+
+def _textured_mesh(lines: ObjLines, faces: FaceRows, groups: NDArray[np.int64]) -> TexturedMesh:
+    before = np.searchsorted(lines.lines_of(Keyword.MATERIAL), faces.lines)  # usemtl above each face
+    return TexturedMesh(
+        sizes=faces.sizes,
+        vertices=faces.corners[:, 0].copy(),
+        corners=faces.corners[:, 1].copy(),
+        groups=groups[before],
+        uv=lines.table(Keyword.UV, (0, 1)),
+    )
+
+
+def _group_names(lines: ObjLines) -> list[str]:
+    """The names of the materials that faces have, each once, in the order of the file; "" above the first."""
+    return list(dict.fromkeys(["", *(text.strip() for text in lines.texts(Keyword.MATERIAL))]))
+
+
+def _groups(lines: ObjLines) -> NDArray[np.int64]:
+    """Which of `_group_names` counts above all lines with `usemtl`, and behind each, (M + 1,)."""
+    number_of = {name: number for number, name in enumerate(_group_names(lines))}
+    return np.array([0, *(number_of[text.strip()] for text in lines.texts(Keyword.MATERIAL))], np.int64)
+
+
+def _normal_corners(lines: ObjLines, corners: NDArray[np.int64], count: int) -> _NormalCorners:
+    vertex, _, normal = corners[corners[:, 2] != -1].T
+    normals = lines.count(Keyword.NORMAL)
+    usable = (vertex >= 0) & (vertex < count) & (normal >= 0) & (normal < normals)
+    is_in_order = normals == count and bool((vertex[:_LOOK] == normal[:_LOOK]).all())
+    return _NormalCorners(vertex[usable], normal[usable], is_in_order)
+
+
+def _normals(lines: ObjLines, of: _NormalCorners, count: int) -> NDArray[np.float64] | None:
     """A normal for each of `count` vertices, (count, 3), or None where not every vertex has one.
 
     They stand in the order of the vertices, or the faces tell; a vertex whose corners have several
     normals gets their mean.
     """
-    normals = parse_table(_lines(text, "vn"), (0, 1, 2))
-    if not len(normals):
+    if not lines.count(Keyword.NORMAL):
         return None
-    start = parse_table(islice(_corners(text), _LOOK), (0, 2), "/")
-    if len(normals) == count and (start[:, 0] == start[:, 1]).all():
+    normals = lines.table(Keyword.NORMAL, (0, 1, 2))
+    if of.is_in_order and len(normals) == count:
         return normals
-    sizes = np.array([count, len(normals)])
-    sums, corners_of = np.zeros((count, 3)), np.zeros(count, np.intp)
-    all_corners = _corners(text)
-    while len(corners := parse_table(islice(all_corners, _CORNERS_AT_ONCE), (0, 2), "/")):
-        corners = np.where(corners < 0, corners + sizes, corners - 1)  # negative: counted from the end
-        vertex, normal = corners[((corners >= 0) & (corners < sizes)).all(axis=1)].astype(np.intp).T
-        np.add.at(sums, vertex, normals[normal])
-        np.add.at(corners_of, vertex, 1)
-    if not corners_of.all():
+    usable = of.normals < len(normals)
+    vertices, corners = of.vertices[usable], normals[of.normals[usable]]
+    if not np.bincount(vertices, minlength=count).all() or not len(vertices):
         return None
+    sums = np.stack([np.bincount(vertices, values, count) for values in corners.T], axis=1)
     return sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), np.finfo(np.float32).tiny)
 
 
-def _texture(text: TextIOWrapper, path: Path) -> TextureContents | None:
-    """The textures that the faces have, None where no material has a picture."""
-    materials = _materials(text, path)
-    if not any(material.image for material in materials.values()):
+def _texture(
+    lines: ObjLines, mesh: TexturedMesh | None, materials: dict[str, Material], is_named: bool
+) -> TextureContents | None:
+    """The texture of the faces; None where no material has a picture."""
+    if mesh is None or not materials:
         return None
-    uv = parse_table(_lines(text, "vt"), (0, 1))
-    number_of = {name: number for number, name in enumerate(materials)}
-    pieces, taken, held = [np.empty((0, 3), np.int64)], uv.nbytes, path.stat().st_size
-    for rows in batches(_textured_polygons(text), _FACES_AT_ONCE):
-        pieces.append(_textured(rows, number_of))
-        taken += _JOINING * pieces[-1].nbytes
-        admit(held, taken)
-    vertices, corners, used = np.concatenate(pieces).T
-    return TextureContents(
-        images=tuple(material.image for material in materials.values()),
-        colors=np.array([material.color for material in materials.values()], np.float64).reshape(-1, 3),
-        uv=uv,
-        vertices=vertices,
-        corners=corners,
-        materials=used,
-    )
+    in_any_case = {name.casefold(): material for name, material in materials.items()}
+    usual = next(iter(materials.values())) if len(materials) == 1 else Material()
+    used = [materials.get(name) or in_any_case.get(name.casefold(), usual) for name in _group_names(lines)]
+    return TextureContents(mesh=mesh, materials=tuple(used), is_named=is_named)
 
 
-def _materials(text: TextIOWrapper, path: Path) -> dict[str, Material]:
-    """The materials of the files that `mtllib` names. The name of the only one is also ""."""
+def _materials(lines: ObjLines, path: Path, decided: Decided) -> dict[str, Material]:
+    """The materials of the files that `mtllib` names; {} where none of them has a picture."""
     found: dict[str, Material] = {}
-    text.seek(0)
-    for line in text.read(_HEAD).splitlines():
-        keyword, _, rest = line.strip().partition(" ")
-        if keyword != "mtllib":
-            continue
-        names = [rest.strip()] if (path.parent / rest.strip()).is_file() else rest.split()
-        for name in names:
-            with suppress(InputError, OSError, ValueError):
-                found |= read_materials(path.parent / name)
-    if len(found) == 1:
-        found[""] = next(iter(found.values()))
-    return found
+    for line in lines.others(b"mtllib"):
+        for name in _file_names(line[len("mtllib") :].strip(), path.parent):
+            try:
+                found |= read_materials(file_beside(path.parent, name))
+            except (InputError, OSError, ValueError):
+                decided.report("assumed", "Scan4D cannot read the file of materials that the OBJ file names")
+    return found if any(material.image for material in found.values()) else {}
 
 
-_Row = tuple[list[str], str, int, int]  # corners as written, the material, vertices and uv so far
+def _file_names(text: str, folder: Path) -> list[str]:
+    """The names behind `mtllib`: one that may contain blanks, or several."""
+    return [text] if file_beside(folder, text).is_file() else text.split()
 
 
-def _textured_polygons(text: TextIOWrapper) -> Iterator[_Row]:
-    vertices = positions = 0
-    material = ""
-    text.seek(0)
-    for line in _unindented(text):
-        if line.startswith(("v ", "v\t")):
-            vertices += 1
-        elif line.startswith(("vt ", "vt\t")):
-            positions += 1
-        elif line.startswith("usemtl"):
-            material = line[len("usemtl") :].strip()
-        elif line.startswith(("f ", "f\t")):
-            yield line.split()[1:], material, vertices, positions
-
-
-def _textured(rows: list[_Row], number_of: dict[str, int]) -> NDArray[np.int64]:
-    """Vertex, row of uv and material of each corner, (C, 3); -1 where there is none."""
-    words = [word for corners, *_ in rows for word in corners]
-    sizes = [len(corners) for corners, *_ in rows]
-    found = np.zeros((len(words), 3), np.int64)
-    counts = {word.count("/") for word in words}
-    if len(counts) == 1 and counts <= {1, 2} and not any("//" in word for word in words):
-        stated, _ = whole_numbers([" ".join(words).replace("/", " ").split()])
-        found[:, :2] = stated.reshape(len(words), -1)[:, :2]
-    else:
-        split = [word.split("/", 2) for word in words]
-        found[:, 0] = [int(parts[0]) for parts in split]
-        found[:, 1] = [int(parts[1]) if len(parts) > 1 and parts[1] else 0 for parts in split]
-    found[:, 2] = np.repeat([number_of.get(material, -1) for _, material, _, _ in rows], sizes)
-    so_far = np.repeat([(vertices, positions) for *_, vertices, positions in rows], sizes, axis=0)
-    stated = found[:, :2]
-    found[:, :2] = np.where(stated < 0, stated + so_far, stated - 1)
-    return found
-
-
-def _unindented(text: TextIOWrapper) -> Iterator[str]:
-    """The lines from where the text stands, without blanks in front."""
-    return (line.lstrip() if line[:1] in _BLANKS else line for line in bounded_lines(text))
-
-
-def _lines(text: TextIOWrapper, keyword: str) -> Iterator[str]:
-    """The rest of every line that starts with the keyword; from the beginning of the file."""
-    starts = (keyword + " ", keyword + "\t")
-    text.seek(0)
-    for line in bounded_lines(text):
-        if line.startswith(starts):
-            yield line[len(keyword) :]
-        elif line[:1] in _BLANKS and (inner := line.lstrip()).startswith(starts):
-            yield inner[len(keyword) :]
-
-
-def _corners(text: TextIOWrapper) -> Iterator[str]:
-    """The face corners that name a normal: `vertex/[texture]/normal`."""
-    for line in _lines(text, "f"):
-        yield from (corner for corner in line.split() if corner.count("/") == 2)
+def _picture_of_name(lines: ObjLines, path: Path) -> Path | None:
+    """The picture beside a file with positions in a texture that has its name; None where there is none."""
+    if not lines.count(Keyword.UV):
+        return None
+    beside = (file_beside(path.parent, path.stem + suffix) for suffix in _PICTURES)
+    return next((file for file in beside if file.is_file()), None)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..admission import admit
 from ..colors import rgba8
-from ..contents import Deferred, PointContents
+from ..contents import Column, Deferred, PointContents
 from ..points import PointCloud, choose_origin, retained_rows
 from . import axes, colors, missing, splats, unit
 from .normals import with_usable_normals
@@ -121,11 +121,21 @@ def _splats(columns: dict[str, NDArray], points: NDArray, decided: Decided) -> d
     }
 
 
-def _complete(choices: Sequence[Sequence[str]], columns: Mapping[str, NDArray]) -> list[str]:
+def _complete(choices: Sequence[Sequence[str]], columns: Mapping[str, Column]) -> list[str]:
     """The columns of the first choice of names that is complete, in any case; none where none is."""
     names = {name.lower(): name for name in columns}
     complete = (choice for choice in choices if all(name in names for name in choice))
     return [names[name] for name in next(complete, ())]
+
+
+def color_columns(columns: Mapping[str, Column]) -> list[str]:
+    """The columns that hold colours; none where there are none."""
+    return _complete(_COLORS, columns)
+
+
+def normal_columns(columns: Mapping[str, Column]) -> list[str]:
+    """The columns that hold normals; none where there are none."""
+    return _complete(_NORMALS, columns)
 
 
 def _taken(columns: dict[str, NDArray], chosen: Sequence[str]) -> NDArray:

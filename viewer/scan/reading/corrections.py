@@ -13,6 +13,7 @@ from .record import ROLES, Decision, holds_name
 
 _LENS_COUNTS = (0, 4, 5, 8)  # of coefficients, see viewer/scan/lens.py
 _MOST_LINES = 1 << 16
+_MOST_POINTS = 100_000_000
 
 
 def _one_of(*words: str) -> Callable[[str], str]:
@@ -91,6 +92,20 @@ def _axes(text: str) -> str:
     return " ".join(words)
 
 
+def _texture(text: str) -> str:
+    kind, colon, rest = text.lower().partition(":")
+    if colon and kind == "dense":
+        return f"dense:{_positive_count(rest)}"
+    return _one_of("vertices", "dense", "none")(text)
+
+
+def _positive_count(text: str) -> int:
+    number = int(text)
+    if not 0 < number <= _MOST_POINTS:
+        raise ValueError
+    return number
+
+
 def _times(text: str) -> str:
     kind, colon, rest = text.partition(":")
     if colon and kind == "fps":
@@ -119,7 +134,7 @@ CORRECTED = {
     "colors": _words("the largest value 1, 255 or 65535, or none", "1", "255", "65535", "none"),
     "normals": _words("stored or none", "stored", "none"),
     "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number", ("none", "0,0,0")),
-    "texture": Key(_one_of("vertices", "dense", "none"), "vertices, dense or none", ("vertices", "none")),
+    "texture": Key(_texture, "vertices, dense, dense:500000 or none", ("vertices", "dense", "none")),
     "splats": _words("yes or no", "yes", "no"),
     "camera": Key(_camera, "fx,fy,cx,cy in pixels, then 4, 5 or 8 lens coefficients or none; or a file"),
     "depth-scale": Key(_positive, "a number of steps in one unit, above 0"),
@@ -141,13 +156,13 @@ CORRECTED = {
 class Corrections(Mapping[str, Any]):
     """Corrections of a user: key -> parsed value.
 
-    columns:       tuple of roles        separator, encoding, colors, normals, texture, splats, axes,
-                   ground: str
+    columns:       tuple of roles        separator, encoding, colors, normals, splats, axes, ground: str
     decimal:       "." or ","            skip: int              depth-scale: float
     missing:       "none", a float, or (x, y, z)
     camera:        tuple (fx, fy, cx, cy, *lens), in pixels with the centre of the first one at (0, 0); or a
                    file's name
     depth-channel, unit, frames, take: str
+    texture:       "none", "vertices", "dense", or "dense:500000", with the largest number of points
     times:         "names", "index", "fps:50", "column:NAME", or a file's name
 
     texts: key -> the text that the user gave, as documents store it.

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterator
 from functools import cache
 from inspect import signature
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from numpy.typing import NDArray
 
@@ -16,6 +16,9 @@ from .record import Aside, Contradiction, Decision, Reading, Take
 ReportKind = Literal[
     "assumed", "unit", "times", "normals", "camera", "aside", "take", "contradiction", "correction",
 ]  # fmt: skip
+
+
+T = TypeVar("T")
 
 
 class Report(NamedTuple):
@@ -38,6 +41,8 @@ class _Made:
         self.takes: tuple[Take, ...] = ()
         self.contradictions: dict[tuple[int, str], Contradiction] = {}
         self.reports: dict[tuple[str, str], Report] = {}
+        self.frames = 1
+        self.shared: dict[object, tuple[object, Any]] = {}
 
 
 class Decided:
@@ -62,6 +67,32 @@ class Decided:
         other = Decided(self.corrections, self.other_colors)
         other.frame, other._made = frame, self._made
         return other
+
+    @property
+    def frames(self) -> int:
+        """How many frames the scan has, as far as its source says."""
+        return self._made.frames
+
+    @frames.setter
+    def frames(self, count: int) -> None:
+        self._made.frames = count
+
+    def shared(self, name: object, key: object, make: Callable[[], T]) -> T:
+        """What `make` returns for a frame; the same object for later frames as long as their key is equal.
+
+        name: of what is shared; one object of each name is held, and none where the scan has one frame.
+        """
+        if self.frames == 1:
+            return make()
+        with self._made.lock:
+            held = self._made.shared.get(name)
+        if held is not None and held[0] == key:
+            found: T = held[1]
+            return found
+        made = make()
+        with self._made.lock:
+            self._made.shared[name] = key, made
+        return made
 
     def settle(self, key: str, decide: Callable[[], Decision]) -> Decision:
         """The decision about a key for the whole scan. The first call makes it; `decide` may read frames."""
