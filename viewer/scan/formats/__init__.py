@@ -49,7 +49,7 @@ from ..reading.cloud import assemble, stored_colors
 from ..reading.hints import hint_for, hinted_suffix
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
-from ..reading.textures import Pictures, paint
+from ..reading.textures import PictureReaders, paint
 from ..times import frame_in_words
 from ._pictures import picture_file, texture_colors
 
@@ -165,7 +165,7 @@ def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Sc
 def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, decided: Decided) -> Scanned:
     """The points or views that a module's answer comes to."""
     if isinstance(found, PointContents):
-        paint(found, decided, Pictures(picture_file, texture_colors))
+        paint(found, decided, PictureReaders(picture_file, texture_colors))
         scanned: Scanned = assemble(found, decided)
     else:
         scanned = found

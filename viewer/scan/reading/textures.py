@@ -55,7 +55,7 @@ class _Picture(Protocol):
     def changed(self) -> tuple[int, int]: ...
 
 
-class Pictures(NamedTuple):
+class PictureReaders(NamedTuple):
     """Readers of pictures. Both raise InputError.
 
     look: reads the size of a picture. colors: reads (H, W, 3) sRGB bytes, or (H, W, 4) with alpha, in a part
@@ -81,7 +81,7 @@ class _Plan:
     reductions: tuple[int, ...]
 
 
-def paint(contents: PointContents, decided: Decided, pictures: Pictures) -> None:
+def paint(contents: PointContents, decided: Decided, pictures: PictureReaders) -> None:
     """Give the points the colours of their texture, as columns, and add points between them where decided.
 
     A picture that is missing or damaged is reported, and its material's colour stands in for it.
@@ -170,7 +170,7 @@ def _differ(contents: PointContents) -> bool:
     return any(len(column) and bool((column != column[0]).any()) for column in colors)
 
 
-def _looked_at(image: Path | None, pictures: Pictures, decided: Decided) -> _Picture | None:
+def _looked_at(image: Path | None, pictures: PictureReaders, decided: Decided) -> _Picture | None:
     if image is None:
         return None
     try:
@@ -237,7 +237,7 @@ class _Frame:
     count: int
     found: Sequence[_Picture | None]
     texels: NDArray[np.float64]
-    pictures: Pictures
+    pictures: PictureReaders
     decided: Decided
     _plans: dict[int, _Plan] = field(default_factory=dict)
 
