@@ -28,7 +28,7 @@ _SLASHES_AS_BLANKS = bytes.maketrans(b"/", b" ")
 
 
 class Keyword(IntEnum):
-    """What a line is."""
+    """The keyword of a line."""
 
     OTHER = 0
     VERTEX = 1  # v
@@ -148,7 +148,7 @@ class ObjLines:
         return parse_numbers(self.texts(keyword), columns, self.dialect) if found is None else found
 
     def _compiled_table(self, keyword: Keyword, columns: Sequence[int] | None) -> NDArray[np.float64] | None:
-        """The same where all rows are plain numbers; None where one is odd."""
+        """The numbers as `table`, if all rows are plain; None if one is odd."""
         from ._obj_kernels import parse_rows
 
         lines = self._lines[keyword]
@@ -203,7 +203,7 @@ def _with_whole_lines(data: bytes) -> bytes:
 
 
 def _lines_in(data: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Where lines begin, and where their line feeds are."""
+    """The first byte of each line, and its line feed."""
     values = np.frombuffer(data, np.uint8)
     ends = np.concatenate(
         [
@@ -252,7 +252,7 @@ def _corners_of(text: bytes) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def _stated_in_all(corners: NDArray[np.intp], slashes: NDArray[np.intp]) -> list[int] | None:
-    """Which of vertex, position and normal every corner states; None where they differ.
+    """The columns of vertex, position and normal that every corner states; None if corners differ.
 
     corners: where the words begin. slashes: where these are.
     """

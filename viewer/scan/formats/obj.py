@@ -160,7 +160,7 @@ def _bad_width(width: int) -> str:
 
 @dataclass(frozen=True, eq=False)
 class _NormalCorners:
-    """Which normals the vertices have. vertices, normals: (C,), a pair for each corner with a normal.
+    """The normals of the vertices. vertices, normals: (C,), a pair for each corner with a normal.
     is_in_order: whether row k of the normals is that of vertex k."""
 
     vertices: NDArray[np.int64]
@@ -226,7 +226,7 @@ def _group_names(lines: ObjLines) -> list[str]:
 
 
 def _groups(lines: ObjLines) -> NDArray[np.int64]:
-    """Which of `_group_names` counts above all lines with `usemtl`, and behind each, (M + 1,)."""
+    """The rows of `_group_names` that count above all lines with `usemtl`, and behind each, (M + 1,)."""
     number_of = {name: number for number, name in enumerate(_group_names(lines))}
     return np.array([0, *(number_of[text.strip()] for text in lines.texts(Keyword.MATERIAL))], np.int64)
 

@@ -78,7 +78,7 @@ class Decided:
         self._made.frames = count
 
     def shared(self, name: object, key: object, make: Callable[[], T]) -> T:
-        """What `make` returns for a frame; the same object for later frames as long as their key is equal.
+        """Return the result of `make`, and the same object for later frames as long as their key is equal.
 
         name: of what is shared; one object of each name is held, and none where the scan has one frame.
         """

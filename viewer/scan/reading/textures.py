@@ -68,7 +68,7 @@ class PictureReaders(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Plan:
-    """What frames with the same faces and pictures of the same sizes share.
+    """Positions and pixels that frames with the same faces share.
 
     at_vertices: where vertices are sampled. between: the points that are added, perhaps none.
     sample_ends, point_ends: (G,), behind the last of both of each material. reductions: (G,), of its picture.
@@ -136,7 +136,7 @@ def _decide(contents: PointContents, frame: _Frame) -> Decision:
 
 
 def _without_pictures(texture: TextureContents) -> Decision:
-    """What becomes of the colours of a frame of which no picture can be read."""
+    """Decide about the colours of a frame of which no picture can be read."""
     why = "Scan4D cannot read its pictures"
     if len({material.color for material in texture.materials if material.color is not None}) < 2:
         return Decision(KEY, NONE, "assumed", _names(texture), why)
@@ -219,7 +219,7 @@ def _placed(uv: NDArray, groups: NDArray[np.int64], materials: Sequence[Material
 
 
 def _reduction(apart: float, pixels: float) -> int:
-    """In which part of its width and height a picture is read, for points that lie so many texels apart."""
+    """The part of its width and height in which a picture is read, for points so many texels apart."""
     usable = (
         part for part in _REDUCTIONS if _SLACK * part <= apart and pixels >= _LEAST_PIXELS * part * part
     )
@@ -247,7 +247,7 @@ class _Frame:
         return texels_covered(self.texture.mesh, self.count, _scaled(self.texels, self.texture.materials))
 
     def plan(self, most: int) -> _Plan:
-        """Where the pictures are sampled. most: points that may be added."""
+        """The positions at which the pictures are sampled. most: points that may be added."""
         if most not in self._plans:
             placed = [(material.scale, material.offset) for material in self.texture.materials]
             key = self.texture.mesh, self.count, self.texels.tolist(), placed, most
