@@ -318,6 +318,12 @@ def test_headers_of_very_many_or_long_names(path: Path) -> None:
     [
         ("bool", "u1", 1),
         ("uint64", "u8", 1 << 52),
+        ("size_t", "u8", 1 << 52),
+        ("int32_t", "i4", -7),
+        ("ubyte", "u1", 200),
+        ("byte", "i1", -7),
+        ("single", "f4", 1.5),
+        ("boolean", "u1", 1),
         ("int64", "i8", -(1 << 52)),
         ("long", "i8", -5),
         ("ulong", "u8", 5),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from viewer.scan.reading.corrections import Corrections
-from viewer.scan.reading.normals import decide, usable_normals
+from viewer.scan.reading.normals import decide, fill_from_neighbours, usable_normals
 
 RNG = np.random.default_rng(3)
 
@@ -30,6 +30,34 @@ def test_some_bad_normals_become_zero_and_the_others_stay() -> None:
     assert decide(found).value == "partly"
     assert not found.normals[bad].any()
     np.testing.assert_array_equal(np.delete(found.normals, bad, axis=0), np.delete(normals, bad, axis=0))
+
+
+def test_missing_normals_follow_the_points_around() -> None:
+    sphere = RNG.normal(size=(5000, 3)).astype(np.float32)
+    sphere /= np.linalg.norm(sphere, axis=1, keepdims=True)
+    for sign in (1, -1):
+        normals = 3 * sign * sphere
+        normals[::7] = 0
+        fill_from_neighbours(normals, sphere)
+        found = normals[::7]
+        np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-5)
+        assert (np.einsum("ij,ij->i", found, sign * sphere[::7]) > 0.98).all()
+        np.testing.assert_array_equal(normals[1::7], 3 * sign * sphere[1::7])
+
+
+@pytest.mark.parametrize("count", [2, 3, 20])
+def test_missing_normals_of_points_in_a_line_are_those_beside(count: int) -> None:
+    line = np.stack([np.arange(count), 0 * np.arange(count), 0 * np.arange(count)], axis=1).astype(np.float32)
+    normals = np.tile(np.array([0, 0, 1], np.float32), (count, 1))
+    normals[1] = 0
+    fill_from_neighbours(normals, line)
+    np.testing.assert_allclose(normals[1], (0, 0, 1), atol=1e-6)
+
+
+def test_the_user_retains_normals_as_they_are() -> None:
+    normals = np.array([[0, 0, 1], [0, 0, 0]], np.float32)
+    decision = decide(usable_normals(normals), Corrections.parse({"normals": "stored"}))
+    assert (decision.value, decision.source) == ("stored", "user")
 
 
 @pytest.mark.parametrize("length", [1e-30, 1e-12, 3, 1e30])

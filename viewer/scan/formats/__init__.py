@@ -9,6 +9,7 @@ A format module declares
   `read_times(path)` (seconds, (T,) float64, or None);
 - where it holds faces: `read_faces(path, frame=0) -> Iterator[Faces]`, in pieces, none where there are none;
 - where it has no `contents`: `read_colors(path, frame) -> NDArray`, colours as stored, or None;
+- where columns of frames or times may tell moments: `column_names(path) -> Sequence[str]`, from the header;
 - where frames refer to others: `Frames(path)`, whose `read(frame)` remembers what the next one needs;
 - where it states the unit of length: `read_unit(path) -> str`, from the header alone;
 - where it can be written: `write(path, cloud)`, which may return a remark for the user, or
@@ -51,9 +52,11 @@ from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
 from ..reading.textures import PictureReaders, paint
 from ..times import frame_in_words
+from ._moments import MomentsOfCloud, may_hold_moments, moments_of_cloud
 from ._pictures import picture_file, texture_colors
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
+_MOMENTS = "moments"  # of a path, as the decisions remember them
 _LONGEST_MESSAGE = 400  # characters
 
 
@@ -98,9 +101,10 @@ def frame_count(path: Path | str, decided: Decided | None = None) -> int:
     path = Path(path)
     module = _readable(path)
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        if not hasattr(module, "frame_count"):
-            return 1
-        return ask(module.frame_count, path, decided=decided or Decided())
+        decided = decided or Decided()
+        count = ask(module.frame_count, path, decided=decided) if hasattr(module, "frame_count") else 1
+        moments = _moments(module, path, decided) if count == 1 else None
+        return count if moments is None else len(moments)
 
 
 def read_times(path: Path | str, decided: Decided | None = None) -> NDArray[np.float64] | None:
@@ -108,9 +112,10 @@ def read_times(path: Path | str, decided: Decided | None = None) -> NDArray[np.f
     path = Path(path)
     module = _readable(path)
     with one_message(path, f"cannot be read as {module.TITLE}"):
-        if not hasattr(module, "read_times"):
-            return None
-        return ask(module.read_times, path, decided=decided or Decided())
+        decided = decided or Decided()
+        stated = ask(module.read_times, path, decided=decided) if hasattr(module, "read_times") else None
+        moments = _moments(module, path, decided) if stated is None else None
+        return stated if moments is None else moments.times
 
 
 def read_unit(path: Path | str, decided: Decided | None = None) -> str | None:
@@ -158,8 +163,28 @@ def read_colors(path: Path | str, frame: int, decided: Decided) -> NDArray | Non
 
 def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scanned:
     """Read one moment by a module, with the decisions that every format shares."""
+    moments: MomentsOfCloud | None = decided.remember((_MOMENTS, path), lambda: None)  # by `frame_count`
+    return _whole(module, path, frame, decided) if moments is None else moments.at(frame)
+
+
+def _whole(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scanned:
+    """Read one moment as a module has it."""
     hook = module.contents if hasattr(module, "contents") else module.read
     return _finished(module, path, ask(hook, path, frame, decided=decided), decided)
+
+
+def _moments(module: ModuleType, path: Path, decided: Decided) -> MomentsOfCloud | None:
+    """The moments that columns of a file of one moment tell; None where they tell none. Raises InputError."""
+    if not hasattr(module, "column_names"):
+        return None
+
+    def find() -> MomentsOfCloud | None:
+        if not may_hold_moments(ask(module.column_names, path, decided=decided), decided):
+            return None
+        cloud = _whole(module, path, 0, decided)
+        return moments_of_cloud(cloud, decided) if isinstance(cloud, PointCloud) else None
+
+    return decided.remember((_MOMENTS, path), find)
 
 
 def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, decided: Decided) -> Scanned:

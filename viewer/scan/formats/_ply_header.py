@@ -24,6 +24,12 @@ TYPES = {
     "bool": "u1", "int64": "i8", "uint64": "u8", "long": "i8", "ulong": "u8", "longlong": "i8",
     "ulonglong": "u8", "half": "f2", "float16": "f2",
 }  # fmt: skip
+_KNOWN = list(TYPES)  # that a message names
+TYPES |= {
+    "boolean": "u1", "byte": "i1", "ubyte": "u1", "single": "f4", "unsigned": "u4", "size_t": "u8",
+    "int8_t": "i1", "int16_t": "i2", "int32_t": "i4", "int64_t": "i8",
+    "uint8_t": "u1", "uint16_t": "u2", "uint32_t": "u4", "uint64_t": "u8",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class Property:
     def __post_init__(self) -> None:
         for name in (self.type, self.length_type or self.type):
             if name not in TYPES:
-                raise unknown_name("PLY property type", name[:_LONGEST_WORD], list(TYPES))
+                raise unknown_name("PLY property type", name[:_LONGEST_WORD], _KNOWN)
         if TYPES[self.length_type or "int"][0] == "f":
             raise InputError(
                 f"the list '{self.name[:_LONGEST_WORD]}' has a length of type {self.length_type}"

@@ -28,6 +28,12 @@ def frame_count(path: Path, decided: Decided) -> int:
         return point_array(array, array.first, decided).frames
 
 
+def column_names(path: Path) -> list[str]:
+    """The names of the fields of a point, none where it has none."""
+    with opened(path) as stream:
+        return [*(StoredArray.open("positions", stream, size_of(stream)).dtype.names or ())]
+
+
 def read(path: Path, frame: int, decided: Decided) -> PointCloud:
     """One frame of the points; the other frames are not read. Raises InputError."""
     with opened(path) as stream:

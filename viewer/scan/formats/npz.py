@@ -91,6 +91,18 @@ def read_unit(path: Path, decided: Decided) -> str | None:
         return unit_of_arrays(found, size_of(stream), decided) if (found := _images(arrays)) else None
 
 
+def column_names(path: Path, decided: Decided) -> list[str]:
+    """The names of the numbers that each of a list of points has. Raises InputError."""
+    with opened(path) as stream, _arrays(stream, decided) as arrays:
+        if _images(arrays) is not None or "positions" not in arrays:
+            return []
+        positions = arrays["positions"]
+        if positions.dtype.names is not None:
+            return [*positions.dtype.names]
+        each = [name for name, array in arrays.items() if array.shape == positions.shape[:1]]
+        return each if len(positions.shape) == 2 else []
+
+
 def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
     """Seconds of the frames, (T,) float64, of an array of times, a rate or a step; or None."""
     with opened(path) as stream, _arrays(stream, decided) as arrays:

@@ -114,6 +114,12 @@ def contents(path: Path, frame: int, decided: Decided) -> PointContents | tuple[
         return PointContents(columns=columns, held=held, stated=stated, remarks=header.remarks)
 
 
+def column_names(path: Path) -> list[str]:
+    """The names of the fields of a point. Raises InputError."""
+    with opened(path) as stream:
+        return [name for field in _read_header(stream.read(_HEADER_LIMIT)).fields for name in field.columns]
+
+
 def _camera_view(columns: Columns, shape: tuple[int, int], viewpoint: list[str]) -> RangeView | None:
     """The range view of an organised cloud, or None where it is no camera's."""
     named = {name.lower(): column for name, column in columns.items()}

@@ -92,6 +92,13 @@ def contents(path: Path, frame: int = 0) -> PointContents:
         )
 
 
+def column_names(path: Path) -> list[str]:
+    """The names of the properties of a vertex. Raises InputError."""
+    with opened(path) as stream:
+        header = parse_header(stream.read(LONGEST_HEADER))
+    return [p.name for element in header.elements if element.name == "vertex" for p in element.numbers]
+
+
 def _as_stored(vertex: Element, held: int) -> Element:
     """The vertices without normals, where a file of vertices alone holds exactly that many bytes: exporters
     that forget the word `property` also declare normals that they do not store."""

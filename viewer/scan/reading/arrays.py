@@ -39,9 +39,14 @@ POINT_ARRAYS = (  # what programs call the array of points; the first that is th
 )  # fmt: skip
 _PICTURES = ("world_points", "pts3d", "point_map", "point_maps", "points3d", "pointmap", "pointmaps")
 _CONFIDENCES = ("conf", "confidence")  # names that end so belong to pictures
-_RATES = ("fps", "rate", "framerate", "frame_rate", "mocap_framerate", "mocap_frame_rate", "frequency")
-_TIMES = ("times", "timestamps", "timestamp", "time")
-_STEPS = ("dt", "frame_time", "timestep")
+_RATES = (
+    "fps", "rate", "framerate", "frame_rate", "mocap_framerate", "mocap_frame_rate", "frequency", "freq",
+    "hz", "fs", "sampling_rate", "sample_rate", "sampling_frequency", "capture_rate",
+    "video_fps", "frames_per_second",
+)  # fmt: skip
+_TIMES = ("times", "timestamps", "timestamp", "time", "t", "time_stamps", "frame_times")
+_STEPS = ("dt", "frame_time", "timestep", "time_step")
+_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}  # at the end of the name of times
 _LEAST_ROWS, _LEAST_COLUMNS = 8, 16  # of a picture
 _MOST_PIXELS = 1 << 23  # no camera has more, and a longer sequence need not be looked at
 _FIRST_ROWS = 1  # that are looked at first: they tell most sequences
@@ -238,12 +243,13 @@ def stated_times(arrays: Mapping[str, ArrayInFile], frames: int) -> tuple[NDArra
     nanoseconds become seconds from the first one on. Raises InputError where `times` is unusable.
     """
     by_name = {name.lower(): name for name in arrays}
-    for name in _TIMES:
-        if (
-            name in by_name
-            and (times := _times_of(arrays[by_name[name]], frames, name == "times")) is not None
-        ):
-            return times, by_name[name]
+    for name in by_name:
+        base, _, unit = name.rpartition("_")
+        if name in _TIMES or (base in _TIMES and unit in _UNITS):
+            per_second = None if name in _TIMES else _UNITS[unit]
+            times = _times_of(arrays[by_name[name]], frames, name == "times", per_second)
+            if times is not None:
+                return times, by_name[name]
     for name in (*_RATES, *_STEPS):
         if name in by_name and (number := _single(arrays[by_name[name]])) is not None and number > 0:
             step = number if name in _STEPS else 1 / number
@@ -251,15 +257,28 @@ def stated_times(arrays: Mapping[str, ArrayInFile], frames: int) -> tuple[NDArra
     return None
 
 
-def _times_of(array: ArrayInFile, frames: int, must: bool) -> NDArray[np.float64] | None:
-    fits = array.shape == (frames,) and array.dtype.kind in "fiu"
-    if not (fits and np.isfinite(values := array.read()).all()):
+def _times_of(
+    array: ArrayInFile, frames: int, must: bool, per_second: float | None
+) -> NDArray[np.float64] | None:
+    """Seconds of an array of times; None where it holds something else. per_second: as stated."""
+    values = (
+        array.read().reshape(-1) if math.prod(array.shape) == frames and array.dtype.kind in "fiuM" else None
+    )
+    if values is not None and values.dtype.kind == "M":
+        values, per_second = values.astype("M8[ns]").astype(np.int64), 1e9
+    if values is None or not np.isfinite(values).all():
         if must:
             raise InputError(f"array '{array.name}' is not {frames} finite numbers")
         return None
     if must:
         return values.astype(np.float64)
-    return seconds_of_stamps(values)
+    if (np.diff(values) <= 0).any():
+        return None
+    return (
+        seconds_of_stamps(values)
+        if per_second is None
+        else (values - values[0]).astype(np.float64) / per_second
+    )
 
 
 def seconds_of_stamps(stamps: NDArray) -> NDArray[np.float64]:
@@ -272,7 +291,10 @@ def seconds_of_stamps(stamps: NDArray) -> NDArray[np.float64]:
 
 
 def _single(array: ArrayInFile) -> float | None:
-    if math.prod(array.shape) != 1 or array.dtype.kind not in "fiu":
+    if not 0 < math.prod(array.shape) <= MOST_FRAMES or array.dtype.kind not in "fiuUS":
         return None
-    number = float(array.read().ravel()[0])
-    return number if math.isfinite(number) else None
+    try:
+        numbers = array.read().ravel().astype(np.float64)
+    except ValueError:
+        return None
+    return float(numbers[0]) if np.isfinite(numbers).all() and (numbers == numbers[0]).all() else None

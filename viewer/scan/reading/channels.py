@@ -16,10 +16,10 @@ from .record import Decision
 KEY = "depth-channel"
 EXPECTED = "Depth is expected in a channel called Z, depth or Depth.V, or in the only channel, Y or R"
 
-_NAMES = ("depth", "d")  # of a channel, in lower case, beside Z
+_NAMES = ("depth", "d", "zdepth", "distance", "depth_z")  # of a channel, in lower case, beside Z
 _LAYERS = ("depth", "zdepth", "z")  # of a layer whose only number a pixel is depth, in lower case
 _VALUES = ("v", "y", "z", "d", "r")  # what that number is called, in lower case
-_ALONE = ("y", "r", "v", "l")  # what the only channel of depth is called, in lower case
+_ALONE = ("y", "r", "v", "l", "z")  # what the only channel of depth is called, in lower case
 _WITHOUT_DEPTH = ("a", "alpha", "mask")  # beside a channel that counts as the only one, in lower case
 
 
