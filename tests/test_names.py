@@ -18,8 +18,8 @@ BY_PROTOCOL = {"Frames", "Params", "Tool", "Settings"}  # each backend, and each
 
 # Functions that modules of a kind have under one name, or that do the work of one of that name.
 FUNCTIONS_BY_PROTOCOL = {
-    "add_arguments", "column_names", "find", "run", "draw", "check", "contents", "frame_count", "read", "read_faces",
-    "read_colors", "read_times", "read_unit", "write", "write_poses", "render",
+    "add_arguments", "column_names", "find", "run", "draw", "check", "contents", "frame_count", "read",
+    "read_faces", "read_colors", "read_times", "read_unit", "write", "write_poses", "render",
     "lacks", "owns", "decide",
 }  # fmt: skip
 
