@@ -56,7 +56,7 @@ from ._moments import MomentsOfCloud, may_hold_moments, moments_of_cloud
 from ._pictures import picture_file, texture_colors
 
 NOTES = {".txt", ".csv", ".tif", ".tiff"}  # beside frames of another kind these are notes, not frames
-_MOMENTS = "moments"  # of a path, as the decisions remember them
+_MOMENTS = "moments"  # of a path, as the decisions share them
 _LONGEST_MESSAGE = 400  # characters
 
 
@@ -163,7 +163,10 @@ def read_colors(path: Path | str, frame: int, decided: Decided) -> NDArray | Non
 
 def _scanned(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scanned:
     """Read one moment by a module, with the decisions that every format shares."""
-    moments: MomentsOfCloud | None = decided.remember((_MOMENTS, path), lambda: None)  # by `frame_count`
+    may_split = hasattr(module, "column_names")
+    if may_split and hasattr(module, "frame_count"):
+        may_split = ask(module.frame_count, path, decided=decided) == 1
+    moments = _moments(module, path, decided) if may_split else None
     return _whole(module, path, frame, decided) if moments is None else moments.at(frame)
 
 
@@ -184,7 +187,7 @@ def _moments(module: ModuleType, path: Path, decided: Decided) -> MomentsOfCloud
         cloud = _whole(module, path, 0, decided)
         return moments_of_cloud(cloud, decided) if isinstance(cloud, PointCloud) else None
 
-    return decided.remember((_MOMENTS, path), find)
+    return decided.shared(_MOMENTS, path, find)
 
 
 def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, decided: Decided) -> Scanned:

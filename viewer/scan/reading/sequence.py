@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Aside, Contradiction, Decision, Reading, Take
 
-T = TypeVar("T")
-
 ReportKind = Literal[
     "assumed", "unit", "times", "normals", "camera", "aside", "take", "contradiction", "correction",
 ]  # fmt: skip
@@ -38,7 +36,6 @@ class _Made:
         self.lock = threading.RLock()
         self.decisions: dict[str, Decision] = {}
         self.settled: dict[str, Decision] = {}
-        self.facts: dict[object, Any] = {}
         self.aside: dict[Aside, None] = {}
         self.unused: dict[str, None] = {}
         self.takes: tuple[Take, ...] = ()
@@ -103,14 +100,6 @@ class Decided:
             if key not in self._made.settled:
                 self._made.settled[key] = self._made.decisions[key] = decide()
             return self._made.settled[key]
-
-    def remember(self, key: object, make: Callable[[], T]) -> T:
-        """Make a fact about the files of the scan once, for all who ask by this key."""
-        with self._made.lock:
-            if key not in self._made.facts:
-                self._made.facts[key] = make()
-            fact: T = self._made.facts[key]
-            return fact
 
     def note(self, *decisions: Decision) -> None:
         """Put decisions into the record where it has none about their keys yet."""
