@@ -32,13 +32,17 @@ def write_frame(path: Path, points: np.ndarray) -> None:
             np.savez(path, positions=points)
         case ".obj":
             path.write_text("# a mesh\n" + "".join(f"v {row}\n" for row in rows.splitlines()))
+        case ".xyz":
+            path.write_text(f"# a cloud\n{rows}")
+        case ".csv":
+            path.write_text("x,y,z\n" + rows.replace(" ", ","))
         case ".pcd":
             path.write_text(PCD.format(len(points)) + rows)
         case _:
             path.write_text(PLY.format(len(points)) + rows)
 
 
-@pytest.fixture(params=[".ply", ".pcd", ".npy", ".npz", ".obj"])
+@pytest.fixture(params=[".ply", ".pcd", ".npy", ".npz", ".obj", ".xyz", ".csv"])
 def scan(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """Four frames, of which the first and the third are empty."""
     points = np.random.default_rng(0).normal(size=(400, 3))
@@ -62,6 +66,14 @@ def test_a_timeline_tells_empty_frames_from_broken_ones(scan: Path) -> None:
         assert [timeline.drawn(index).count for index in range(4)] == [0, 400, 0, 400]
         assert timeline.drawn(2).time == timeline.times[2]
         assert {one.kind for one in timeline.messages} == {"empty"}
+
+
+def test_a_picture_of_one_empty_frame_shows_the_background(scan: Path, run: Run, tmp_path: Path) -> None:
+    for more in ((), ("--no-gl",)):
+        done = run("render", scan, "--pose", 2, *SMALL[:2], *more, "-o", tmp_path / "p.png", "--force")
+        assert done.code == 0, done.err
+        assert "empty picture for frame 3" in done.err
+        assert len(np.unique(picture(tmp_path / "p.png").reshape(-1, 4)[:, :3], axis=0)) == 1
 
 
 def test_films_and_pictures_show_the_background(scan: Path, run: Run, tmp_path: Path) -> None:

@@ -88,9 +88,9 @@ def read_poses(timeline: Timeline, indices: Sequence[int], with_empty: bool = Fa
     """The poses of these indices, the next one being read while one is in use.
 
     Where several are asked for, broken ones are reported and left out, and empty ones too. with_empty: empty
-    ones come as poses without points. Raises InputError where no pose with points is left.
+    ones come as poses without points. Raises InputError where no pose is left, or several without points.
     """
-    read = timeline.drawn if with_empty and len(indices) > 1 else timeline.pose
+    read = timeline.drawn if with_empty else timeline.pose
     said, found = 0, False
     for number, index in enumerate(indices):
         try:
@@ -104,7 +104,7 @@ def read_poses(timeline: Timeline, indices: Sequence[int], with_empty: bool = Fa
         if number + 1 < len(indices):
             timeline.request(indices[number + 1])
         yield pose
-    if not found:
+    if not found and len(indices) > 1:
         raise InputError(f"none of its {len(indices)} frames can be read", timeline.name)
 
 
@@ -143,7 +143,7 @@ def first_readable(timeline: Timeline, indices: Sequence[int]) -> Pose:
     """The first of these poses that is not broken; no later one is read.
 
     Of many poses, `_TRIED` are tried: half of them in order, half spread over the rest. Raises InputError
-    where none of them can be read.
+    where none of them can be read. Where all of them are empty, those of the whole scan are tried.
     """
     tried, half = list(indices), _TRIED // 2
     if len(tried) > _TRIED:
@@ -151,6 +151,8 @@ def first_readable(timeline: Timeline, indices: Sequence[int]) -> Pose:
     for index in tried:
         with suppress(InputError):
             return timeline.pose(index)
+    if timeline.empty.issuperset(indices) and len(indices) < len(timeline):
+        return first_readable(timeline, range(len(timeline)))
     error = timeline.broken[tried[0]]
     if len(indices) == 1:
         raise error

@@ -242,7 +242,7 @@ def _requests(
         first = pose if pose.count or chosen else first_readable(timeline, indices)
         camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, first)
         if chosen is None and goal is not None:
-            shown = next(shot for shot in shots if shot.pose == first.index)
+            shown = next((shot for shot in shots if shot.pose == first.index), shots[0])
             choice = choice_of(first, camera_of(shown), size, goal, timeline.unit, args.device)
             chosen = choice.configuration.backend, choice.configuration.params
         chosen = chosen or backend_for(first, backend, values)

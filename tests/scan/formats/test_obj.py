@@ -175,6 +175,13 @@ def test_opacity_behind_the_colours_is_no_weight_before_them(path: Path) -> None
     assert read(path).colors[:, :3].tolist() == [[255, 0, 0], [0, 255, 0]]
 
 
+def test_other_numbers_of_vertices_are_in_the_record(path: Path) -> None:
+    path.write_text("v 1 2 3 4 5\nv 4 5 6 7 8\n")
+    with open_scan(path) as timeline:
+        assert timeline.pose(0).cloud.colors is None
+        assert timeline.reading.unused == ("numbers 4 to 5 of each vertex",)
+
+
 def test_the_decimal_mark_is_in_the_record(path: Path) -> None:
     for text, mark in (("v 1,5 2,5 3\nv 4 5 6\n", ","), ("v 1.5 2.5 3\nv 4 5 6\n", ".")):
         path.write_text(text)

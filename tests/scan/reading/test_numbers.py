@@ -182,6 +182,13 @@ def test_rows_that_look_like_comments(line: str) -> None:
     assert not numbers.is_comment(line)
 
 
+def test_a_stated_decimal_point_makes_commas_marks_of_thousands() -> None:
+    lines = ["1,234 2,345 -3,456\n", "4,567 5,678 6,789\n"]
+    assert not dialect_of(lines).is_certain
+    dialect = dialect_of(lines, decimal=".")
+    np.testing.assert_array_equal(parse_numbers(lines, None, dialect)[0], [1234, 2345, -3456])
+
+
 def test_bars_separate_values() -> None:
     assert numbers.dialect_of(["x|y|z\n", "1,5|2|3\n", "4|5|6\n"]) == Dialect("bar", ",")
 

@@ -33,6 +33,7 @@ def save(path: Path, text: str, encoding: str = "utf-8") -> Path:
         "//X Y Z\n3\n1 2 3\n4 5 6\n7 8 10\n",
         "640 480\n1 2 3\n4 5 6\n7 8 10\n",
         "1|2|3\n4|5|6\n7|8|10\n",
+        "1,2,3;\n4,5,6;\n7,8,10;\n",
         "[1, 2, 3]\n[4, 5, 6]\n[7, 8, 10]\n",
         "; made by hand\n1 2 3\n! good\n4 5 6\n/* end */\n7 8 10\n",
         "1 2 3\n4 5 6\n7 8 10\nEND\n",
@@ -78,6 +79,7 @@ def messages(file: Path) -> str:
         ("x y z\n1 2 3 255 0 0\n4 5 6 0 255 0\n", "3 names of columns, but the rows have 6 values"),
         ("x y z r g b\n1 2 3\n4 5 6\n", "6 names of columns, but the rows have 3 values"),
         ("1 2 3\n4 5 6 7\n", "3 to 4 values"),
+        ("0x10 2 3\n4 5 6\n7 8 9\n", "does not read line 1"),
         ("x,y,z\n1,2,3\n4,5,6\nTotal: 2 points\n", "1 lines of text below the rows"),
     ],
 )

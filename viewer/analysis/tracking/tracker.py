@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...errors import EmptyFrame, InputError
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
 from ...task import checkpoint
@@ -208,7 +208,9 @@ class Tracker:
                     key = self._moment(part.spot.frame)
                     part.topology = key.pose.overview.topology
             except InputError as error:
-                part.seen[frame] = Sighting.gap(f"{error.where or 'a frame'} cannot be read: {error.what}")
+                is_empty = isinstance(error, EmptyFrame)
+                what = "is empty" if is_empty else f"cannot be read: {error.what}"
+                part.seen[frame] = Sighting.gap(f"{error.where or 'a frame'} {what}")
                 continue
             if part.is_exact_in(topology):
                 part.seen[frame] = _exact(part.spot, moment.pose)

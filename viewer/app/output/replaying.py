@@ -149,7 +149,10 @@ class Replayer(WindowPart):
         if not self._is_read_as(replaying, entry):
             return True
         timeline = self.playback.timeline
-        if entry.pose in timeline.broken or entry.pose >= len(timeline):
+        if entry.pose in timeline.empty:
+            self._show(entry, timeline.drawn(entry.pose))
+            replaying.next, replaying.since = replaying.next + 1, None
+        elif entry.pose in timeline.broken or entry.pose >= len(timeline):
             self.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown: Scan4D skips it.")
             replaying.next += 1
         elif (pose := timeline.ready(entry.pose)) is None:

@@ -51,7 +51,7 @@ def contents(path: Path, frame: int = 0, decided: Decided | None = None) -> Poin
     with opened(path) as stream:
         lines = _lines(stream, decided.frames)
         lines.dialect = _dialect_of_vertices(lines, decided)
-        positions, colors = _vertices(lines)
+        positions, colors = _vertices(lines, decided)
         columns = dict(zip("xyz", positions.T, strict=True))
         materials = _materials(lines, path, decided)
         picture = None if materials else _picture_of_name(lines, path)
@@ -109,7 +109,9 @@ def _remarks(lines: ObjLines) -> Iterator[str]:
         yield line.lstrip("# ")
 
 
-def _vertices(lines: ObjLines) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _vertices(
+    lines: ObjLines, decided: Decided
+) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Positions and colours, (N, 3) each; None where no vertex has a colour. Those without one are white."""
     try:
         table = lines.table(Keyword.VERTEX)
@@ -118,6 +120,8 @@ def _vertices(lines: ObjLines) -> tuple[NDArray[np.float64], NDArray[np.float64]
     if table.shape[1] < 3:
         raise InputError(_bad_width(table.shape[1]))
     if (at := _COLORS_AT.get(table.shape[1])) is None:
+        if table.shape[1] > 4:
+            decided.note_unused(f"numbers 4 to {table.shape[1]} of each vertex")
         return table[:, :3], None
     if table.shape[1] == 7 and _is_opaque(table[:, 6]) and not _is_opaque(table[:, 3]):
         at = 3  # x y z r g b a

@@ -70,10 +70,10 @@ _FRAMES = {"frame", "frames", "frame_id", "frameid", "frame id", "frame_no", "fr
            "framenumber", "frame number", "frame_index", "frameindex", "frame index", "frame #",
            "frame_nr", "frame nr", "bild", "bild nr", "bildnr", "bildnummer", "trame"}  # fmt: skip
 _TIMES = {"time", "times", "t", "timestamp", "timestamps", "time_stamp", "seconds", "sec", "zeit", "temps",
-          "zeitstempel", "tiempo", "elapsed_time", "relative_time",
+          "zeitstempel", "tiempo", "elapsed_time", "relative_time", "sekunden", "secs",
           "time step", "timestep", "time_step"}  # fmt: skip
 _IDS = {"id", "ids", "point_id", "pointid", "point id", "vertex_id", "marker_id", "marker", "point_number",
-        "pointnumber", "point number", "point_index", "track_id"}  # fmt: skip
+        "pointnumber", "point number", "point_index", "track_id", "point", "punkt"}  # fmt: skip
 _LABELS = {"label", "name", "landmark", "marker", "description"}
 
 _IN_BRACKETS = re.compile(r"\s*[\[({<]\s*([^\])}>]*?)\s*[\])}>]$")
@@ -97,7 +97,7 @@ def plain_name(name: str) -> PlainName:
 
     The number of a component follows `_`, whatever a program writes: "points_0" for `Points:0`, `Points[0]`.
     """
-    text = name.strip().strip("\"'").lstrip("#/%!;*_' \t").strip()
+    text = name.strip().strip("\"'").lstrip("#/%!;*_' \t").rstrip("#.: ")
     text = unicodedata.normalize("NFKD", _CAPITAL.sub("_", text).casefold())
     text = "".join(letter for letter in text if not unicodedata.combining(letter))
     unit = None

@@ -7,7 +7,7 @@ import csv
 import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import chain, islice
 from typing import NamedTuple
 
@@ -151,12 +151,14 @@ class Dialect:
     decimal:     "." or ","
     needs_blank: whether a comma separates only where a blank follows, as in "1,25, 2,50"
     is_certain:  False where each comma could be a mark of thousands
+    groups:      whether each comma is a mark of thousands, as where the user states a decimal point
     """
 
     separator: str = "blank"
     decimal: str = "."
     needs_blank: bool = False
     is_certain: bool = True
+    groups: bool = False
 
     @property
     def delimiter(self) -> str | None:
@@ -198,6 +200,8 @@ def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
     line = with_plain_signs(line).strip(" \r\n" if dialect.separator == "tab" else None)
     if line[:1] in _OPENING and _IN_BRACKETS.match(line):
         line = line.strip("()[]{};, \t")
+    if dialect.separator == "comma":
+        line = line.rstrip("; ")
     if dialect.needs_blank:
         words = _BETWEEN.split(line)
     elif dialect.delimiter is None:
@@ -209,7 +213,10 @@ def split_line(line: str, dialect: Dialect = PLAIN) -> list[str]:
             words = line.split(dialect.delimiter)
     else:
         words = line.split(dialect.delimiter)
-    return [word.strip().strip("\"'").strip() for word in words]
+    words = [word.strip().strip("\"'").strip() for word in words]
+    if dialect.groups:
+        words = [word.replace(",", "") if _LIKE_THOUSANDS.fullmatch(word) else word for word in words]
+    return words
 
 
 def with_plain_signs(text: str) -> str:
@@ -254,6 +261,8 @@ def dialect_of(lines: Iterable[str], separator: str | None = None, decimal: str 
         if (one.separator == separator if separator else _occurs(one, text))
         and (one.decimal == decimal if decimal else one.decimal == "." or "," in text)
     ]
+    if decimal == ".":
+        candidates = [replace(one, groups=one.separator != "comma") for one in candidates]
     if _is_spaced(sample, separator, decimal):
         return _SPACED
     if separator is None and decimal == "," and not candidates:

@@ -205,6 +205,8 @@ class _Search:
             doubts = [doubt] if doubt else []
         elif names is None and (doubt := _uneven_rows(rows)):
             doubts = [doubt]
+        if names is None and (doubt := self._skipped(words)):
+            doubts.append(doubt)
         columns = self._columns(names, words, rows)
         instead = self.instead or cameras_in_words(rows) or (cameras_in_names(names) if names else None)
         other = next((kind for start, kind in _FIRST_WORDS.items() if self._begins_with(start)), None)
@@ -248,6 +250,17 @@ class _Search:
         width = width if names is None else len(names)
         known = [*words, *[""] * (width - len(words))][:width]
         return [at for at, word in enumerate(known) if self._is_number(word) or self._may_be(at, rows)]
+
+    def _skipped(self, words: Sequence[str]) -> str:
+        """A message where the last line above the first row may be a row that cannot be read."""
+        if self.unnamed is None or len(self.unnamed[2]) != len(words):
+            return ""
+        number, line, found = self.unnamed
+        if not any(map(self._is_number, found)):
+            return ""
+        return (
+            f"Scan4D does not read line {number}, which is above the first row: {shortened(line.strip())!r}"
+        )
 
     def _check_names(self, names: list[str] | None, words: Sequence[str]) -> None:
         """Raise InputError where the line above the first row names other things than points."""
