@@ -109,9 +109,7 @@ def _remarks(lines: ObjLines) -> Iterator[str]:
         yield line.lstrip("# ")
 
 
-def _vertices(
-    lines: ObjLines, decided: Decided
-) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
+def _vertices(lines: ObjLines, decided: Decided) -> tuple[NDArray[np.float64], NDArray[np.float64] | None]:
     """Positions and colours, (N, 3) each; None where no vertex has a colour. Those without one are white."""
     try:
         table = lines.table(Keyword.VERTEX)
