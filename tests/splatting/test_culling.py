@@ -7,6 +7,7 @@ import threading
 import time
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 from scenes import rarely
@@ -114,10 +115,11 @@ def test_chunks_are_told_apart_as_the_plain_version_does(renderer: Renderer, ord
     assert kinds == {(False, False), (True, False), (True, True)}
 
 
+@pytest.mark.parametrize(("seconds", "parts"), [(0.0, 1), (1e6, 2)], ids=["by time", "by number"])
 def test_the_drawing_thread_neither_orders_points_nor_tests_chunks(
-    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, seconds: float, parts: int
 ) -> None:
-    """It uploads a slice in each picture, and pictures are the same all the while."""
+    """A picture uploads few slices or has the GPU order few runs of points, and all pictures are the same."""
     threads, pictures = set(), []
     for owner, name in ((chunks, "best_order"), (chunks, "in_coarse_order")):
         function = getattr(owner, name)
@@ -125,26 +127,45 @@ def test_the_drawing_thread_neither_orders_points_nor_tests_chunks(
             owner, name, lambda cloud, do=function: (threads.add(threading.current_thread()), do(cloud))[1]
         )
     monkeypatch.setattr(View, "may_show", lambda *_: pytest.fail("chunks are tested on the CPU"))
-    monkeypatch.setattr(arrays, "_SLICE", 1 << 16)
-    monkeypatch.setattr(culling, "UPLOAD_SECONDS", 0.0)
+    slice_bytes, run = 1 << 14, 1 << 12
+    for owner, name, value in (
+        (arrays, "_SLICE", slice_bytes), (culling, "_SLICES", 2), (culling, "UPLOAD_SECONDS", seconds),
+        (culling, "_RUN", run), (culling, "_RUNS", 2),
+    ):  # fmt: skip
+        monkeypatch.setattr(owner, name, value)
     cloud = shells("chance")
     request = request_of(cloud, looking(cloud, 0), 1)
     surface, far = Surface(renderer.gpu, SIZE), looking(cloud, 70, 0.45)
-    written: list[int] = []
-    write = arrays.GpuArray.write
-    monkeypatch.setattr(
-        arrays.GpuArray, "write", lambda array, *end: (written.append(1), write(array, *end))[1]
-    )
+    work: list[int] = []
+    write, dispatch = arrays.GpuArray.write, renderer.gpu.dispatch
+
+    def counted_write(array: arrays.GpuArray, *limits: float) -> bool:
+        before = array.uploaded_bytes
+        is_complete = write(array, *limits)
+        work.append(array.uploaded_bytes - before)
+        return is_complete
+
+    def counted_dispatch(program: moderngl.ComputeShader, count: int) -> None:
+        dispatch(program, count)
+        if program is renderer.gpu.compute("chunks/reorder.comp"):
+            work.append(12 * count)
+
+    monkeypatch.setattr(arrays.GpuArray, "write", counted_write)
+    monkeypatch.setattr(renderer.gpu, "dispatch", counted_dispatch)
+    most = parts * max(slice_bytes, 12 * run)
+    ordered = 0
     end = time.monotonic() + 60
     while "chunks" not in surface.stats.counted and time.monotonic() < end:
-        written.clear()
+        work.clear()
         render_frame(renderer, replace(request, camera=far), surface)
         pictures.append(surface.row)
         if len(pictures) > 1:
-            assert len(written) <= 2, "of rows or positions, a slice"
+            ordered += sum(work)
+            assert sum(work) <= most + slice_bytes, "the last slice of rows, and the first runs"
         time.sleep(0.002)
     assert "chunks" in surface.stats.counted
-    assert len(pictures) > (4 + 12) * COUNT >> 16, "as many as there are slices"
+    assert ordered >= (4 + 12) * COUNT, "rows, and positions in their order"
+    assert len(pictures) > ordered // (most + slice_bytes)
     assert all((picture == pictures[0]).all() for picture in pictures)
     assert threads
     assert threading.current_thread() not in threads

@@ -37,14 +37,21 @@ class GpuArray:
         self.texels = gl.BufferTexture(gpu.buffer(reserve=self.nbytes), texel_format)
         self.holders: weakref.WeakSet[GpuPose] = weakref.WeakSet()
 
-    def write(self, end: float = np.inf) -> bool:
-        """Upload slices until that time of the performance counter, at least one; whether all is there."""
+    def write(self, end: float = np.inf, slices: float = np.inf) -> bool:
+        """Upload slices until that time of the performance counter, at least one and at most so many; whether
+        all is there. Drivers that copy later return at once: then only the number bounds the work."""
         while self._slices:
             first, words = self._slices.popleft()
             self.texels.buffer.write(words, offset=first)
-            if time.perf_counter() > end:
+            slices -= 1
+            if slices <= 0 or time.perf_counter() > end:
                 break
         return not self._slices
+
+    @property
+    def uploaded_bytes(self) -> int:
+        """Bytes that are on the GPU by now."""
+        return self._slices[0][0] if self._slices else self.nbytes
 
     def __del__(self) -> None:
         if hasattr(self, "texels"):  # there may have been no memory for them

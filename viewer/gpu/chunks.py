@@ -103,7 +103,11 @@ def in_coarse_order(cloud: PointCloud) -> Ordered:
         codes[part] = x | y << 1 | z << 2
     rows = np.argsort(codes, kind="stable").astype(np.uint32)  # of 16 bits: by their digits, in linear time
     chunk = chunk_size(len(cloud))
-    return Ordered(chunk, rows, *_boxes(positions.take(rows, axis=0), chunk))
+    many = max(_PART, chunk)  # both powers of two; more at a time would hold the interpreter's lock for long
+    starts = range(0, len(rows), many)
+    boxes = [_boxes(positions[rows[start : start + many]], chunk) for start in starts]
+    low, high = (np.concatenate(corners) for corners in zip(*boxes, strict=True))
+    return Ordered(chunk, rows, low, high)
 
 
 def chunk_size(count: int, chunks: int = _CHUNKS, least: int = _CHUNK) -> int:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 import weakref
-from concurrent.futures import Future
 from dataclasses import dataclass
 
 import moderngl
@@ -25,7 +24,6 @@ from ..gpu.compact import IndexList
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..picture.target import RenderTarget
-from ..task import Task, in_background
 
 _TILE = 16  # pixels along an edge, whose farthest depth hides chunks
 _MOST_TILES = 1024  # that are looked at for one chunk; one that is larger in the picture counts as shown
@@ -33,6 +31,8 @@ SLACK = 1.0  # pixels, for what float32 rounds
 _ROUNDING = 1e-5  # of the pose's size, by which boxes are larger for the same reason
 START, FIND, _GIVE, VIEW = range(4)  # steps of chunks/cull.comp
 UPLOAD_SECONDS = 0.004  # that one picture spends on uploading what is in order
+_SLICES = 4  # of an array that one picture uploads at most
+_RUN, _RUNS = 1 << 16, 64  # points that are put in order at a time, and how often in one picture at most
 _MOST_PICTURES = 15  # until the chunks in view are counted again
 # Share of the chunks in view that must be hidden for a graphics card to gain by looking for them. Pictures
 # that do without otherwise, and pictures that look before the share is read.
@@ -69,7 +69,7 @@ def culled_chunks(pose: GpuPose) -> CulledChunks | None:
     if not may_order(pose):
         return None
     chunks = pose.cached(CulledChunks)
-    return chunks if chunks.upload(time.perf_counter() + UPLOAD_SECONDS) else None
+    return chunks if chunks.prepare(pose, time.perf_counter() + UPLOAD_SECONDS) else None
 
 
 def may_order(pose: GpuPose) -> bool:
@@ -107,8 +107,9 @@ class ChunkBoxes:
         return None if self._rows is None else self._rows.texels
 
     def upload(self, end: float) -> bool:
-        """Upload rows until that time of the performance counter; whether all are there."""
-        return self._rows is None or self._rows.write(end)
+        """Upload rows until that time of the performance counter, but no more than a picture may; whether all
+        are there."""
+        return self._rows is None or self._rows.write(end, _SLICES)
 
     def test(self, surface: RenderTarget, step: int, margins: Margins, **defines: object) -> None:
         """Run a step of chunks/cull.comp on all of them. defines: of its variants."""
@@ -179,27 +180,22 @@ class CulledChunks:
         self._boxes = boxes = ChunkBoxes(pose)
         self.count, self._size = boxes.count, boxes.size
         self._lists = [IndexList(gpu, boxes.chunks, self._size) for _ in range(4)]
-        self._positions: GpuArray | None = None
-        self._gathering: Future[NDArray[np.float32]] | None = None
-        rows, positions = boxes.order.rows, pose.cloud.positions
-        if rows is not None:
-            self._gathering = in_background(Task("Ordering points"), lambda: positions.take(rows, axis=0))
+        self._reordered: _Reordered | None = None
         self._looks_again_in = 0  # pictures, until the chunks in view are counted again
         self._pause = self._looked = 0  # pictures that do not look for hidden chunks, and those that did
 
-    def upload(self, end: float) -> bool:
-        """Upload rows and positions until that time of the performance counter; whether all are there."""
+    def prepare(self, pose: GpuPose, end: float) -> bool:
+        """Upload rows, then put the positions in their order, until that time of the performance counter, but
+        no more than a picture may; whether all is there."""
+        rows = self._boxes.rows
         if not self._boxes.upload(end):
             return False
-        if self._gathering is not None and self._gathering.done():
-            self._positions = GpuArray(self._gpu, self._gathering.result(), gl.RGB32F)
-            self._gathering = None
-        if self._positions is None:
-            return self._gathering is None
-        if not self._positions.write(end):
+        if rows is None:
+            return True
+        if self._reordered is None:  # in a picture of its own, as drivers take long to give much memory
+            self._reordered = _Reordered(self._gpu, self.count)
             return False
-        self._positions.values = None
-        return True
+        return self._reordered.go_on(pose, rows, end)
 
     @property
     def defines(self) -> dict[str, object]:
@@ -208,9 +204,8 @@ class CulledChunks:
 
     def bind(self, pose: GpuPose) -> None:
         """Bind the positions and rows of the pose's points, in the order of chunks."""
-        (pose.array("positions") if self._positions is None else self._positions.texels).bind(
-            Texture.POSITIONS
-        )
+        positions = pose.array("positions") if self._reordered is None else self._reordered.texels
+        positions.bind(Texture.POSITIONS)
         if self._boxes.rows is not None:
             self._boxes.rows.bind(Texture.DRAWN_ROWS)
 
@@ -280,13 +275,44 @@ class CulledChunks:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        own = 0 if self._positions is None else self._positions.nbytes
+        own = 0 if self._reordered is None else self._reordered.texels.buffer.size
         return own + self._boxes.nbytes + sum(listed.nbytes for listed in self._lists)
 
     def release(self) -> None:
         """Delete what it holds on the GPU."""
         self._gpu.discard(self._boxes, *self._lists)
-        self._positions = None
+        if self._reordered is not None:
+            self._gpu.discard(self._reordered.texels)
+
+
+class _Reordered:
+    """Positions in the order of chunks, which the GPU puts there run by run. texels: RGB32F, all points."""
+
+    def __init__(self, gpu: Gpu, count: int) -> None:
+        self._gpu, self._count = gpu, count
+        self._done = 0
+        self.texels = gl.BufferTexture(gpu.buffer(reserve=12 * count), gl.RGB32F)
+
+    def go_on(self, pose: GpuPose, rows: gl.BufferTexture, end: float) -> bool:
+        """Go on until that time of the performance counter, a run at least, and at most so far as a picture
+        may; whether all are in order."""
+        if self._done == self._count:
+            return True
+        gpu, program = self._gpu, self._gpu.compute("chunks/reorder.comp")
+        with gpu.timers.measure("reorder"):
+            pose.array("positions").bind(Texture.POSITIONS)
+            rows.bind(Texture.CHUNK_ROWS)
+            for _ in range(_RUNS):
+                run = min(_RUN, self._count - self._done)
+                self.texels.buffer.bind_to_storage_buffer(
+                    Storage.ARRANGED, offset=12 * self._done, size=12 * run
+                )
+                gpu.set(program, first=self._done)
+                gpu.dispatch(program, run)
+                self._done += run
+                if self._done == self._count or time.perf_counter() > end:
+                    break
+        return self._done == self._count
 
 
 def counts_of(seen: NDArray[np.uint32]) -> dict[str, int]:
