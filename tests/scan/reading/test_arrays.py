@@ -232,3 +232,61 @@ def test_coordinates_in_front_of_the_points(tmp_path: Path, suffix: str, order: 
     assert frames == 2
     np.testing.assert_allclose(found, many + 1)
     assert opened(many[:3])[0] == 1, "three points stay rows"
+
+
+def test_columns_of_several_frames(tmp_path: Path) -> None:
+    """Each frame has rows of x, y, z and colours."""
+    table = np.concatenate([RNG.normal(size=(3, 50, 3)), RNG.integers(0, 256, (3, 50, 3))], axis=2)
+    for name in (".npy", ".npz"):
+        with open_scan(save(tmp_path, name, table)) as scan:
+            assert len(scan) == 3
+            cloud = scan.pose(2).cloud
+        np.testing.assert_allclose(cloud.world(), table[2, :, :3], atol=1e-6)
+        np.testing.assert_array_equal(cloud.colors[:, :3], table[2, :, 3:])
+
+
+@pytest.mark.parametrize("shape", [(50,), (2, 50)])
+def test_fields_of_several_numbers(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    fields = np.zeros(shape, [("xyz", "f4", 3), ("rgb", "u1", 3), ("normal", "f4", 3), ("quality", "f4")])
+    fields["xyz"], fields["rgb"], fields["normal"] = RNG.normal(size=(*shape, 3)), (200, 100, 50), (0, 0, 1)
+    for name in (".npy", ".npz"):
+        with open_scan(save(tmp_path, name, fields)) as scan:
+            assert len(scan) == len(shape)
+            cloud = scan.pose(len(scan) - 1).cloud
+        np.testing.assert_allclose(cloud.world(), fields["xyz"].reshape(-1, 50, 3)[-1], atol=1e-6)
+        assert cloud.colors[0].tolist() == [200, 100, 50, 255]
+        assert cloud.normals[0].tolist() == [0, 0, 1]
+        assert [*cloud.scalars] == ["quality"]
+
+
+@pytest.mark.parametrize("shape", [(40,), (5, 8)])
+def test_arrays_of_one_coordinate_each(tmp_path: Path, shape: tuple[int, ...]) -> None:
+    x, y, z = RNG.normal(size=(3, *shape))
+    path = tmp_path / "scan.npz"
+    np.savez(
+        path, X=x, Y=y, Z=z, red=np.full(shape, 200, np.uint8), **dict.fromkeys(("green", "blue"), x * 0)
+    )
+    with open_scan(path) as scan:
+        cloud = scan.pose(0).cloud
+    np.testing.assert_allclose(cloud.world(), np.stack([x.ravel(), y.ravel(), z.ravel()], 1), atol=1e-6)
+    assert cloud.colors[0].tolist() == [200, 0, 0, 255]
+
+
+@pytest.mark.parametrize(
+    ("points", "colors", "normals"),
+    [
+        ("verts", "vertex_colors", "normal"),
+        ("positions", "rgb", "vertex_normals"),
+        ("pc", "color", "normals"),
+    ],
+)
+def test_other_names_of_attributes(tmp_path: Path, points: str, colors: str, normals: str) -> None:
+    xyz = RNG.normal(size=(40, 3))
+    arrays = {points: xyz, colors: np.full((40, 3), 0.5), normals: np.tile([0, 0, 1.0], (40, 1))}
+    path = tmp_path / "scan.npz"
+    np.savez(path, **arrays, betas=np.zeros(10))
+    with open_scan(path) as scan:
+        cloud = scan.pose(0).cloud
+        assert scan.reading.unused == ("array betas (10,)",)
+    assert cloud.colors[0].tolist() == [128, 128, 128, 255]
+    assert cloud.normals[0].tolist() == [0, 0, 1]

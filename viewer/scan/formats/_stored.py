@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from io import BytesIO
 from threading import RLock
@@ -18,6 +19,7 @@ from ..contents import PointContents
 from ..reading.columns import decide as decide_columns
 from ..reading.columns import names_of
 from ..reading.sequence import Decided
+from ._columns import named
 
 _CHUNK = 1 << 22  # bytes read at a time, so that a packed stream needs no second copy
 _LONGEST_HEADER = 10_000  # bytes, as numpy has it
@@ -139,10 +141,10 @@ def rows_of_points(values: NDArray) -> NDArray:
 
 
 def columns_of_array(values: NDArray, held: int, decided: Decided) -> PointContents:
-    """The columns of points (N, C), or of an array of fields, by name. Raises InputError."""
+    """The columns of points (…, C), or of an array of fields, by name. Raises InputError."""
     if values.dtype.names is not None:
-        fields = {name: values[name] for name in values.dtype.names if values[name].ndim == 1}
-        return PointContents(columns=fields, held=held)
+        return PointContents(columns=named(_fields(values.ravel())), held=held)
+    values = values.reshape(-1, values.shape[-1])
     table = values.astype(np.float64, copy=False)
     roles = decide_columns(table, corrections=decided.corrections)
     decided.note(roles)
@@ -150,3 +152,13 @@ def columns_of_array(values: NDArray, held: int, decided: Decided) -> PointConte
     return PointContents(
         columns=columns, is_named=False, has_roles="columns" in decided.corrections, held=held
     )
+
+
+def _fields(values: NDArray) -> Iterator[tuple[str, NDArray]]:
+    """The columns of an array of fields (N,); those of a field with several numbers are called `NAME_0`."""
+    for name in values.dtype.names or ():
+        column = values[name]
+        if column.ndim == 1:
+            yield name, column
+        elif column.ndim == 2:
+            yield from ((f"{name}_{at}", column[:, at]) for at in range(column.shape[1]))

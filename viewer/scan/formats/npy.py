@@ -43,7 +43,7 @@ def read(path: Path, frame: int, decided: Decided) -> PointCloud:
         share = frame if what.sequence else None
         admit(held, array.memory(share))
         if array.dtype.names is not None or array.shape[-1] != 3:
-            return assemble(columns_of_array(array.read(), held, decided), decided)
+            return assemble(columns_of_array(array.read(share), held, decided), decided)
         return cloud_of([rows_of_points(array.read(share))], {}, {}, held=held, decided=decided)
 
 
@@ -52,7 +52,8 @@ def read_colors(path: Path, frame: int, decided: Decided) -> NDArray | None:
     with opened(path) as stream:
         held = size_of(stream)
         array = StoredArray.open("positions", stream, held)
-        if array.dtype.names is None and len(array.shape) != 2:
+        if array.dtype.names is None and array.shape[-1] == 3:
             return None
-        admit(held, array.memory())
-        return stored_colors(columns_of_array(array.read(), held, decided))
+        share = frame if point_array(array, array.first, decided).sequence else None
+        admit(held, array.memory(share))
+        return stored_colors(columns_of_array(array.read(share), held, decided))

@@ -12,7 +12,7 @@ Without `positions`, `depth`, `xyz` or `elevation` make a range view; see `_arra
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from functools import partial
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, shortened
 from ..admission import MOST_MEMBERS, admit, check_count, opened, size_of
-from ..contents import Deferred
+from ..contents import Deferred, PointContents
 from ..faces import Faces
 from ..points import PointCloud, choose_origin
 from ..pose import Scanned
@@ -36,6 +36,7 @@ from ..reading.arrays import (
     point_array,
     points_among,
     stated_times,
+    states_times,
     without_batch,
 )
 from ..reading.cloud import assemble, cloud_of, stored_colors
@@ -49,7 +50,7 @@ from ..reading.range_arrays import (
 )
 from ..reading.sequence import Decided
 from ._array_views import colors_of_arrays, unit_of_arrays, view_of_arrays
-from ._columns import first_repeated
+from ._columns import first_repeated, named
 from ._precision import within_decimals
 from ._stored import StoredArray, columns_of_array, rows_of_points
 from ._topology import with_topology
@@ -64,6 +65,8 @@ _OF_POINTS: dict[str, list[tuple[int, ...]]] = {
     "radii": [()],
     "axes": [(4,)],
 }
+_OF_VERTICES = ("rgba", "vertex_colors", "point_colors")  # more names of colours beside points
+_NORMALS = ("normal", "vertex_normals", "point_normals")
 _OF_ALL = {"origin", "times", "viewpoint"}
 _FORM = "Name points 'positions', (N, 3), (T, N, 3) or (H, W, 3), and range images 'depth', (H, W)"
 _SAVE_ANEW = "Save the arrays with numpy.savez"
@@ -80,8 +83,10 @@ _FAR = 16  # radii of the points from their origin, where float32 still tells a 
 
 
 def frame_count(path: Path, decided: Decided) -> int:
-    """How many frames the points have; 1 for a range view."""
+    """How many frames the points or the range views have."""
     with opened(path) as stream, _arrays(stream, decided) as arrays:
+        if _axes(arrays):
+            return 1
         return found.frames if (found := _images(arrays)) else _points(arrays, decided).frames
 
 
@@ -106,6 +111,8 @@ def column_names(path: Path, decided: Decided) -> list[str]:
 def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
     """Seconds of the frames, (T,) float64, of an array of times, a rate or a step; or None."""
     with opened(path) as stream, _arrays(stream, decided) as arrays:
+        if _axes(arrays):
+            return None
         images = _images(arrays)
         points = None if images else _points(arrays, decided)
         frames = images.frames if images else points.frames if points and points.sequence else 1
@@ -118,13 +125,17 @@ def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
 def read(path: Path, frame: int, decided: Decided) -> Scanned:
     """One frame; it reads no array that is not needed, and no other frame. Raises InputError."""
     with opened(path) as stream, _arrays(stream, decided) as arrays:
+        if axes := _axes(arrays):
+            return assemble(_columns(arrays, axes, size_of(stream)), decided)
         if (images := _images(arrays)) is not None:
             return (view_of_arrays(images, size_of(stream), frame, decided),)
         points, held, array = _points(arrays, decided), size_of(stream), arrays["positions"]
         if array.dtype.names is not None or array.shape[-1] != 3:
-            admit(held, array.memory())
-            return assemble(columns_of_array(array.read(), held, decided), decided)
+            entry = frame if points.sequence else None
+            admit(held, array.memory(entry))
+            return assemble(columns_of_array(array.read(entry), held, decided), decided)
         shares = _shares(arrays, points, frame)
+        _note_unused(arrays, shares, decided)
         share = shares.pop("positions")
         admit(held, array.memory(share))
         positions = [rows_of_points(array.read(share))]
@@ -156,12 +167,15 @@ def read_colors(path: Path, frame: int, decided: Decided) -> NDArray | None:
     """The colours of a frame as stored, (N, C), or None. Raises InputError."""
     with opened(path) as stream, _arrays(stream, decided) as arrays:
         held = size_of(stream)
+        if axes := _axes(arrays):
+            return stored_colors(_columns(arrays, axes, held))
         if (images := _images(arrays)) is not None:
             return colors_of_arrays(images, frame)
         points, array = _points(arrays, decided), arrays["positions"]
         if array.dtype.names is not None or array.shape[-1] != 3:
-            admit(held, array.memory())
-            return stored_colors(columns_of_array(array.read(), held, decided))
+            entry = frame if points.sequence else None
+            admit(held, array.memory(entry))
+            return stored_colors(columns_of_array(array.read(entry), held, decided))
         shares = _shares(arrays, points, frame)
         if "colors" not in shares:
             return None
@@ -248,13 +262,14 @@ def _with_positions(arrays: dict[str, StoredArray], decided: Decided) -> dict[st
     if called != "positions" and source is not None and (source == called or states_a_camera(arrays)):
         return arrays
     positions = as_points(arrays.pop(called), decided)
-    shape = positions.shape[:-1]
-    if "colors" not in arrays and called != "positions":
-        pictures = {name: as_picture(array) for name, array in arrays.items() if name.lower() in COLORS}
-        alike = [name for name, array in pictures.items() if array.shape[:-1] == shape]
+    for role, names in (("colors", (*COLORS, *_OF_VERTICES)), ("normals", _NORMALS)):
+        if role in arrays or positions.dtype.names is not None:
+            continue
+        pictures = {name: as_picture(array) for name, array in arrays.items() if name.lower() in names}
+        alike = [name for name, array in pictures.items() if array.shape[:-1] == positions.shape[:-1]]
         if alike:
             del arrays[alike[0]]
-            arrays["colors"] = pictures[alike[0]]
+            arrays[role] = pictures[alike[0]]
     return arrays | {"positions": positions}
 
 
@@ -311,6 +326,30 @@ def _shares(arrays: dict[str, StoredArray], points: PointArray, frame: int) -> d
         if name in _OF_POINTS or (name not in _OF_ALL and array.dtype.kind in "fiub"):
             shares[name] = share
     return shares
+
+
+def _axes(arrays: dict[str, StoredArray]) -> list[str]:
+    """The names of the columns of points whose x, y and z are arrays of their own; [] without these."""
+    axes = [array for name, array in arrays.items() if name.lower() in ("x", "y", "z")]
+    shape = axes[0].shape if axes else ()
+    fits = len(axes) == 3 and 0 not in shape and all(array.shape == shape for array in axes)
+    if not (fits and shape) or "positions" in arrays or image_source(arrays):
+        return []
+    return [name for name, array in arrays.items() if array.shape == shape and array.dtype.kind in "fiub"]
+
+
+def _columns(arrays: dict[str, StoredArray], names: Sequence[str], held: int) -> PointContents:
+    """The columns of points by the names of their arrays. Raises InputError."""
+    admit(held, sum(arrays[name].memory() for name in names))
+    return PointContents(columns=named((name, arrays[name].read().ravel()) for name in names), held=held)
+
+
+def _note_unused(arrays: dict[str, StoredArray], used: Iterable[str], decided: Decided) -> None:
+    """Put into the record which arrays no frame uses."""
+    known = {*used, *_OF_ALL, "faces"}
+    for name, array in arrays.items():
+        if array.shape and name not in known and not states_times(name):
+            decided.note_unused(f"array {name} {array.shape}")
 
 
 def _images(arrays: dict[str, StoredArray]) -> RangeArrays | None:

@@ -5,7 +5,7 @@
 | (N, C) | rows of columns: x y z, and as `columns.py` decides |
 | (3, N), (3, H, W), (S, 3, H, W) | the same with the coordinates in front |
 | (N,) of fields | the same, with names |
-| (T, N, 3) | T frames of N points |
+| (T, N, 3), (T, N, C), (T, N) of fields | T frames of N points |
 | (H, W, 3) | one organised cloud: rows of a picture, whose pixels are near to their neighbours both ways |
 | (S, H, W, 3) | S frames, each an organised cloud |
 """
@@ -35,7 +35,9 @@ KEY = "frames"
 ROWS, IMAGE = "rows", "image"  # what `--read frames=` takes for (A, B, 3)
 POINT_ARRAYS = (  # what programs call the array of points; the first that is there
     "positions", "points", "vertices", "xyz", "world_points", "pts3d", "point_map", "point_maps", "points3d",
-    "pointmap", "pointmaps", "pcd", "point_cloud", "pointcloud", "pc", "arr_0",
+    "pointmap", "pointmaps", "pcd", "point_cloud", "pointcloud", "pc", "cloud", "verts", "vertex", "position",
+    "pos", "coords", "coordinates", "markers", "joints", "joints3d", "joints_3d", "keypoints3d",
+    "keypoints_3d", "arr_0",
 )  # fmt: skip
 _PICTURES = ("world_points", "pts3d", "point_map", "point_maps", "points3d", "pointmap", "pointmaps")
 _CONFIDENCES = ("conf", "confidence")  # names that end so belong to pictures
@@ -57,6 +59,7 @@ _NEAR = 0.1  # of the extent: how far neighbours in a picture may be apart
 _ALIKE = 10.0  # how much farther apart neighbours along one axis may be than along the other
 _FILLED = 0.02  # the least part of the pixels that hold a point
 _MOST_COLUMNS = 64
+_MOST_OF_FRAMES = 12  # columns where the array has frames or rows as well
 _MOST_AXES = 4
 _FRONT = (3, 4, 6, 7, 9)  # coordinates, and what may stand beside them, of arrays with these in front
 _MOST_BESIDE = 16  # numbers of a point where there are so few rows
@@ -122,9 +125,11 @@ def may_be_points(array: ArrayInFile) -> bool:
     """Whether the shape and the type of an array allow that it holds points."""
     names, shape = array.dtype.names, array.shape
     if names is not None:
-        return len(shape) == 1
+        return len(shape) in (1, 2)
     if _coordinates_first(shape):
         return True
+    if len(shape) == 3 and 3 < shape[-1] <= _MOST_OF_FRAMES:
+        return array.dtype.kind == "f"  # others may be pictures
     return 2 <= len(shape) <= _MOST_AXES and (
         shape[-1] == 3 or (len(shape) == 2 and 3 < shape[1] <= _MOST_COLUMNS)
     )
@@ -147,10 +152,14 @@ def point_array(
         raise InputError(f"array '{array.name}' is of type {array.dtype}, expected numbers")
     if not math.prod(shape):
         raise EmptyFrame(f"holds no points: array '{array.name}' has shape {shape}")
-    if len(shape) <= 2:
+    if len(shape) == 1 or (len(shape) == 2 and array.dtype.names is None):
         return PointArray("cloud", 1, shape[0])
     if len(shape) == 3:
-        decision = decided.settle(KEY, lambda: decide(array, look, decided.corrections, beside))
+
+        def first(count: int) -> NDArray:
+            return look(count)[..., :3]
+
+        decision = decided.settle(KEY, lambda: decide(array, first, decided.corrections, beside))
         if decision.value == IMAGE:
             return PointArray("image", 1, shape[0] * shape[1], shape[:2])
     check_count(shape[0], MOST_FRAMES, "frames")
@@ -255,6 +264,12 @@ def stated_times(arrays: Mapping[str, ArrayInFile], frames: int) -> tuple[NDArra
             step = number if name in _STEPS else 1 / number
             return np.arange(frames, dtype=np.float64) * step, by_name[name]
     return None
+
+
+def states_times(name: str) -> bool:
+    """Whether an array of this name states times, a rate or a step."""
+    base, _, unit = name.lower().rpartition("_")
+    return name.lower() in (*_TIMES, *_RATES, *_STEPS) or (base in _TIMES and unit in _UNITS)
 
 
 def _times_of(
