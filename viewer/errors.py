@@ -80,16 +80,16 @@ _SYSTEM = {
     errno.ENOSPC: _FULL,
     getattr(errno, "EDQUOT", errno.ENOSPC): _FULL,  # a share of it
     errno.EFBIG: ("the file would be larger than this disk allows", "Use another disk"),
-    errno.EROFS: ("its file system is read-only", "Use another folder"),
-    errno.ENAMETOOLONG: ("its name is too long", "Use a shorter name"),
+    errno.EROFS: ("the file system is read-only", "Use another folder"),
+    errno.ENAMETOOLONG: ("the name of the file is too long", "Use a shorter name"),
     errno.ENOENT: ("no such file or folder", "Check its name"),
     errno.EISDIR: ("is a folder", "Name a file in it"),
-    errno.ENOTDIR: ("a part of its path is not a folder", "Check its name"),
+    errno.ENOTDIR: ("a part of the path is not a folder", "Check its name"),
     errno.ELOOP: ("its links form a loop", "Name the file itself, not a link"),
     errno.EMFILE: ("too many files are open", "Close other programs, or raise 'ulimit -n'"),
     errno.ENFILE: ("too many files are open", "Close other programs"),
     errno.ENOMEM: ("not enough memory", "Close other programs"),
-    errno.EIO: ("the disk fails to read or write it", "Copy the file to another disk"),
+    errno.EIO: ("the disk fails to read or write the file", "Copy the file to another disk"),
 }
 _CUT_SHORT = re.compile(r"[0-9]+ requested and [0-9]+ written")  # all that numpy tells of a full disk
 

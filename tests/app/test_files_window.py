@@ -193,7 +193,7 @@ def test_the_dialog_says_at_the_field_what_cannot_be_opened(
         for path, why in (
             (study / "missing.ply", r"missing\.ply: no such file"),
             (damaged / "1.npy", r"1\.npy"),
-            (damaged / "%d.npy", "Scan4D cannot read any of its 3 frames"),
+            (damaged / "%d.npy", "Scan4D cannot read any of the 3 frames"),
         ):
             app.do(("key", "Tab"), ("key", "ctrl+a", "type", "--delay", 15, path))
             app.settle()
@@ -226,7 +226,7 @@ def test_a_folder_that_cannot_be_read_leaves_the_open_scan(
         app.see(frame=1)
         before = app.settle()
         app.drop(damaged)
-        app.told("Cannot open: damaged: Scan4D cannot read any of its 3 frames")
+        app.told("Cannot open: damaged: Scan4D cannot read any of the 3 frames")
         after = app.settle()
         assert (after.scan, after.frame) == (str(study / "one"), 1)
         assert (after.camera, after.document) == (before.camera, before.document)
@@ -247,7 +247,7 @@ def test_what_cannot_be_read_at_the_start_is_told_over_the_demo_or_the_next(
         assert len([note for note in app.notes if "0.npy" in note]) == 1
         close(app)
     with running_app(screen, tmp_path, damaged) as app:
-        app.told("Cannot open: damaged: Scan4D cannot read any of its 2 frames")
+        app.told("Cannot open: damaged: Scan4D cannot read any of the 2 frames")
         app.see(scan=DEMO, is_idle=True)
         close(app)
     with running_app(screen, tmp_path, tmp_path / "missing.ply") as app:

@@ -184,7 +184,7 @@ def test_a_folder_that_cannot_be_read_at_all_is_refused_in_one_message(tmp_path:
     opening = Opening()
     opening.start("scan", "scan", Way(no_session, open_it))
     with pytest.raises(
-        InputError, match=r"scan: Scan4D cannot read any of its 3 frames\. The first problem: \S+0\.npy"
+        InputError, match=r"scan: Scan4D cannot read any of the 3 frames\. The first problem: \S+0\.npy"
     ):
         taken(opening)
     assert is_closed(opened[0])

@@ -96,9 +96,9 @@ def test_levels_without_data_are_named_instead_of_f(app: RunningApp) -> None:
 @pytest.mark.parametrize(
     ("shown", "words"),
     [
-        ((4,), "Level 4 has no data here; press 0"),
-        ((2, 4), "Levels 2 and 4 have no data here; press 0"),
-        ((1, 2, 4), "Levels 1, 2 and 4 have no data here; press 0"),
+        ((4,), "Level 4 has no pixels in this view; press 0"),
+        ((2, 4), "Levels 2 and 4 have no pixels in this view; press 0"),
+        ((1, 2, 4), "Levels 1, 2 and 4 have no pixels in this view; press 0"),
         ((), "All levels are off; press 0"),
     ],
 )

@@ -22,7 +22,9 @@ def test_what_was_made_comes_back_under_another_name(screen: Screen, tmp_path: P
         wait_until_stored(tmp_path, old, made)
     old.rename(new)
     with running_app(screen, tmp_path, new) as app:
-        app.told("Scan4D has seen these files under another name: .*doe .bookmarks., which is no longer")
+        app.told(
+            "Scan4D has seen the files of this scan under another name: .*doe .bookmarks., which is no longer"
+        )
         assert not app.settle().document["bookmarks"]
         app.do(("mousemove", *lowest_button(app)), ("click", 1))
         used = app.see(lambda state: state.document["bookmarks"])

@@ -109,7 +109,7 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     assert "'--outptu'. Did you mean '--output'" in refused("render", "demo", "--outptu", "x.png")
     for words in (["--set", "a=1", scans / "ball.npz"], [scans / "ball.npz"]):
         message = refused(*words)
-        assert f"a command is missing. 'scan4d view {scans / 'ball.npz'}' shows it" in message
+        assert f"a command is missing. 'scan4d view {scans / 'ball.npz'}' shows the scan" in message
         assert all(name in message for name in command_names())
     assert "a command is missing before '--set'" in refused("--set", "a=1", "nowhere.ply")
     for command in ("doctor", "backends"):

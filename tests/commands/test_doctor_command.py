@@ -75,7 +75,7 @@ def test_a_full_disk_under_the_shader_cache_is_no_harm(full_disk: Path, tmp_path
     (tmp_path / "file").write_text("")
     caches = {
         str(full_disk): "the disk is full",
-        str(tmp_path / "file"): "a part of its path is not a folder",
+        str(tmp_path / "file"): "a part of the path is not a folder",
         str(tmp_path / "new"): str(tmp_path / "new" / "mesa_shader_cache") + "\n",
     }
     for cache, words in caches.items():

@@ -392,7 +392,7 @@ def test_a_name_as_long_as_can_be(suffix: str, run: Run, refused: Refused, folde
     before = set(folder.iterdir())
     assert run(*command, name).code == 0
     assert {path.name for path in set(folder.iterdir()) - before} == {name}
-    assert "name is too long" in refused(*command, f"n{name}")
+    assert "the name of the file is too long" in refused(*command, f"n{name}")
 
 
 # --- small pictures, small disks --------------------------------------------------------------

@@ -297,7 +297,7 @@ def test_pictures_without_a_description_and_damaged_ones_are_refused(suffix: str
         import OpenEXR
 
         OpenEXR.File({}, {"Z": np.zeros((4, 4), np.float32)}).write(str(path))
-    with pytest.raises(InputError, match="does not store how it was made"):
+    with pytest.raises(InputError, match="does not store how the picture was made"):
         Recording.load(path)
 
 

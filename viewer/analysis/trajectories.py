@@ -80,7 +80,7 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     if unknown:
         raise InputError(
             f"the rigid reference '{unknown[0]}' is not placed",
-            hint="Place this landmark first, or remove it from the rigid references",
+            hint="Place the landmark first, or remove it from the rigid references",
         )
     if len(set(anchors)) < 3:
         hint = (
@@ -98,7 +98,7 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     if motions[reference] is None:
         raise InputError(
             "no frame has three rigid references that do not lie on one line",
-            hint="Place these landmarks, or choose others as rigid references",
+            hint="Place the rigid references, or choose others as rigid references",
         )
     return motions
 

@@ -140,7 +140,7 @@ def _checked(given: Mapping[str, Any], commands: CommandTable, problems: list[In
     for name, text in table.items():
         try:
             if name not in commands.of:
-                hint = f"{did_you_mean(name, commands.of)}F1 lists them"
+                hint = f"{did_you_mean(name, commands.of)}F1 lists all commands"
                 raise InputError(f"unknown command '{shortened(name)}'", hint=hint)
             if not isinstance(text, str):
                 raise InputError(f"the value of '{name}' is not a text", hint=f'Write {name} = "Ctrl+K"')
@@ -170,7 +170,7 @@ def _without_clashes(
                 else:
                     tool = commands.tool_of.get(name)
                     where = f"The tool '{tool}'" if tool else "The default keys"
-                    hint = f"'{name}' has no keys now. Give it others in {FILE}; F1 lists the keys in use"
+                    hint = f"'{name}' has no keys now. Give it other keys in {FILE}; F1 lists the keys in use"
                     problems.append(InputError(what, where, hint))
                     usual[name] = ""
                 break

@@ -57,4 +57,4 @@ def _put_aside(path: Path, what: str) -> str:
     except OSError as error:
         what = f"{what}, and cannot be moved ({error.strerror})"
         return str(InputError(what, path, "Scan4D starts with the defaults"))
-    return str(InputError(what, path, f"Scan4D renamed it to {kept.name} and starts with the defaults"))
+    return str(InputError(what, path, f"Scan4D renamed the file to {kept.name} and starts with the defaults"))

@@ -221,7 +221,9 @@ def read_stream(path: Path | str) -> WordStream:
 def _file_size(header: bytes) -> int:
     """Bytes of the file that begins so. Raises InputError where it is no file of code words."""
     if not header.startswith(_MAGIC) or len(header) < _HEADER.size:
-        raise InputError("is not a file of code words", hint=f"'scan4d render -o NAME{SUFFIX}' writes them")
+        raise InputError(
+            "is not a file of code words", hint=f"'scan4d render -o NAME{SUFFIX}' writes such files"
+        )
     _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack(header)
     if version != _VERSION:
         raise InputError(f"is of version {version}", hint=f"This version of Scan4D reads version {_VERSION}")

@@ -48,7 +48,7 @@ def goal_of(args: Namespace) -> Goal | None:
     if args.backend not in (None, AUTO):
         hint = f"Use --backend {AUTO}, or leave out --{name}"
         raise InputError(
-            f"this limit chooses the renderer, but the command already names one: {args.backend}",
+            f"a limit chooses the renderer, but the command already names one: {args.backend}",
             f"--{name}",
             hint,
         )

@@ -233,7 +233,7 @@ def _no_command(words: Sequence[str], commands: Sequence[str]) -> InputError:
         return InputError(f"'{first}' comes before the command", hint=hint)
     if files := [word for word in words if os.path.exists(word)]:
         name = shlex.quote(files[0])
-        hint = f"'scan4d view {name}' shows it, 'scan4d render {name} -o picture.png' draws it. {see}"
+        hint = f"'scan4d view {name}' shows the scan, 'scan4d render {name} -o picture.png' draws it. {see}"
         return InputError("a command is missing", hint=hint)
     if first and not first.startswith("-"):
         return unknown_name("command", words[0], commands)

@@ -105,7 +105,7 @@ def read_poses(timeline: Timeline, indices: Sequence[int], with_empty: bool = Fa
             timeline.request(indices[number + 1])
         yield pose
     if not found and len(indices) > 1:
-        raise InputError(f"none of its {len(indices)} frames can be read", timeline.name)
+        raise InputError(f"none of the {len(indices)} frames can be read", timeline.name)
 
 
 def framing(timeline: Timeline, indices: Sequence[int]) -> Bounds:

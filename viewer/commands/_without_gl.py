@@ -167,7 +167,7 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
         found: dict[str, Any] = estimate(pose, missing)
         return pose.with_cloud(replace(pose.cloud, **found))
     except ImportError:  # the library that finds neighbours is linked to EGL
-        effects = {"normals": "the discs face the viewer", "radii": "all have the same size"}
+        effects = {"normals": "the discs face the viewer", "radii": "all discs have the same size"}
         effect = " and ".join(effects[name] for name in missing)
         warn(f"Scan4D cannot estimate {' or '.join(missing)} here: {effect}")
         return pose

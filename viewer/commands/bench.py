@@ -137,7 +137,7 @@ def _calibrate(args: Namespace) -> int:
     there, and store the model of them. 1 where Ctrl-C stopped it: nothing is stored then."""
     if args.suite or args.backend or args.compare:
         hint = "Leave out --suite, --backend and --compare"
-        raise InputError("this suite defines its own pictures and renderers", "--calibrate", hint)
+        raise InputError("the suite defines its own pictures and renderers", "--calibrate", hint)
     settings = settings_of(args, replace(_CALIBRATION, views=2) if args.quick else _CALIBRATION)
     renderer = drawing.renderer(args.device)
     if not args.report:

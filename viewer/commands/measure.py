@@ -406,8 +406,8 @@ def _save_plot(
     for line in plot.lines:
         if line not in plot.drawn and path.suffix.lower() != ".csv":
             warn(
-                f"'{line.label}' is not plotted in {path}: its axes are in {', '.join(plot.units)}, not "
-                f"{line.unit}"
+                f"'{line.label}' is not plotted in {path}: the axes of the plot are in "
+                f"{', '.join(plot.units)}, not {line.unit}"
             )
 
 

@@ -188,7 +188,7 @@ def _mesh(pose: Pose, faces: Faces) -> Mesh:
     try:
         return Mesh(pose.cloud, faces.triangles())
     except InputError as error:
-        raise InputError(error.what, pose.label, "Its faces do not match its vertices") from error
+        raise InputError(error.what, pose.label, "The faces do not match the vertices of the mesh") from error
 
 
 def _numbers(text: str) -> tuple[float, ...]:

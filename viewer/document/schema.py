@@ -48,7 +48,7 @@ class NewerFormatError(InputError):
     """File of a later Scan4D, whose format is not known here."""
 
 
-DAMAGED = "The file is damaged, or Scan4D did not write it. Make it again"
+DAMAGED = "The file is damaged, or Scan4D did not write it. Make the file again"
 _MOST_BYTES = 256 * 2**20
 _MOST_SECONDS = 86_400.0
 _LATEST = 1e12  # seconds, of a scan

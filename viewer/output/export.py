@@ -182,7 +182,7 @@ def read_description(path: Path) -> str:
         ) from error
     if not isinstance(text, str):
         hint = "Use a picture that 'scan4d render' or the window has saved"
-        raise InputError("does not store how it was made", path, hint)
+        raise InputError("does not store how the picture was made", path, hint)
     return text
 
 

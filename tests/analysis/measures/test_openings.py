@@ -73,7 +73,7 @@ def test_a_region_around_a_hole_is_a_ring(holed: PoseSurface, order: int) -> Non
     assert area.share == pytest.approx(ring_area / polygon(13), abs=0.02)
     outline = found(holed, "perimeter", corners)
     assert outline.value == pytest.approx(24 * 26 * np.sin(np.pi / 24), rel=5e-3)
-    assert "% of its outline" in refused(holed, "volume", corners)
+    assert "% of the outline" in refused(holed, "volume", corners)
 
 
 def test_paths_around_a_hole_are_refused_and_those_beside_it_are_not(holed: PoseSurface) -> None:
@@ -94,7 +94,7 @@ def test_an_outline_crosses_a_hole_straight(holed: PoseSurface, order: int) -> N
     assert area.share == pytest.approx(1 - np.pi * 18 / 120, abs=0.04)
     assert outline.value == pytest.approx(20 + 2 * np.hypot(10, 12), rel=5e-3)
     assert outline.share == pytest.approx(1 - 12 / outline.value, abs=0.03)
-    assert "% of its outline" in refused(holed, "volume", corners)
+    assert "% of the outline" in refused(holed, "volume", corners)
 
 
 def test_the_end_of_a_patch_is_no_opening() -> None:
@@ -314,14 +314,14 @@ def test_a_section_that_ends_at_an_opening_is_refused() -> None:
         return np.array([[radius, height, 0], [0, height, radius], [-radius, height, 0]])
 
     assert found(tube, "section", around(15)).value == pytest.approx(2 * np.pi * radius, rel=0.01)
-    assert refused(tube, "section", around(0)).startswith("its line ends at an opening")
+    assert refused(tube, "section", around(0)).startswith("the line of the section ends at an opening")
     both = found(tube, "section", around(0), lines="all")
     assert both.value == pytest.approx(2 * np.pi * radius - 12, abs=2)
     places = sheet(44, 44)
     bent = np.column_stack([places, -(places[:, 0] ** 2) / 60])
     holed = PoseSurface(pose_of(bent[np.linalg.norm(places, axis=1) > 6]))
     upright = np.array([[-15.0, 0, -15 * 15 / 60], [15, 0, -15 * 15 / 60], [10, 0, -40]])
-    assert refused(holed, "section", upright).startswith("its line ends at an opening")
+    assert refused(holed, "section", upright).startswith("the line of the section ends at an opening")
     beside = found(holed, "section", upright + np.array([0, 12, 0]))
     steps = np.linspace(-22, 22, 400)
     expected = np.hypot(np.diff(steps), np.diff(-(steps**2) / 60)).sum()

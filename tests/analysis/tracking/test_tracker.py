@@ -77,7 +77,7 @@ def test_what_is_marked_as_missing_is_a_gap() -> None:
     landmark = replace(placed("middle", key(0.0, 0.0, 0)), missing=(2,))
     track = track_landmarks(timeline_of(MovingHills(4)), [landmark])["middle"]
     assert track.known.tolist() == [3, 2, 1, 2]
-    assert track.reasons == {2: "you marked it as not visible"}
+    assert track.reasons == {2: "you marked the landmark as not visible"}
 
 
 def test_a_broken_frame_is_a_gap() -> None:

@@ -84,7 +84,7 @@ class LandmarkSet:
         usable, of_names = _usable_names(names)
         if unit and usable_unit(unit) is None:
             named = f"'{shortened(unit)}', which is not a known unit such as mm"
-            of_names = [*of_names, f"Lengths are in {named}: Scan4D does not convert them"]
+            of_names = [*of_names, f"Lengths are in {named}: Scan4D does not convert the lengths"]
         there = np.isfinite(positions).all(axis=2)
         if known is None:
             known = np.where(there, Known.PLACED, Known.PENDING)
@@ -168,9 +168,8 @@ class LandmarkSet:
             return self if unit is None else replace(self, unit=unit)
         factor = conversion(self.unit, unit)
         if factor is None:
-            remark = (
-                f"Lengths are in '{self.unit}', but the scan is in '{unit}': Scan4D does not convert them"
-            )
+            units = f"Lengths are in '{self.unit}', but the scan is in '{unit}'"
+            remark = f"{units}: Scan4D does not convert the lengths"
             return replace(self, unit=unit, remarks=(*self.remarks, remark))
         with np.errstate(over="ignore"):
             return replace(self, unit=unit, positions=self.positions * factor, sigmas=self.sigmas * factor)

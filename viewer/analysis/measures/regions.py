@@ -14,10 +14,10 @@ from ...mesh.patch import Patch
 from .outlines import area_of, crosses_itself, is_within
 from .planes import THROUGH, plane_of
 
-NO_PLANE = "its landmarks lie on a line, so they define no plane"
-CROSSES = "its outline crosses itself: check the order of its landmarks"
-_NOTHING = "its outline encloses no surface"
-_BAG = "the surface within its outline continues behind an opening or a fold"
+NO_PLANE = "the landmarks of the measure lie on a line, so they define no plane"
+CROSSES = "the outline crosses itself: check the order of the landmarks"
+_NOTHING = "the outline encloses no surface"
+_BAG = "the surface within the outline continues behind an opening or a fold"
 
 Vector = NDArray[np.float64]  # (3,)
 

@@ -16,8 +16,8 @@ from .follower import Sighting
 Float = NDArray[np.float64]
 Seen = Mapping[int, Sighting]  # by frame
 
-_MISSING = "you marked it as not visible"
-_ELSEWHERE = "you placed it in a frame that the scan does not have"
+_MISSING = "you marked the landmark as not visible"
+_ELSEWHERE = "you placed the landmark in a frame that the scan does not have"
 
 
 def track_of(

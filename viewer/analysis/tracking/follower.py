@@ -180,7 +180,7 @@ class Follower:
     ) -> Sighting:
         """Look for it in the next frame by the surface around it. carried: where a body has carried it."""
         if self._wide is None or self._fine is None:
-            return Sighting.gap("there is no surface where you placed it")
+            return Sighting.gap("there is no surface where you placed the landmark")
         try:
             return self._registered(surface, self._guesses(surface, before, carried), carried)
         except _Lost as lost:

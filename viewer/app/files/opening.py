@@ -191,5 +191,5 @@ def read_from(timeline: Timeline, first: int) -> int:
     if count == 1:
         raise problem
     raise InputError(
-        f"Scan4D cannot read any of its {count} frames. The first problem: {problem}", timeline.name
+        f"Scan4D cannot read any of the {count} frames. The first problem: {problem}", timeline.name
     )

@@ -28,7 +28,7 @@ def offer_of_stored(scan: str, hash: Future[str | None], use: Callable[[SavedSes
     named = [f"{printable(each.scan)} ({_made(each)})" for each in found]
     gone = "" if os.path.lexists(found[0].scan) else ", which is no longer there"
     choices = {f"Use {_made(each)} of {_title(each.scan)}": partial(use, each) for each in found[::-1]}
-    text = f"Scan4D has seen these files under another name: {'; '.join(named)}{gone}."
+    text = f"Scan4D has seen the files of this scan under another name: {'; '.join(named)}{gone}."
     return Offer(text, dict(reversed(choices.items())), _ABOUT)
 
 

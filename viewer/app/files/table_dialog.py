@@ -199,7 +199,7 @@ class TableDialog(WindowPart):
         if choices.problem:
             imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(choices.problem)}")
         elif choices.shown is not None:
-            imgui.text_disabled("Scan4D reads these rows as points.")
+            imgui.text_disabled("Scan4D reads the rows of this table as points.")
         imgui.begin_disabled(not choices.can_open)
         if self._takes_keyboard and choices.can_open:
             imgui.set_keyboard_focus_here()

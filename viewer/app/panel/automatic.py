@@ -95,7 +95,7 @@ def _draw_choice(choosing: Choosing) -> None:
     )
     widgets.fact("90 % within", f"{bounded:.2g} {comparison.goal.unit}")
     widgets.tooltip(
-        "Nine of ten pictures are expected to stay within this value. Scan4D compares the value with "
+        "Nine of ten pictures are expected to stay within the shown value. Scan4D compares the value with "
         "your limit"
     )
     if measured is not None:

@@ -112,7 +112,7 @@ class ScanSection(WindowPart):
         titles = {_OWN: own} | {name: UNIT_WORDS.get(name, name) for name in names}
         widgets.label(
             "Scan unit",
-            "The length of one unit of the scan's coordinates. Scan4D remembers it for this scan.",
+            "The length of one unit of the scan's coordinates. Scan4D remembers the unit for this scan.",
         )
         chosen = widgets.combo("unit", document.unit or _OWN, list(titles), titles)
         guess = guess_unit(self.framing.bounds(pose), document.look.up)
@@ -153,7 +153,7 @@ class ScanSection(WindowPart):
             return
         widgets.label(
             "Frame rate",
-            "Frames per second of the scan. Press Enter to set it. Scan4D remembers it for this scan.",
+            "Frames per second of the scan. Press Enter to set the rate. Scan4D remembers it for this scan.",
         )
         entered, rate = imgui.input_float(
             "##rate", pacing.rate, format="%.4g Hz", flags=imgui.InputTextFlags_.enter_returns_true.value

@@ -230,9 +230,9 @@ def words_on_levels(levels: Mapping[int, bool], key: str) -> str:
     if not shown:
         what = "All levels are off"
     elif len(shown) == 1:
-        what = f"Level {shown[0]} has no data here"
+        what = f"Level {shown[0]} has no pixels in this view"
     else:
-        what = f"Levels {', '.join(shown[:-1])} and {shown[-1]} have no data here"
+        what = f"Levels {', '.join(shown[:-1])} and {shown[-1]} have no pixels in this view"
     return what + (f"; press {key}" if key else "")
 
 

@@ -217,7 +217,7 @@ def _parsed(line: str, needed: dict[str, Any]) -> Row:
     if not isinstance(row, dict):
         raise ValueError("not a JSON object")
     if missing := [name for name, kind in needed.items() if not isinstance(row.get(name), kind)]:
-        raise ValueError(f"it lacks a usable {', '.join(missing)}")
+        raise ValueError(f"the row lacks a usable {', '.join(missing)}")
     return _from_json(row)
 
 

@@ -128,7 +128,7 @@ def read_table(path: Path) -> LandmarkSet:
     raise at_line(
         "has neither the columns x, y and z nor NAME_x, NAME_y and NAME_z",
         line,
-        "The first line must name the columns; l, p and s or r, a and s are coordinates too",
+        "The first line must name the columns, such as x, y and z, or l, p and s, or r, a and s",
     )
 
 
@@ -316,7 +316,7 @@ def _wide(
         frames.append(len(frames) if frame_at is None else _frame(row[frame_at], line))
         if len(frames) > 1 and frames[-1] <= frames[-2]:
             raise at_line(
-                f"its frame is {frames[-1] + 1}, but the row above has {frames[-2] + 1}",
+                f"the frame of this row is {frames[-1] + 1}, but that of the row above is {frames[-2] + 1}",
                 line,
                 "Sort the rows by frame",
             )

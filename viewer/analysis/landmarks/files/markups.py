@@ -57,7 +57,8 @@ def read(path: Path) -> LandmarkSet:
         raise InputError("holds no landmarks")
     if len({part["axes"] for part in parts}) > 1 or len({part["unit"] for part in parts}) > 1:
         raise InputError(
-            "its markups are in several coordinate systems or units", hint="Save each markup to its own file"
+            "the markups of the file are in several coordinate systems or units",
+            hint="Save each markup to its own file",
         )
     own = _own(data)
     unit = _word(own["unit"]) if "unit" in own else parts[0]["unit"]

@@ -71,7 +71,7 @@ def read(path: Path) -> LandmarkSet:
         notes=LandmarkNotes(
             _unit(reader),
             _texts(reader, "DESCRIPTIONS", count),
-            remarks=[] if labels else ["Its points have no names: Scan4D numbers them"],
+            remarks=[] if labels else ["The points of the file have no names: Scan4D numbers them"],
         ),
     )
 
@@ -86,7 +86,7 @@ def _library() -> Iterator[None]:
             raise
         except Exception as error:
             raise InputError(
-                f"its parameters or frames are damaged ({error or type(error).__name__})"
+                f"the parameters or frames of the file are damaged ({error or type(error).__name__})"
             ) from error
 
 

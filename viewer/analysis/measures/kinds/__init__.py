@@ -84,7 +84,7 @@ def kind_of(measure: Measure) -> MeasureKind:
         if kind.most not in (None, kind.least):
             wanted = f"{kind.least} to {kind.most}"
         raise InputError(
-            f"this measure takes {wanted} landmarks, not {count}",
+            f"the measure takes {wanted} landmarks, not {count}",
             f"{kind.title} '{measure.name}'",
             kind.about,
         )

@@ -58,7 +58,7 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     how = options.get("plane", PLANES[0])
     center, normal = plane_of(local, how)
     if not np.isfinite(normal).all():
-        return Refused("its landmarks lie on a line, so they define no plane")
+        return Refused("the landmarks of the measure lie on a line, so they define no plane")
 
     def beyond(points: Points) -> NDArray[np.float64]:
         return np.abs((points - center) @ normal) - _SLAB * surface.spacing
@@ -66,13 +66,13 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     patch = surface.patch(beyond)
     lines = _contours(patch, center, normal, local[0], options)
     if not lines:
-        return Refused("the plane through its landmarks meets no surface")
+        return Refused("the plane through the landmarks meets no surface")
     if options.get("lines") != "all" and _ends_at_opening(
         surface, lines[0], plane_section(patch, center, normal)
     ):
         return Refused(
-            "its line ends at an opening in the surface. Fill the opening, or measure along all lines "
-            "(option lines = all)"
+            "the line of the section ends at an opening in the surface. Fill the opening, or measure along "
+            "all lines (option lines = all)"
         )
     gradient = np.zeros_like(positions)
     step = _STEP * surface.spacing

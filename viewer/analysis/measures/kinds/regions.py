@@ -60,7 +60,7 @@ def _through(surface: PoseSurface, positions: NDArray[np.float64], *, is_rim: bo
     patch = patch_through(surface, prism)
     lines = rim_through(patch, prism) if len(patch.faces) else []
     if not lines:
-        return Refused("there is no surface in front of or behind its outline")
+        return Refused("there is no surface in front of or behind the outline")
     if is_rim:
         value, deviation = sum(map(length_of, lines)), off_smooth(surface, lines)
     else:
@@ -101,7 +101,7 @@ def _volume(surface: PoseSurface, positions: NDArray[np.float64], _: Options) ->
     if isinstance(region, Refused):
         return region
     if region.share < WHOLE:
-        return Refused(f"the surface fills only {100 * region.share:.0f} % of its outline")
+        return Refused(f"the surface fills only {100 * region.share:.0f} % of the outline")
     piece = region.piece
     edges = [steps_along(line, surface.spacing)[:-1] for line in loop.lines]
     around = np.concatenate(edges)
@@ -181,7 +181,7 @@ KINDS = (
     ),
     MeasureKind(
         "volume", "Volume above the outline's plane",
-        "volume between a region and the plane of its outline; negative below the plane",
+        "volume between a region and the plane of the outline; negative below the plane",
         "volume", 3, None, _volume, True,
     ),
 )  # fmt: skip

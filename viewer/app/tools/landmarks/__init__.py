@@ -257,7 +257,7 @@ class Tool:
         self.context.redraw()
         if ends and landmark is not None:
             if picked is None:
-                raise InputError(f"No surface there: {landmark.name} stays where it was.")
+                raise InputError(f"No surface under the mouse: {landmark.name} stays where it was.")
             self.corrects = False
             self._set(landmark, click, "Move landmark")
 

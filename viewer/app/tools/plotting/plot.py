@@ -75,7 +75,7 @@ def _why_none(tool: Tool) -> str:
         return (
             "Scan4D is measuring the frames."
             if tool.context.followed.is_busy
-            else "No measure has a value yet: place its landmarks."
+            else "No measure has a value yet: place the landmarks of a measure."
         )
     if not tool.shown.curves:
         return "All measures are hidden: tick some in the panel."
