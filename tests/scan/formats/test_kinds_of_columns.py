@@ -285,3 +285,18 @@ def test_the_unit_that_a_comment_states(tmp_path: Path) -> None:
     with open_scan(tmp_path, unit="ft") as timeline:
         assert timeline.pose(0).cloud is not None
         assert timeline.unit == "ft"
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".pcd"])
+def test_decimal_commas_are_in_the_record(tmp_path: Path, suffix: str) -> None:
+    heads = {
+        ".ply": "ply\nformat ascii 1.0\nelement vertex 2\n"
+        "property float x\nproperty float y\nproperty float z\nend_header\n",
+        ".pcd": "FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nWIDTH 2\nHEIGHT 1\nPOINTS 2\nDATA ascii\n",
+    }
+    path = tmp_path / f"a{suffix}"
+    for rows, mark in (("1,5 2 3\n4 5,25 6\n", ","), ("1.5 2 3\n4 5.25 6\n", ".")):
+        path.write_text(heads[suffix] + rows)
+        with open_scan(path) as scan:
+            assert scan.pose(0).cloud.world().tolist() == [[1.5, 2, 3], [4, 5.25, 6]]
+            assert scan.reading["decimal"].value == mark

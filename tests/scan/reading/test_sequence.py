@@ -87,6 +87,19 @@ def write_archive(path: Path, positions: NDArray, colors: NDArray) -> None:
     np.savez(path, positions=positions, colors=colors)
 
 
+def write_table(path: Path, positions: NDArray, colors: NDArray) -> None:
+    """A table, with a column of frames where there are several."""
+    frames = (
+        np.broadcast_to(np.arange(len(colors))[:, None, None], (*colors.shape[:2], 1))
+        if colors.ndim == 3
+        else []
+    )
+    parts = [positions, colors] if colors.ndim == 2 else [frames, positions, colors]
+    table = np.concatenate(parts, axis=-1).reshape(-1, sum(part.shape[-1] for part in parts))
+    names = "x,y,z,red,green,blue" if colors.ndim == 2 else "frame,x,y,z,red,green,blue"
+    np.savetxt(path, table, "%g", ",", header=names, comments="")
+
+
 def write_picture(path: Path, positions: NDArray, colors: NDArray) -> None:
     """Depth pictures instead, of the same colours."""
     shape = (*colors.shape[:-2], 2, 5, 3)
@@ -101,6 +114,8 @@ def write_picture(path: Path, positions: NDArray, colors: NDArray) -> None:
         (".npy", write_fields, False),
         (".npz", write_archive, False),
         (".npz", write_archive, True),
+        (".csv", write_table, False),
+        (".csv", write_table, True),
         (".npz", write_picture, False),
         (".npz", write_picture, True),
     ],

@@ -15,6 +15,7 @@ from ..points import PointCloud
 from ..reading import numbers
 from ..reading.cloud import ELLIPSES, GEOMETRY
 from ..reading.columns import canonical_names
+from ..reading.sequence import Decided
 from ._precision import is_enough
 
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
@@ -109,19 +110,18 @@ def bounded_lines(stream: IO[AnyStr]) -> Iterator[AnyStr]:
 
 def parse_table(
     lines: Iterable[str],
-    columns: Sequence[int] | None = None,
-    delimiter: str | None = None,
     rows: int | None = None,
+    decided: Decided | None = None,
 ) -> NDArray[np.float64]:
     """Numbers from lines of text, (N, C) float64, as `numbers.parse_numbers` reads them.
 
-    delimiter: between the values; None: blanks, or what `numbers.dialect_of` finds, decimal commas too.
+    Blanks separate them, or what `numbers.dialect_of` finds. decided: its record gets the decimal mark.
     """
-    if delimiter is None:
-        dialect, lines = numbers.looked_at(lines, rows)
-    else:
-        dialect = numbers.Dialect(delimiter)
-    return numbers.parse_numbers(lines, columns, dialect, rows)
+    stated = decided.corrections.get("decimal") if decided else None
+    dialect, lines = numbers.looked_at(lines, rows, stated)
+    if decided is not None:
+        decided.note(dialect.decisions(["decimal"] if stated else ())[1])
+    return numbers.parse_numbers(lines, None, dialect, rows)
 
 
 def whole_numbers(rows: Sequence[Sequence[str]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -102,7 +102,7 @@ def contents(path: Path, frame: int, decided: Decided) -> PointContents | tuple[
         if header.encoding not in _ENCODINGS:
             raise unknown_name("PCD encoding", header.encoding[:_LONGEST_WORD], list(_ENCODINGS))
         stream.seek(header.size)
-        columns = _ENCODINGS[header.encoding](stream, header)
+        columns = _ENCODINGS[header.encoding](stream, header, decided)
         packed = header.encoding == "binary_compressed"
         if header.grid and {name.lower() for name in columns} <= _OF_VIEWS:
             admit(size_of(stream), header.points * (header.dtype.itemsize + _VIEW_BYTES) + _WORK)
@@ -226,9 +226,9 @@ def _grid(words: dict[str, list[str]], points: int) -> tuple[int, int] | None:
     return (height, width) if min(height, width) > 1 and height * width == points else None
 
 
-def _read_ascii(stream: BinaryIO, header: _Header) -> Columns:
+def _read_ascii(stream: BinaryIO, header: _Header, decided: Decided) -> Columns:
     stream.seek(header.size)
-    table = parse_table(text_lines(stream), rows=header.points)
+    table = parse_table(text_lines(stream), header.points, decided)
     if len(table) < header.points:
         raise too_few(len(table), header.points, "points")
     ends = np.cumsum([f.count for f in header.fields])
@@ -242,12 +242,12 @@ def _read_ascii(stream: BinaryIO, header: _Header) -> Columns:
     )
 
 
-def _read_binary(stream: BinaryIO, header: _Header) -> Columns:
+def _read_binary(stream: BinaryIO, header: _Header, decided: Decided) -> Columns:
     rows = read_records(stream, header.dtype, header.points, "points")
     return _unpacked(_columns(header, [rows[name] for name in header.dtype.names or ()]))
 
 
-def _read_compressed(stream: BinaryIO, header: _Header) -> Columns:
+def _read_compressed(stream: BinaryIO, header: _Header, decided: Decided) -> Columns:
     """One LZF stream that holds field after field, each for all points."""
     import lzf
 

@@ -61,7 +61,7 @@ _NORMALS = {"nx", "ny", "nz"}
 _GRID, _CELL_BYTES = "range_grid", 64  # bytes of memory for a cell of it
 
 
-def contents(path: Path, frame: int = 0) -> PointContents:
+def contents(path: Path, frame: int = 0, decided: Decided | None = None) -> PointContents:
     """The vertices of a PLY file, ascii or binary, and its remarks. Raises InputError."""
     with opened(path) as stream:
         header = parse_header(stream.read(LONGEST_HEADER))
@@ -81,8 +81,10 @@ def contents(path: Path, frame: int = 0) -> PointContents:
         stream.seek(header.size)
         for element in before:
             _skip(stream, element, header.encoding)
-        read_rows = _read_ascii if header.encoding == "ascii" else _read_binary
-        columns = read_rows(stream, vertex, header.encoding)
+        if header.encoding == "ascii":
+            columns = _read_ascii(stream, vertex, decided)
+        else:
+            columns = _read_binary(stream, vertex, header.encoding)
         faces = _faces(stream, header, len(before) + 1)
         return PointContents(
             columns=columns,
@@ -200,11 +202,11 @@ def _filled_lines(stream: BinaryIO, element: Element) -> Iterator[str]:
     return islice(filter(str.strip, text_lines(stream)), min(element.count, sys.maxsize))
 
 
-def _read_ascii(stream: BinaryIO, element: Element, encoding: str) -> Columns:
+def _read_ascii(stream: BinaryIO, element: Element, decided: Decided | None) -> Columns:
     if element.has_lists:
         table = _walk_lines(_filled_lines(stream, element), element)
     else:
-        table = parse_table(text_lines(stream), rows=element.count)
+        table = parse_table(text_lines(stream), element.count, decided)
         if len(table) and table.shape[1] < len(element.properties):
             promised = len(element.properties)
             raise InputError(f"its rows hold {table.shape[1]} values, but the header promises {promised}")

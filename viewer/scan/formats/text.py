@@ -22,14 +22,16 @@ from ...errors import InputError, shortened
 from ..admission import MOST_FRAMES, check_count, opened
 from ..contents import PointContents, Stated, TextHead
 from ..points import PointCloud
-from ..reading import columns, numbers
+from ..reading import colors, columns, numbers
 from ..reading.camera_tables import cameras_in_table
-from ..reading.cloud import assemble
+from ..reading.cloud import assemble, stored_colors
 from ..reading.record import Decision
 from ..reading.sequence import Decided
 from ..reading.tables import NAMES_HELP, TableHead, head_of
 from ..times import DEFAULT_FPS
 from ._columns import bounded_lines, named
+
+_SOME_ROWS = 1 << 12  # which tell the scale of colours
 
 TITLE = "a text table"
 SUFFIXES = (".xyz", ".csv", ".txt", ".pts", ".asc", ".xyzn", ".xyzrgb", ".xyznrgb", ".xyzi")
@@ -75,6 +77,18 @@ def _whole(path: Path, decided: Decided) -> PointContents:
     )
 
 
+def read_colors(path: Path, frame: int, decided: Decided) -> NDArray | None:
+    """The colours of the first rows of a table as stored, (N, C), or None. Raises InputError."""
+    with _text_of(path, decided) as (text, _):
+        head = head_of(bounded_lines(text), decided.corrections)
+        text.seek(0)
+        lines = islice(bounded_lines(text), head.skip, None)
+        loose = numbers.LooseLines()
+        table = numbers.parse_numbers(lines, head.columns, head.dialect, rows=_SOME_ROWS, loose=loose)
+    names = _names(head, table, path, decided)
+    return stored_colors(PointContents(columns=named(zip(names, table.T, strict=True))))
+
+
 def frame_count(path: Path, decided: Decided) -> int:
     """How many moments a table holds, by its columns of frames, times and ids; 1 where it cannot be read."""
     try:
@@ -117,6 +131,9 @@ class Frames:
         with self._reading:
             if self._columns is None:
                 self._columns = _whole(self._path, self._decided)
+                copy = replace(self._columns, columns={**self._columns.columns})
+                if (found := stored_colors(copy)) is not None:  # of all moments
+                    colors.settled_scale(found, self._decided)
             whole = self._columns
         start, end = self._moments.starts[frame : frame + 2]
         rows = self._moments.order[start:end]

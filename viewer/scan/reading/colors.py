@@ -52,7 +52,7 @@ def evidence_of(colors: NDArray) -> ColorEvidence:
     top = colors.max(initial=0)
     if colors.dtype.kind == "f" and not np.isfinite(top):
         top = colors.max(initial=0, where=np.isfinite(colors))
-    if colors.dtype.kind != "f" or top > _LITTLE_MORE:
+    if colors.dtype.kind != "f" or top > 255:
         return ColorEvidence(kind, float(top))
     sample = strided(colors)
     return ColorEvidence(kind, float(top), float(np.mean(sample != np.rint(sample))) if sample.size else 0.0)
@@ -61,8 +61,9 @@ def evidence_of(colors: NDArray) -> ColorEvidence:
 def scale_of(evidence: ColorEvidence) -> ColorScale:
     """The scale that one frame tells.
 
-    Whole numbers of 16 bit or more that stay within 255 may be 8-bit colours or those of a dark frame; floats
-    of 0 and 1 alone may be of either range. Neither is certain.
+    Whole numbers of 16 bit or more that stay within 255 may be 8-bit colours or those of a dark frame, and so
+    may whole numbers below 255 in floats, as text has them. Floats of 0 and 1 alone may be of either range.
+    None of these is certain.
     """
     kind, top, fractions = evidence
     if kind[0] == "b":
@@ -72,7 +73,7 @@ def scale_of(evidence: ColorEvidence) -> ColorScale:
     if top > 255:
         return ColorScale(65535, True)
     if top > _LITTLE_MORE or (top > 1 and fractions <= _MOSTLY):
-        return ColorScale(255, True)
+        return ColorScale(255, fractions > 0 or top == 255)
     return ColorScale(1, fractions > 0)
 
 

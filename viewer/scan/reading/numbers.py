@@ -432,12 +432,17 @@ def parse_numbers(
     return table
 
 
-def looked_at(lines: Iterable[str], most: int | None = None) -> tuple[Dialect, Iterator[str]]:
-    """How the rows of a stream are written, and all its lines. most: lines that may be taken."""
+def looked_at(
+    lines: Iterable[str], most: int | None = None, decimal: str | None = None
+) -> tuple[Dialect, Iterator[str]]:
+    """Find how the rows of a stream are written, and return that with all its lines.
+
+    most: lines that may be taken. decimal: the decimal mark that the user states.
+    """
     lines = iter(lines)
     head = _batch(lines, _LOOKED_AT if most is None else min(most, _LOOKED_AT))
     is_plain = not any(mark in line for line in head for mark in ",;")
-    return PLAIN if is_plain else dialect_of(head), chain(head, lines)
+    return PLAIN if is_plain else dialect_of(head, None, decimal), chain(head, lines)
 
 
 def _batch(lines: Iterator[str], most: int) -> list[str]:
