@@ -113,6 +113,35 @@ def test_the_recording_of_a_replay_is_what_was_recorded_first(tmp_path: Path) ->
 
 
 @pytest.mark.slow
+def test_a_replay_shows_the_empty_frames_that_were_recorded(tmp_path: Path) -> None:
+    scan = tmp_path / "scan"
+    scan.mkdir()
+    points = np.random.default_rng(0).random((300, 3))
+    for number in range(3):
+        rows = "".join(f"{x},{y},{z}\n" for x, y, z in points if number != 1)
+        (scan / f"f{number}.csv").write_text("x,y,z\n" + rows)
+    with virtual_screen(tmp_path, SIZE) as screen, running_app(screen, tmp_path, scan) as app:
+        press(app, "r")
+        app.see(is_recording=True)
+        press(app, "Right")
+        app.see(words="Frame 2 is empty")
+        press(app, "Right")
+        app.see(frame=2)
+        app.settle()
+        path, entries = recorded(app)
+        assert [entry.pose for entry in entries] == [0, 2]
+        empty = replace(entries[0], pose=1, at=(entries[0].at + entries[1].at) / 2)
+        replace(Recording.load(path), entries=(entries[0], empty, entries[1])).save(path)
+        press(app, "shift+r")
+        app.see(is_replaying=True)
+        app.see(is_replaying=False, frame=2)
+        app.settle()
+        assert "replays frame 1" in app.log()
+        assert "cannot be shown" not in app.log()
+        assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
 def test_an_anonymous_picture_is_shown_where_the_scan_stands(tmp_path: Path) -> None:
     scan, picture = tmp_path / "far.npz", tmp_path / "anonymous.png"
     points = np.random.default_rng(0).random((300, 3)) + np.array([5000, 100, 7])

@@ -130,6 +130,7 @@ def test_the_times_csv_in_the_documentation(tmp_path: Path) -> None:
         ("file,minute\na.ply,0\n", "line 1: time 'minute' is not a number"),
         ("a.ply;0,5\nb.ply;1,2,5\n", "line 2: time '1,2,5' is not a number"),
         ("a.ply,0,5\nb.ply,1,0\nc.ply,2,2\n", "decimal marks"),
+        ("0 0 0\n", "times.csv: no time for 'b.ply'"),
         ("file,time\na.ply,12:30:01\nb.ply,1\nc.ply,2\n", "line 3: time '1' is not a clock time"),
         (b"a.ply,0\nb.ply,\xff\xfe\n", "line 2: time 'ÿþ' is not a number"),
         ("a" * 200_000, "times.csv: has 1 times for 3 frames"),

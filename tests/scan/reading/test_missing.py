@@ -65,6 +65,16 @@ def test_a_value_far_from_all_others_was_not_measured(value: float) -> None:
     assert found.value == f"{value:g}"
 
 
+def test_rows_of_such_a_value_count_however_few() -> None:
+    points = np.vstack([RNG.random((500, 3)), np.full((2, 3), -9999.0)])
+    found = missing.unmeasured_points(points)
+    assert found is not None
+    assert (found.value, found.rows.sum()) == ("-9999", 2)
+    points[-1] = (1, 2, -9999)  # one odd height may be measured
+    points[-2] = (1, 2, 3)
+    assert missing.unmeasured_points(points) is None
+
+
 @pytest.mark.parametrize(
     "values",
     [

@@ -97,6 +97,14 @@ def test_columns_of_text_are_in_the_record(tmp_path: Path) -> None:
     assert texts == ("column 'name', which holds text", "column 'color', which holds text")
 
 
+@pytest.mark.parametrize("time", ["2024-05-01T12:30:0{}", "12:30:0{}.5"])
+def test_clock_times_of_several_moments_are_reported(time: str, tmp_path: Path) -> None:
+    rows = "".join(f"{time.format(frame)},{x},0,0\n" for frame in (1, 2) for x in range(3))
+    assert "does not read the frames or times of column 'Time'" in messages(
+        save(tmp_path / "scan.csv", f"Time,x,y,z\n{rows}")
+    )
+
+
 @pytest.mark.parametrize("text", ["x y z\n", "# nothing\n", "0\n", "\n\n"])
 def test_a_table_without_rows_is_an_empty_frame_of_a_sequence(text: str, tmp_path: Path) -> None:
     for number, content in enumerate(["1 2 3\n", text, "4 5 6\n"]):

@@ -179,6 +179,9 @@ def _note_writing(head: TableHead, encoding: Decision, decided: Decided) -> None
     for name in head.unused:
         if name:
             decided.note_unused(f"column '{shortened(name)}', which holds text")
+            if columns.moment_columns([name]).can_split:
+                what = f"Scan4D does not read the frames or times of column '{shortened(name)}', a text"
+                decided.report("times", f"{what}. Write them as numbers to play the moments of the table")
 
 
 def _report_doubts(head: TableHead, path: Path, decided: Decided) -> None:

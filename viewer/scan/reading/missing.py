@@ -41,7 +41,20 @@ def unmeasured_points(points: NDArray) -> Unmeasured | None:
         return Unmeasured(ZEROS, rows)
     depth = points[:, 2]
     value = unmeasured_value(depth)
-    return None if value is None else Unmeasured(f"{value:g}", depth == depth.dtype.type(value))
+    if value is not None:
+        return Unmeasured(f"{value:g}", depth == depth.dtype.type(value))
+    return _sentinel_rows(points) if len(points) else None
+
+
+def _sentinel_rows(points: NDArray) -> Unmeasured | None:
+    """The rows of points (N, 3) whose x, y and z are one such number, however few, if it lies far away."""
+    depth = points[:, 2]
+    for value in {float(depth.min()), float(depth.max())} & {*SENTINELS}:
+        rows = (points == points.dtype.type(value)).all(axis=1)
+        others = depth[~rows]
+        if rows.any() and others.size and abs(value - others).min() > np.ptp(others):
+            return Unmeasured(f"{value:g}", rows)
+    return None
 
 
 def zero_rows(points: NDArray) -> NDArray[np.bool_] | None:

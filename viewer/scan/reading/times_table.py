@@ -112,12 +112,13 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> StatedTimes:
     Raises InputError, with the line, where a row cannot be understood, and where a frame has no time or two,
     or not a later one than the frame before it.
     """
-    rows = _rows_of(path)
+    rows, separator = _rows_of(path)
     columns, rows = _columns_of(path, rows, labels)
     for row in rows:
         if len(row.cells) <= max(columns.time, columns.frame or 0):
             raise _bad_row(path, row.line, "a column is missing")
-    _check_decimals(path, rows, columns)
+    if separator == "," and not columns.why:
+        _check_decimals(path, rows, columns.time + 1)
     frames = _frames_of(path, rows, columns, labels)
     found = _numbers_of(path, rows, columns)
     times, lines = np.full(len(labels), np.nan), [0] * len(labels)
@@ -153,8 +154,9 @@ def _doubt(times: NDArray[np.float64]) -> str:
 # --- rows and columns ---------------------------------------------------------------------------
 
 
-def _rows_of(path: Path) -> list[_Row]:
-    """The rows that are not blank. A comment just above them that names a time is the first of them."""
+def _rows_of(path: Path) -> tuple[list[_Row], str | None]:
+    """The rows that are not blank, and their separator. A comment just above them that names a time is the
+    first of them."""
     try:
         with open_plain(path) as file:
             text = decoded(file.read())
@@ -172,7 +174,7 @@ def _rows_of(path: Path) -> list[_Row]:
             for cells in reader:
                 row = [text_of_cell(cell.strip()) for cell in cells]
                 rows += [_Row(reader.line_num, row)] if any(row) else []
-        return [row for row in rows if not is_comment(row.cells[0])]
+        return [row for row in rows if not is_comment(row.cells[0])], separator
     except (OSError, csv.Error) as error:
         raise InputError(f"cannot be read ({error})", path, "It should be comma-separated text") from error
 
@@ -368,15 +370,13 @@ def _clock_seconds_of(cell: str) -> float | None:
     return (moment - datetime(1970, 1, 1)).total_seconds() + part
 
 
-def _check_decimals(path: Path, rows: Sequence[_Row], columns: _Columns) -> None:
-    """Raise InputError where commas separate cells, and seem to be decimal marks too: "f1.ply,0,04"."""
-    behind = columns.time + 1
-    if columns.unit is not None or columns.why:
-        return
-    if rows and all(
-        len(row.cells) == behind + 1 and row.cells[columns.time].isdecimal() and row.cells[behind].isdecimal()
-        for row in rows
-    ):
+def _check_decimals(path: Path, rows: Sequence[_Row], behind: int) -> None:
+    """Raise InputError where commas separate cells, and seem to be decimal marks too: "f1.ply,0,04".
+
+    behind: the column behind that of the times.
+    """
+    cells = [row.cells[behind - 1 :] for row in rows]
+    if rows and all(len(pair) == 2 and all(map(str.isdecimal, pair)) for pair in cells):
         raise _bad_row(path, rows[0].line, "uses commas as separators and, it seems, as decimal marks too")
 
 
