@@ -2,8 +2,11 @@
 // nearer to it than to any other point, the farthest corner of its Voronoi cell. Copies, order and far points of the
 // same list change nothing, so that lists need no order.
 //
-// At a border a cell does not end; it counts as twice as far as it reaches to most sides. LISTED: invocations are of
-// the points in the list, else of slots. ENDED: no radius at a border or on a line. What cells cannot tell stays 0.
+// At a border a cell does not end; it counts as BORDER times as far as it reaches to most sides. Where it reaches about
+// as far to opposite sides, points lie in rows that are far apart: it counts up to ROWS times as far.
+// LISTED: invocations are of the points in the list, else of slots. ENDED: no radius at a border or on a line. What
+// cells cannot tell stays 0. LONE: a point that is far from all others, as far as these are from one another, gets a
+// negative radius: it is beside the surface.
 #include "common/item.glsl"
 #if LISTED
 #include "common/list.glsl"
@@ -17,9 +20,31 @@ layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float radii[]; };
 
+#if LONE
+layout(binding = TEXTURE_RADII) uniform samplerBuffer found;  // as they were before this round, 0: not known
+#endif
+
 #if !LISTED
 uniform uint first;
 #endif
+
+const float EVEN = 1.5;  // times as far as to the opposite side
+
+// One over how far the cell counts in four directions. along, against: one over how far it reaches, and to the opposite
+// sides; most_sides: to most. rows: ROWS, or BORDER where the point has no normal, so that nothing tells of rows.
+vec4 bounded(vec4 along, vec4 against, float most_sides, float rows) {
+    bvec4 even = lessThanEqual(max(along, against), EVEN * min(along, against));
+    return max(along, most_sides / mix(vec4(BORDER), vec4(rows), even));
+}
+
+// Whether it may reach about as far to opposite sides, of which one is beyond what cells tell.
+bool is_undecided(vec4 along, vec4 against, float most_sides) {
+    vec4 nearer = max(along, against), farther = min(along, against);
+    vec4 both = max(nearer / min(EVEN, most_sides * KNOWN / (0.5 * BORDER)), farther);
+    return any(lessThan(both, vec4(0.5 / KNOWN)));
+}
+
+float least_of(vec4 v) { return min(min(v.x, v.y), min(v.z, v.w)); }
 
 // Four numbers, ascending.
 vec4 sorted(vec4 v) {
@@ -50,27 +75,46 @@ void main() {
 #endif
     vec3 n = texelFetch(normals, int(row)).xyz;
     float len = length(n);
-    n = len > 0.0 && len < UNKNOWN ? n / len : vec3(0.0, 0.0, 1.0);
+    bool has_normal = len > 0.0 && len < UNKNOWN;
+    n = has_normal ? n / len : vec3(0.0, 0.0, 1.0);
     vec3 u = tangent_of(n), v = cross(n, u);
     clear_cell();
+#if LONE
+    float nearest = UNKNOWN, alike = UNKNOWN;  // squared distances to any other point, and to one of as sparse a place
+#endif
     ivec3 cell = cell_of(place);
     for (int z = -1; z <= 1; ++z)
         for (int y = -1; y <= 1; ++y) {
             int run = int(list_of(cell + ivec3(-1, y, z))), last = int(texelFetch(starts, run + 3).r);
             for (int j = int(texelFetch(starts, run).r); j < last; ++j) {
-                vec3 d = (texelFetch(slots, j).xyz - place) / cell_size;
-                bound_cell(vec2(dot(d, u), dot(d, v)) / max(dot(d, d), 1e-30));
+                vec4 other = texelFetch(slots, j);
+                vec3 d = (other.xyz - place) / cell_size;
+                float squared = dot(d, d);
+                bound_cell(vec2(dot(d, u), dot(d, v)) / max(squared, 1e-30));
+#if LONE
+                float reach = texelFetch(found, int(floatBitsToUint(other.w))).r / cell_size * LONE_REACHES;
+                bool is_other = squared > 0.0;
+                nearest = is_other ? min(nearest, squared) : nearest;
+                bool is_alike = is_other && (reach <= 0.0 || squared <= reach * reach);
+                alike = is_alike ? min(alike, squared) : alike;
+#endif
             }
         }
-    vec4 least = min(-lowest[0], highest[0]);
     float most_sides = fourth(-lowest[0], highest[0]);
-    float farthest = min(min(least.x, least.y), min(least.z, least.w));
 #if ENDED
     // Across a line of points both sides are far.
     vec4 across = max(-lowest[0], highest[0]);
+    float farthest = least_of(min(-lowest[0], highest[0]));
     if (farthest < most_sides / BORDER || any(lessThan(across, across.zwxy / BORDER))) return;
 #endif
-    float inverse = max(farthest, most_sides / BORDER);
+    vec4 forth = highest[0], back = -lowest[0];
+    if (has_normal && is_undecided(forth, back, most_sides)) return;
+    float rows = has_normal ? ROWS : BORDER;
+    float inverse = least_of(min(bounded(forth, back, most_sides, rows), bounded(back, forth, most_sides, rows)));
     float reach = 0.5 / max(inverse, 1e-30);
-    if (reach <= KNOWN) radii[row] = reach * cell_size;
+    if (reach > KNOWN) return;
+#if LONE
+    if (alike > ALIKE * ALIKE * nearest) reach = -reach;
+#endif
+    radii[row] = reach * cell_size;
 }
