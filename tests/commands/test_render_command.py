@@ -300,7 +300,7 @@ def test_a_scan_of_broken_frames_alone_is_an_error(out: str, run: Run, tmp_path:
         (tmp_path / "scan" / f"f{index}.ply").write_bytes(b"ply\nformat ascii 1.0\nend_header\n")
     done = run("render", tmp_path / "scan", "-o", tmp_path / out, *SMALL, "--all")
     assert done.code == 2
-    assert done.err.splitlines()[-1].endswith("none of its 3 frames can be read")
+    assert done.err.splitlines()[-1].endswith("none of the 3 frames can be read")
     assert names(tmp_path) == ["scan"]
     assert run("info", tmp_path / "scan").code == 2
 
