@@ -55,7 +55,7 @@ def test_roles_that_lack_an_axis_cannot_open_and_say_why(table: Path) -> None:
     choices.state_role(1, "-")
     read(choices)
     assert not choices.can_open
-    assert "with x, y and z" in choices.problem
+    assert choices.problem == "Choose a column for x."
     assert choices.shown is not None
     assert choices.shown.cells, "the rows stay"
     choices.reset()
@@ -88,10 +88,13 @@ def test_a_refused_table_shows_its_columns_and_opens_with_roles(tmp_path: Path) 
     path.write_text("u,v,w\n" + "".join(f"{i % 9},{i // 9},{i % 4}\n" for i in range(80)))
     choices = read(TableChoices(path, {}))
     assert "names with x, y, z" in choices.problem
+    assert choices.problem.endswith("Choose a column for x, y and z.")
     assert choices.roles == ["-", "-", "-"]
     for column, role in enumerate("xyz"):
         choices.state_role(column, role)
         assert read(choices).can_open == (role == "z")
+    assert choices.names == ["u", "v", "w"]
+    assert choices.summary == "Scan4D reads x, y, z. You change: columns."
     assert open_scan(path, read=choices.corrections).pose(0).count == 80
 
 
@@ -126,8 +129,7 @@ def test_chosen_files_play_in_the_order_of_the_rows(takes: Path) -> None:
     choices.use("bert_1.npy", True)
     choices.use("anna_1.npy", False)
     at = [row.name for row in choices.rows].index("anna_2.npy")
-    choices.move(at, -1)
-    choices.move(at - 1, -1)
+    choices.move(at, -1)  # past anna_1, which is no frame
     assert choices.rows[0].name == "anna_2.npy"
     choices.move(0, -1)
     wanted = ["anna_2.npy", "anna_0.npy", "bert_1.npy"]
@@ -154,6 +156,50 @@ def test_at_least_one_file_plays(takes: Path) -> None:
     choices.reset()
     assert not choices.problem
     assert len(choices.used) == 2
+
+
+def test_several_files_are_chosen_at_once(takes: Path) -> None:
+    names = sorted(path.name for path in takes.iterdir())
+    choices = FrameChoices(takes, names, {})
+    choices.use("anna_1.npy", False)
+    choices.use("bert_0.npy", False, reaches=True)
+    assert names_of(choices) == ["anna_0.npy"]
+    choices.use_all(True)
+    assert names_of(choices) == names
+    choices.use_all(False)
+    assert "at least one" in choices.problem
+    choices.use("bert_1.npy", True)
+    assert not choices.problem
+
+
+def test_the_dialog_shows_the_times_that_scan4d_finds(takes: Path) -> None:
+    names = [f"anna_{number}.npy" for number in range(3)]
+    choices = FrameChoices(takes, names, {})
+    assert choices.time_titles[""] == "automatic: 25 frames per second, assumed"
+    assert choices.summary == "3 of 3 files are frames of the scan, from 0 to 0.08 s. No changes."
+    choices.state_times("fps:10")
+    assert choices.time_titles[""] == "automatic: 25 frames per second, assumed"
+    assert choices.summary.endswith("from 0 to 0.2 s. You change: times.")
+
+
+def test_a_table_of_times_that_is_broken_is_shown_as_a_problem(takes: Path) -> None:
+    (takes / "times.csv").write_text("nothing;here\n")
+    choices = FrameChoices(takes, ["anna_0.npy", "anna_1.npy"], {"times": "fps:10"})
+    assert not choices.problem
+    choices.state_times("")
+    assert "times.csv" in choices.problem
+    choices.state_times("index")
+    assert not choices.problem
+
+
+def test_too_many_lines_to_skip_are_a_problem(table: Path) -> None:
+    choices = read(TableChoices(table, {"skip": "99999999"}))
+    assert "not a value of skip" in choices.problem
+    assert not choices.can_open
+    choices.state("skip", "500")
+    assert not read(choices).can_open
+    choices.state("skip", "0")
+    assert read(choices).can_open
 
 
 def test_times_become_a_correction(takes: Path) -> None:

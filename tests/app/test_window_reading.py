@@ -9,14 +9,17 @@ import pytest
 from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app, stored_of
 
 from viewer import cli
-from viewer.app.panel.reading import choices, explanation, words_on_assumed
-from viewer.scan.reading.record import Decision, Reading, Take
+from viewer.app.panel.reading import as_text, choices, explanation, other_facts, words_on_assumed
+from viewer.document.document import Document
+from viewer.document.saved_session import SavedSession
+from viewer.scan.open import open_scan
+from viewer.scan.reading.record import Aside, Decision, Reading, Take
 
 
 def test_an_assumption_is_explained_with_its_alternatives() -> None:
     decision = Decision("unit", "units", "assumed", "", "The file states none", ("mm", "m"), True)
     lines = explanation(decision)
-    assert lines[0] == "units"
+    assert lines[0] == "not known"
     assert "Source: assumed" in lines
     assert "The file states none" in lines
     assert [line for line in lines if "what you measure may be wrong" in line]
@@ -45,10 +48,42 @@ def test_a_list_offers_the_alternatives_first_and_no_value_twice() -> None:
     assert choices(Decision("normals", "stored"), Reading()) == ["none"]
 
 
+def test_values_are_shown_in_words_and_typed_as_the_command_line_takes_them() -> None:
+    for decision, words, text in (
+        (Decision("times", "fps:25", "assumed"), "25 frames per second", "fps:25"),
+        (Decision("times", "stored"), "stored", "stored"),
+        (Decision("decimal", ","), "comma", ","),
+        (Decision("columns", ["x", "y", "z"]), "x y z", "x y z"),
+        (Decision("frames", "3 files, a.ply to c.ply", "folder"), "3 files, a.ply to c.ply", "*"),
+        (Decision("frames", "a.ply;b.ply", "user", "--read"), "a.ply;b.ply", "a.ply;b.ply"),
+        (Decision("normals", "dropped"), "dropped", ""),
+        (
+            Decision("camera", {"fx": 290.0, "fy": 291.0, "cx": 1.5, "cy": 2.5, "kind": "z"}),
+            "fx 290, fy 291, cx 1.5, cy 2.5",
+            "290,291,1.5,2.5",
+        ),
+    ):
+        assert (decision.shown, as_text(decision)) == (words, text)
+
+
+def test_many_files_left_aside_are_a_few_facts() -> None:
+    takes = tuple(Aside(f"bert_{i}.ply", "another take: bert") for i in range(900))
+    copies = tuple(Aside(f"a{i} - Copy.ply", f"copy of a{i}.ply") for i in range(9))
+    facts = other_facts(Reading(aside=takes + copies))
+    assert [fact.text for fact in facts] == [
+        "900 files (another take: bert)",
+        "a0 - Copy.ply (copy of a0.ply)",
+        "a1 - Copy.ply (copy of a1.ply)",
+        "and 7 more",
+    ]
+    assert facts[0].help.splitlines()[-1] == "and 880 more"
+    assert len(facts[-1].help.splitlines()) == 7
+
+
 def test_only_assumptions_that_change_numbers_are_marked() -> None:
     assert words_on_assumed(Reading.of(Decision("axes", "unknown", "assumed"))) == ""
     unit = Decision("unit", "units", "assumed", changes_numbers=True)
-    assert "unit units" in words_on_assumed(Reading.of(unit))
+    assert "unit not known" in words_on_assumed(Reading.of(unit))
 
 
 @pytest.fixture
@@ -119,7 +154,7 @@ def test_a_camera_is_corrected_and_one_that_fails_is_taken_back(
         assert state.extent != before.extent
         assert (screen.picture() != picture).any()
         type_into(app, "camera", "none.txt")
-        app.see(lambda state: any("Cannot open" in note for note in state.shown_notes))
+        app.see(lambda state: any("with this correction" in note for note in state.shown_notes))
         after = app.settle()
         assert after.document["reading"] == {"camera": "20,20,19.5,14.5"}
         assert after.extent == state.extent
@@ -130,7 +165,9 @@ def test_a_camera_is_corrected_and_one_that_fails_is_taken_back(
 def test_columns_are_corrected_with_the_keyboard_alone(screen: Screen, tmp_path: Path, table: Path) -> None:
     with running_app(screen, tmp_path, table) as app:
         app.press("F6", "Home", "Return", "Tab", "Return")  # closes the section Scan, opens the next one
-        app.press(*["Tab"] * 5, "Return")  # encoding, separator, decimal mark, lines to skip, columns
+        app.press(
+            *["Tab"] * 6, "Return"
+        )  # the button, encoding, separator, decimal mark, lines to skip, columns
         assert app.settle().lists == 1
         app.press("End", "Return")  # "Other..."
         app.screen.do("key", "ctrl+a", "type", "--delay", "30", "--", "- x y z")
@@ -154,3 +191,104 @@ def test_a_replay_reads_the_scan_as_its_picture_did(screen: Screen, tmp_path: Pa
         assert app.settle().document["reading"] == {"columns": "- x y z"}
         app.screen.do("key", "ctrl+z")
         app.see(lambda state: state.extent[0] < 1.5)
+
+
+@pytest.fixture
+def sequence(tmp_path: Path) -> Path:
+    """Four frames of a surface, as tables whose last three columns are the positions."""
+    x, y = (side.ravel() for side in np.meshgrid(np.linspace(0, 2, 20), np.linspace(0, 3, 20)))
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    for number in range(4):
+        z = 0.3 * np.sin(x + y + 0.1 * number)
+        rows = np.stack([0.5 * np.sin(5 * x), x, y, z], axis=1)
+        np.savetxt(folder / f"f{number}.txt", np.random.default_rng(7).permutation(rows))
+    return folder
+
+
+@pytest.mark.slow
+def test_the_work_on_a_scan_survives_corrections_and_their_undo(
+    screen: Screen, tmp_path: Path, sequence: Path
+) -> None:
+    """The frames become fewer than those that the work is on, and a correction fails."""
+    with running_app(screen, tmp_path, sequence) as app:
+        app.act(PANEL, ("item_open", "How this was read"))
+        type_into(app, "columns", "- x y z")
+        app.see(lambda state: state.extent and state.extent[0] > 1.9)
+        app.settle()
+        app.press("End", "ctrl+b", "m")
+        left, top, width, height = app.view()
+        for right in (0, 60):
+            app.do(("mousemove", left + width // 2 + right, top + height // 2, "click", 1))
+            app.settle()
+        app.press("Escape")
+        work = app.see(lambda state: state.distances and not state.works)
+        type_into(app, "frames", "f0.txt;f1.txt")
+        app.see(lambda state: state.record["frames"]["source"] == "user")
+        for state in (app.settle(), app.press("ctrl+z"), app.press("ctrl+y")):
+            assert state.document["bookmarks"] == work.document["bookmarks"]
+            assert state.document["parts"] == work.document["parts"]
+        type_into(app, "frames", "gone.txt")
+        app.told("with this correction, and removes it: no file matches")
+        state = app.settle()
+        assert state.document["reading"] == {"columns": "- x y z", "frames": "f0.txt;f1.txt"}
+        assert state.document["parts"] == work.document["parts"]
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_corrections_in_a_row_while_it_plays_all_apply_and_fit_the_view(
+    screen: Screen, tmp_path: Path, sequence: Path
+) -> None:
+    with running_app(screen, tmp_path, sequence) as app:
+        app.settle()
+        app.act(PANEL, ("item_open", "How this was read"))
+        app.screen.do("key", "space")
+        app.see(is_playing=True)
+        app.choose(PANEL, "How this was read/columns/##value", "Other...")
+        app.take_in()
+        app.take_in()
+        app.screen.do("key", "ctrl+a", "type", "--delay", "30", "--", "- x y z")
+        app.screen.do("key", "Return")
+        app.choose(PANEL, "How this was read/times/##value", "###fps:50")
+        app.choose(PANEL, "How this was read/axes/##value", "###RAS")
+        app.see(lambda state: state.record["axes"]["source"] == "user")
+        state = app.settle()
+        assert state.document["reading"] == {"columns": "- x y z", "times": "fps:50", "axes": "RAS"}
+        assert state.camera["target"][:2] == pytest.approx([1, 1.5], rel=0.1)
+        assert state.scan_rate == 50
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_a_correction_is_stored_though_another_scan_opens_at_once(
+    screen: Screen, tmp_path: Path, sequence: Path, table: Path
+) -> None:
+    with running_app(screen, tmp_path, sequence) as app:
+        app.settle()
+        app.act(PANEL, ("item_open", "How this was read"))
+        app.choose(PANEL, "How this was read/axes/##value", "###RAS")
+        app.drop(table)
+        app.see(scan=str(table))
+        assert app.settle().document["reading"] == {}
+        app.drop(sequence)
+        app.see(scan=str(sequence))
+        assert app.settle().record["axes"]["value"] == "RAS"
+        record = app.state.record
+        app.screen.do("key", "ctrl+q")
+        app.process.wait(PATIENCE)
+    with running_app(screen, tmp_path, sequence) as app:
+        assert app.settle().record == record
+    assert "Traceback" not in app.log()
+
+
+def test_the_command_line_reads_as_the_window_does(tmp_path: Path, sequence: Path) -> None:
+    """A correction in a stored document, and the same as `--read`."""
+    texts = {"columns": "- x y z", "times": "fps:50", "axes": "RAS"}
+    stated = open_scan(sequence, read=texts)
+    document = Document(reading=texts)
+    saved = SavedSession.from_json(SavedSession(str(sequence), None, 0, document).to_json(), "x")
+    stored = open_scan(sequence, read=saved.document.reading)
+    for timeline in (stated, stored):
+        timeline.pose(0)
+    assert stored.reading == stated.reading

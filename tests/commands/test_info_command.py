@@ -59,7 +59,7 @@ def test_info_says_how_it_read_the_scan(run: Run, tmp_path: Path) -> None:
     table.write_text("1 2 3\n4 5 6\n7 8 10\n")
     short = run("info", table).out
     assert "columns x y z" in re.search("^read as .*$", short, re.M)[0]  # type: ignore[index]
-    assert "unit units" in re.search("^assumed .*$", short, re.M)[0]  # type: ignore[index]
+    assert "unit not known" in re.search("^assumed .*$", short, re.M)[0]  # type: ignore[index]
     assert "how Scan4D read" not in short
     assert "Alternatives: mm, m, cm" in run("info", table, "--verbose").out
     record = json.loads(run("info", table, "--json").out)["reading"]

@@ -22,6 +22,7 @@ from . import theme
 
 T = TypeVar("T")
 _LABEL_SHARE = 0.46  # of the width
+_LABEL, _FIELD = 9.0, 22.0  # widths in a wide dialog, in heights of the font
 _DIALOG_WIDTH = 34.0  # in heights of the font
 _DOT = 0.2  # radius of a mark on an assumption, in heights of the font
 _DECADES = 100.0  # ratio of the limits from which a slider is logarithmic
@@ -193,6 +194,17 @@ def label(text: str, help: str = "", gutter: float = 0.0) -> None:
     if width >= _NARROW * imgui.get_font_size():
         imgui.same_line(max(imgui.get_cursor_start_pos().x + width * _LABEL_SHARE, end))
     imgui.set_next_item_width(-1 - gutter)
+
+
+def dialog_label(text: str, help: str = "") -> None:
+    """A text at the left of a row of a wide dialog; the next widget beside it is as wide as a few words."""
+    em = imgui.get_font_size()
+    imgui.align_text_to_frame_padding()
+    imgui.text(text)
+    if help:
+        tooltip(help)
+    imgui.same_line(_LABEL * em)
+    imgui.set_next_item_width(min(_FIELD * em, imgui.get_content_region_avail().x))
 
 
 def same_line(width: float) -> None:

@@ -8,6 +8,7 @@ import itertools
 import os
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -288,7 +289,10 @@ def scan_frames(files: Sequence[Path], decided: Decided) -> list[Path]:
     named = {file.relative_to(folder).as_posix(): file for file in files}
     frames = deciding_frames.decide(list(named), decided.corrections)
     takes = deciding_takes.decide(frames.names, decided.corrections)
-    decided.replace(frames.decision, takes.decision)
+    chosen = frames.decision
+    if takes.aside and chosen.source != "user":
+        chosen = replace(chosen, value=deciding_frames.counted(takes.names))
+    decided.replace(chosen, takes.decision)
     decided.leave_aside(*frames.aside, *takes.aside)
     decided.note_takes(takes.takes)
     if words := deciding_frames.message_of_files(frames):

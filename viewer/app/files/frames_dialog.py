@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from ...errors import InputError
 from ...files import printable
 from ...scan.reading.corrections import Corrections
 from ...scan.reading.frames import LIST
+from ...scan.reading.record import KEYS, Decision
 from ...scan.reading.takes import ALL, FileRow, split
 from ...scan.sources import FileSequence
 from ...scan.timeline import Timeline
@@ -22,17 +23,19 @@ from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
 
 TITLE = "Choose frames"
+CHOOSE_FRAMES = f"{TITLE}..."  # the command, and the buttons that do the same
 AUTO = ""  # times as Scan4D finds them
 RATE, FILE = "fps", "file"
 TIMES = {
     AUTO: "automatic",
     "names": "from the file names",
-    "index": "25 frames/s",
-    RATE: "a rate",
-    FILE: "a file",
+    "index": "25 frames per second, without gaps",
+    RATE: "another rate",
+    FILE: "from a file",
 }
-_SIZE = ImVec2(46.0, 34.0)  # in heights of the font
-_COLUMNS = (("File", 0.0), ("Take", 6.0), ("Time", 6.0), ("Why not", 10.0), ("Order", 4.5))
+_SIZE = ImVec2(52.0, 34.0)  # in heights of the font
+_NARROW = 40.0  # width of the table, likewise, below which it has no column of takes
+_FILE, _TAKE, _TIME, _WHY, _ORDER = "File", "Take", "Time", "Left aside", "Order"  # titles of columns
 
 
 class FrameChoices:
@@ -51,10 +54,13 @@ class FrameChoices:
         self._before = {key: text for key, text in texts.items() if key in self.KEYS}
         self._texts = dict(self._before)
         self.problem = ""
-        self._takes = split(folder, names).takes
-        self._take_of = {row.name: row.take for row in split(folder, names).files}
+        whole = split(folder, names, Corrections.parse({"times": "index"}))  # so that it reads no times.csv
+        self._takes = whole.takes
+        self._take_of = {row.name: row.take for row in whole.files}
         self.rows: list[FileRow] = []
         self.used: set[str] = set()
+        self._last: str | None = None  # the file that the user chose or left aside last
+        self._found_times = ""  # those that Scan4D finds, in words
         self._look()
         listed = [name for name in self._texts.get("frames", "").split(LIST) if name]
         if LIST in self._texts.get("frames", ""):
@@ -63,12 +69,14 @@ class FrameChoices:
     def _look(self) -> None:
         """Find the rows anew. Choices that are unusable leave them as they are."""
         try:
-            found = split(self.folder, self._names, Corrections.parse(self._texts)).files
+            found = split(self.folder, self._names, Corrections.parse(self._texts))
         except InputError as error:
             self.problem = str(error)
             return
         self.problem = ""
-        rows = {row.name: row._replace(take=self._take_of[row.name]) for row in found}
+        if "times" not in self._texts:
+            self._found_times = _times_in_words(found.times)
+        rows = {row.name: row._replace(take=self._take_of[row.name]) for row in found.files}
         if "frames" in self._texts and self.rows:
             rows = {row.name: rows[row.name] for row in self.rows}
         self.rows = list(rows.values())
@@ -88,6 +96,11 @@ class FrameChoices:
         if not self._takes or "frames" in self._texts:
             return ""
         return self._texts.get("take") or self._takes[0].name
+
+    @property
+    def time_titles(self) -> dict[str, str]:
+        """Kind -> title of each kind of times. The first one says what Scan4D finds, where that is known."""
+        return {**TIMES, AUTO: ": ".join(filter(None, (TIMES[AUTO], self._found_times)))}
 
     @property
     def times(self) -> str:
@@ -117,17 +130,37 @@ class FrameChoices:
         """Correct the times, as `--read times` takes them; empty: as Scan4D finds them."""
         self._state("times", text)
 
-    def use(self, name: str, is_used: bool) -> None:
-        """Use a file as a frame, or leave it aside."""
-        self.used = self.used | {name} if is_used else self.used - {name}
+    def use(self, name: str, is_used: bool, *, reaches: bool = False) -> None:
+        """Use a file as a frame, or leave it aside. reaches: also all files from the one that was chosen or
+        left aside last."""
+        names = [row.name for row in self.rows]
+        first = names.index(self._last) if reaches and self._last in names else names.index(name)
+        low, high = sorted((first, names.index(name)))
+        several = {*names[low : high + 1]}
+        self._last = name
+        self.used = self.used | several if is_used else self.used - several
         self._list()
 
+    def use_all(self, is_used: bool) -> None:
+        """Use all files as frames, or leave all aside."""
+        self.used = {row.name for row in self.rows} if is_used else set()
+        self._list()
+
+    def can_move(self, at: int, by: int) -> bool:
+        """Whether the frame of a row can play one earlier (-1) or later (1)."""
+        return self.rows[at].name in self.used and self._neighbour(at, by) is not None
+
     def move(self, at: int, by: int) -> None:
-        """Move a row up or down."""
-        to = at + by
-        if 0 <= to < len(self.rows):
-            self.rows[at], self.rows[to] = self.rows[to], self.rows[at]
+        """Have the frame of a row play one earlier (-1) or later (1)."""
+        to = self._neighbour(at, by)
+        if to is not None and self.can_move(at, by):
+            self.rows.insert(to, self.rows.pop(at))
             self._list()
+
+    def _neighbour(self, at: int, by: int) -> int | None:
+        """The row of the next frame before (-1) or after (1) a row."""
+        after = range(at + by, len(self.rows) if by > 0 else -1, by)
+        return next((row for row in after if self.rows[row].name in self.used), None)
 
     def _list(self) -> None:
         names = [row.name for row in self.rows if row.name in self.used]
@@ -142,6 +175,18 @@ class FrameChoices:
         self._texts = {}
         self._look()
 
+    @property
+    def summary(self) -> str:
+        """How many files are frames, how long they play, and what the user changes with these choices."""
+        times = [row.time for row in self.rows if row.time is not None]
+        ends = f", from {min(times):.6g} to {max(times):.6g} s" if len(times) > 1 else ""
+        changed = [key for key in self.KEYS if self._texts.get(key) != self._before.get(key)]
+        changes = ", ".join(KEYS[key].lower() for key in changed)
+        return (
+            f"{len(self.used)} of {len(self.rows)} files are frames of the scan{ends}. "
+            + (f"You change: {changes}." if changes else "No changes.")
+        )  # fmt: skip
+
     def _state(self, key: str, text: str) -> None:
         self._texts.pop(key, None)
         if text:
@@ -152,6 +197,15 @@ class FrameChoices:
     def corrections(self) -> dict[str, str]:
         """Corrections by key; an empty text ends a correction that held before."""
         return {**dict.fromkeys(self._before, ""), **self._texts}
+
+
+def _times_in_words(times: Decision) -> str:
+    """Times that Scan4D finds, and where: "25 frames per second, assumed"."""
+    if times.value is None:
+        return ""
+    if times.source == "neighbour" or times.value in ("names", "stored"):
+        return times.shown_source
+    return f"{times.shown}, {times.shown_source}"
 
 
 def files_of_scan(timeline: Timeline) -> tuple[Path, list[str]] | None:
@@ -214,7 +268,7 @@ class FramesDialog(WindowPart):
         if choices.problem:
             imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(choices.problem)}")
         else:
-            imgui.text_disabled(f"{len(choices.used)} of {len(choices.rows)} files are frames of the scan.")
+            widgets.faint(choices.summary)
         imgui.begin_disabled(bool(choices.problem))
         if imgui.is_window_appearing():
             imgui.set_keyboard_focus_here()
@@ -233,40 +287,42 @@ class FramesDialog(WindowPart):
         elif leaves:
             self.choices = None
 
-    COMMANDS = (Command("read_folder", "Choose frames...", ask, when="sequence of files"),)
+    COMMANDS = (Command("read_folder", CHOOSE_FRAMES, ask, when="sequence of files"),)
 
 
 def _draw_choices(choices: FrameChoices) -> None:
     """Declare the take, the times, and the files."""
     imgui.text_wrapped(printable(str(choices.folder)))
     if choices.takes:
-        widgets.label("Take", "The folder holds several scans, and each scan has its own frame numbers")
-        take = widgets.combo("take", choices.take, list(choices.takes), {"": "chosen files", **choices.takes})
+        widgets.dialog_label(
+            "Take", "The folder holds several scans, and each scan has its own frame numbers"
+        )
+        titles = {"": "chosen files", **{name: printable(title) for name, title in choices.takes.items()}}
+        take = widgets.combo("take", choices.take, list(choices.takes), titles)
         if take != choices.take:
             choices.state_take(take)
     _draw_times(choices)
-    extra = 0.0
-    if choices.problem:
-        room = imgui.get_content_region_avail().x
-        extra = imgui.calc_text_size(f"     {choices.problem}", wrap_width=room).y
-    foot = extra + imgui.get_text_line_height_with_spacing() + imgui.get_frame_height_with_spacing()
-    _draw_files(choices, -foot)
+    room = imgui.get_content_region_avail().x
+    text = f"     {choices.problem}" if choices.problem else choices.summary
+    foot = imgui.calc_text_size(printable(text), wrap_width=room).y + 2 * imgui.get_style().item_spacing.y
+    _draw_files(choices, -(foot + imgui.get_frame_height()))
 
 
 def _draw_times(choices: FrameChoices) -> None:
     """Declare the kind of times, and the field that goes with it."""
-    widgets.label("Times", "When each frame happens")
-    kind = widgets.combo("times", choices.times, list(TIMES), TIMES)
+    widgets.dialog_label("Times", "When each frame happens")
+    titles = {kind: printable(title) for kind, title in choices.time_titles.items()}
+    kind = widgets.combo("times", choices.times, list(TIMES), titles)
     if kind != choices.times:
         texts = {RATE: f"fps:{choices.rate:g}", FILE: choices.times_file}
         choices.state_times(texts.get(kind, kind))
     if choices.times == RATE:
-        widgets.label("Frames per second")
+        widgets.dialog_label("Frames per second")
         changed, rate = imgui.input_float("##rate", choices.rate, 1.0, 10.0, "%.6g")
         if changed and rate > 0:
             choices.state_times(f"fps:{rate:.6g}")
     elif choices.times == FILE:
-        widgets.label(
+        widgets.dialog_label(
             "File of times",
             "A table in this folder. Each row: a file name or an index, and its time in seconds",
         )
@@ -278,42 +334,66 @@ def _draw_times(choices: FrameChoices) -> None:
 def _draw_files(choices: FrameChoices, height: float) -> None:
     """Declare all files. height: negative, from the foot."""
     flags = imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_outer | imgui.TableFlags_.borders_inner_h
-    if not imgui.begin_table("files", len(_COLUMNS), flags, ImVec2(0, height)):
+    flags |= imgui.TableFlags_.resizable
+    columns = _columns(choices)
+    if not imgui.begin_table("files", len(columns), flags, ImVec2(0, height)):
         return
     em = imgui.get_font_size()
-    for title, width in _COLUMNS:
+    for title, width in columns.items():
         kind = imgui.TableColumnFlags_.width_fixed if width else imgui.TableColumnFlags_.width_stretch
         imgui.table_setup_column(title, kind, width * em)
     imgui.table_setup_scroll_freeze(0, 1)
-    imgui.table_headers_row()
+    imgui.table_next_row(imgui.TableRowFlags_.headers)
+    imgui.table_next_column()
+    toggled, is_used = imgui.checkbox(f"{_FILE}###all", len(choices.used) == len(choices.rows))
+    widgets.tooltip("Choose all files, or none. Shift and a click on a file choose several files.")
+    if toggled:
+        choices.use_all(is_used)
+    for title in [*columns][1:]:
+        imgui.table_next_column()
+        imgui.align_text_to_frame_padding()
+        imgui.text_unformatted(title)
     clipper = imgui.ListClipper()
     clipper.begin(len(choices.rows))
     while clipper.step():
         for at in range(clipper.display_start, clipper.display_end):
-            imgui.push_id(at)
-            _draw_file(choices, at)
+            imgui.push_id(choices.rows[at].name)
+            _draw_file(choices, at, columns)
             imgui.pop_id()
     imgui.end_table()
 
 
-def _draw_file(choices: FrameChoices, at: int) -> None:
+def _columns(choices: FrameChoices) -> dict[str, float]:
+    """Title -> width of each column, in heights of the font; 0: what is left."""
+    is_wide = imgui.get_content_region_avail().x > _NARROW * imgui.get_font_size()
+    takes = {_TAKE: 8.0} if choices.takes and is_wide else {}
+    why = {_WHY: 0.0} if len(choices.used) < len(choices.rows) else {}
+    return {_FILE: 0.0, **takes, _TIME: 6.0, **why, _ORDER: 4.5}
+
+
+def _draw_file(choices: FrameChoices, at: int, columns: Collection[str]) -> None:
     """Declare the row of one file."""
     row = choices.rows[at]
     is_used = row.name in choices.used
     imgui.table_next_row()
     imgui.table_next_column()
     toggled, wanted = imgui.checkbox(widgets.labelled(printable(row.name), row.name), is_used)
+    widgets.tooltip(printable(row.name if is_used else f"{row.name}\nLeft aside: {row.why}"))
     if toggled:
-        choices.use(row.name, wanted)
-    imgui.table_next_column()
-    imgui.text_unformatted(printable(row.take))
+        choices.use(row.name, wanted, reaches=imgui.get_io().key_shift)
+    if _TAKE in columns:
+        imgui.table_next_column()
+        imgui.text_unformatted(printable(row.take))
     imgui.table_next_column()
     imgui.text_unformatted("" if row.time is None or not is_used else f"{row.time:.6g} s")
+    if _WHY in columns:
+        imgui.table_next_column()
+        imgui.text_disabled("" if is_used else printable(row.why))
     imgui.table_next_column()
-    imgui.text_unformatted("" if is_used else printable(row.why))
-    imgui.table_next_column()
-    if widgets.flat_button(icons.ICON_FA_ARROW_UP, "Earlier"):
-        choices.move(at, -1)
-    imgui.same_line()
-    if widgets.flat_button(icons.ICON_FA_ARROW_DOWN, "Later"):
-        choices.move(at, 1)
+    for by, icon, help in ((-1, icons.ICON_FA_ARROW_UP, "Earlier"), (1, icons.ICON_FA_ARROW_DOWN, "Later")):
+        imgui.begin_disabled(not choices.can_move(at, by))
+        if widgets.flat_button(icon, help):
+            choices.move(at, by)
+        imgui.end_disabled()
+        imgui.same_line()
+    imgui.new_line()

@@ -17,21 +17,24 @@ from ...files import printable
 from ...scan.listing import is_there
 from ...scan.open import DEMO, open_scan
 from ...scan.pose import Pose
+from ...scan.reading.frames import USE_ALL
 from ...scan.reading.record import Take
 from ...scan.reading.takes import ALL
-from ...scan.timeline import Timeline
+from ...scan.timeline import ScanMessage, Timeline
 from ...task import Task, in_background
 from ..notices import Notices, Offer, Problem, Refusal
 from ..part import Parts, WindowPart
 from ..playing.playback import Playback
 from ..session import Session, known_as
 from ..window import Window
+from .frames_dialog import CHOOSE_FRAMES
 from .opening import Opened, Opening, Way, find_facts, find_stored
 from .same_content import offer_of_change, offer_of_stored
 from .scans import title
-from .table_dialog import is_table
+from .table_dialog import READ_TABLE, is_table
 
 log = logging.getLogger(__name__)
+CANNOT_OPEN = "Cannot open: "
 _MOST_TAKES = 12  # that have a button
 
 
@@ -63,6 +66,7 @@ class Opener(WindowPart):
     open_with: Callable[..., None]
     offer_to_locate: Callable[..., None]
     ask_for_table: Callable[..., None]
+    ask_for_frames: Callable[[], None]
     correct_reading: Callable[[Mapping[str, str]], None]
     after: Callable[[str], str | None]
     abandon: Callable[[], None]
@@ -116,7 +120,7 @@ class Opener(WindowPart):
         except Scan4DError as error:
             if not self._has_begun and asked is not None:  # else nothing would be shown
                 self.open(self.after(asked) or DEMO)
-            self.refuse(self._refusal(f"Cannot open: {error}", asked), asked)
+            self.refuse(self._refusal(f"{CANNOT_OPEN}{error}", asked), asked)
             return
         if opened is not None:
             scan, begun = opened
@@ -204,8 +208,16 @@ class Opener(WindowPart):
             self._messages_read = len(self.playback.timeline.messages)
             return
         for message in messages:
-            takes = self.playback.timeline.reading.takes
-            self.notices.tell_of_scan(self._offer_of_takes(takes) if message.kind == "take" else message.text)
+            self.notices.tell_of_scan(self._shown(message))
+
+    def _shown(self, message: ScanMessage) -> str:
+        """A report about the open scan as the window shows it: with buttons where the user has a choice."""
+        if message.kind == "take":
+            return self._offer_of_takes(self.playback.timeline.reading.takes)
+        if message.kind == "aside":
+            choices = {CHOOSE_FRAMES: self.ask_for_frames}
+            return Offer(message.text.removesuffix(USE_ALL), choices, "aside")
+        return message.text
 
     def _offer_of_takes(self, takes: Sequence[Take]) -> Offer:
         """The message that the folder of the open scan holds several, with a button for each."""
@@ -234,8 +246,9 @@ class Opener(WindowPart):
         """A problem with a scan; of a text table it offers to state how Scan4D reads that."""
         if scan is None or not is_table(scan) or not os.path.isfile(scan):
             return problem
-        ask = partial(self.ask_for_table, scan)
-        return Refusal(problem, {"Read table...": ask}, "refusal")
+        is_open = known_as(scan) == known_as(self.session.scan)
+        ask = partial(self.ask_for_table, None if is_open else scan)
+        return Refusal(problem, {READ_TABLE: ask}, "refusal")
 
     def refuse(self, problem: str, scan: object = None) -> None:
         """Show why what the user asked for was not opened: in the dialog, where that waits for it.

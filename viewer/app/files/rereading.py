@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from ...scan.reading.corrections import Corrections
 from ...scan.reading.record import KEYS, Decision, Reading
 from ...scan.units import checked_unit
+from ..notices import Offer, Problem, Refusal
 from ..part import WindowPart
 from ..playing.playback import Playback
 from ..scene.steering import Steering
 from ..session import Session, known_as
-from .opener import Opener
+from .opener import CANNOT_OPEN, Opener
 
 log = logging.getLogger(__name__)
 
@@ -34,6 +35,7 @@ class Rereading(WindowPart):
     playback: Playback
     opener: Opener
     steering: Steering
+    note_of_opening: Callable[[str], None]
 
     def __post_init__(self) -> None:
         self._asked: Mapping[str, str] | None = None  # the corrections that it is being opened with
@@ -94,8 +96,8 @@ class Rereading(WindowPart):
     def advance(self, now: float) -> None:
         """Open the scan anew where its document has other corrections than it was opened with."""
         wanted, job = self.session.document.reading, self.opener.job
-        if job.scan is None:
-            self._asked = None
+        if job.scan is None or known_as(job.scan) != known_as(self.session.scan):
+            self._asked = None  # nothing is opened, or another scan
         if wanted in (self.opener.reading, self._asked) or (job.scan is not None and self._asked is None):
             return
         self._refits = self.steering.is_at_first
@@ -104,14 +106,21 @@ class Rereading(WindowPart):
         self._asked = wanted
 
     def refused(self, problem: str) -> bool:
-        """Take back the corrections that the scan cannot be read with."""
-        if self._asked is not None:
-            self._asked = None
-            if self.session.history.undoes == self._step:
-                self.session.history.undo()
-            if self.session.document.reading != self.opener.reading:
-                self.session.change("Take the correction back", reading=self.opener.reading)
-        return False
+        """Take back the corrections that the scan cannot be read with, and show why; whether there are any."""
+        if self._asked is None:
+            return False
+        self._asked = None
+        if self.session.history.undoes == self._step:
+            self.session.history.undo()
+        if self.session.document.reading != self.opener.reading:
+            self.session.change("Take the correction back", reading=self.opener.reading)
+        why = problem.removeprefix(CANNOT_OPEN)
+        text = f"Scan4D cannot read the scan with this correction, and removes it: {why}"
+        if isinstance(problem, Offer):
+            self.note_of_opening(Refusal(text, problem.choices, problem.about))
+        else:
+            self.note_of_opening(Problem(text))
+        return True
 
     def begin_scan(self, timeline: object) -> None:
         """Take in that a scan was opened."""

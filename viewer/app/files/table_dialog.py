@@ -15,7 +15,8 @@ from ...errors import InputError
 from ...files import printable
 from ...scan.formats.text import SUFFIXES
 from ...scan.reading.corrections import ROLES, Corrections
-from ...scan.reading.tables import TablePreview, preview
+from ...scan.reading.record import KEYS
+from ...scan.reading.tables import UNREAD, TablePreview, preview, split_names
 from ...task import Task, in_background
 from .. import widgets
 from ..commands import Command
@@ -23,21 +24,34 @@ from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
 
 TITLE = "Read table"
+READ_TABLE = f"{TITLE}..."  # the command, and the buttons that do the same
 AUTO = "auto"  # choice that leaves a decision to Scan4D
+ENCODINGS = {"utf-8": "UTF-8", "utf-16": "UTF-16", "latin-1": "Latin-1 (Western European)"}
 SEPARATORS = {
     "blank": "blanks", "tab": "tabs", "comma": "commas", "semicolon": "semicolons", "bar": "bars",
 }  # fmt: skip
 DECIMALS = {".": "point (1.5)", ",": "comma (1,5)"}
-_ROLE_TITLES = {
+ROLE_TITLES = {
     "-": "not read",
+    "nx": "normal x",
+    "ny": "normal y",
+    "nz": "normal z",
     "r": "red",
     "g": "green",
     "b": "blue",
     "a": "alpha",
+    "number": "point number",
+    "row": "grid row",
+    "column": "grid column",
+    "frame": "frame",
+    "time": "time",
+    "id": "point id",
 }
+AXES = ("x", "y", "z")
+_MOST_SKIPPED = 1 << 16  # lines
 _SIZE = ImVec2(52.0, 34.0)  # in heights of the font
 _MOST_COLUMNS = 60  # that the dialog shows
-_COLUMN = 6.5  # width, in heights of the font
+_COLUMN = 8.0  # width, in heights of the font
 _LINES_ABOVE = 4  # that are shown at once
 
 
@@ -53,10 +67,10 @@ class TableChoices:
     the table is with these; None until it was read. problem: why the choices are unusable; empty if usable.
     """
 
-    KEYS = ("columns", "separator", "decimal", "skip")
+    KEYS = ("columns", "separator", "decimal", "encoding", "skip")
 
     def __init__(self, path: Path, texts: Mapping[str, str]) -> None:
-        """texts: corrections that hold now, also those of other keys, such as the encoding."""
+        """texts: corrections that hold now, also those of other keys, such as the unit."""
         self.path = path
         self._others = {key: text for key, text in texts.items() if key not in self.KEYS}
         self._before = {key: text for key, text in texts.items() if key in self.KEYS}
@@ -96,6 +110,22 @@ class TableChoices:
         return [*found, *["-"] * width][:width]
 
     @property
+    def names(self) -> list[str]:
+        """What the last line above the rows calls the columns; empty where it has another number of words."""
+        if self.shown is None or not self.shown.cells or not 0 < self.shown.skip <= len(self.shown.lines):
+            return []
+        words = split_names(self.shown.lines[self.shown.skip - 1])
+        return words if len(words) == len(self.shown.cells[0]) > 1 else []
+
+    @property
+    def summary(self) -> str:
+        """What Scan4D reads from each row, and what the user changes with these choices."""
+        read = [ROLE_TITLES.get(role, role) for role in self.roles if role not in UNREAD]
+        changed = [key for key in self.KEYS if self.texts.get(key) != self._before.get(key)]
+        changes = ", ".join(KEYS[key].lower() for key in changed)
+        return f"Scan4D reads {', '.join(read)}. " + (f"You change: {changes}." if changes else "No changes.")
+
+    @property
     def can_open(self) -> bool:
         """Whether Scan4D can read the table with these choices."""
         return self.shown is not None and not self.problem and not self.waits
@@ -111,13 +141,15 @@ class TableChoices:
         return self._reading is not None
 
     def _look(self) -> None:
-        try:
-            corrections = Corrections.parse({**self._others, **self.texts})
-            self.problem = ""
-        except InputError as error:  # roles that are not whole yet: the rows are still shown
-            self.problem = error.hint or str(error)
-            rest = {key: text for key, text in self.texts.items() if key != "columns"}
-            corrections = Corrections.parse({**self._others, **rest})
+        """Read the table with those texts that are usable: roles may not be whole yet."""
+        usable: dict[str, str] = {}
+        self.problem = ""
+        for key, text in {**self._others, **self.texts}.items():
+            try:
+                usable |= Corrections.parse({key: text}).texts
+            except InputError as error:
+                self.problem = "" if key == "columns" else str(error)
+        corrections = Corrections.parse(usable)
         self._reading = in_background(Task("Reading"), partial(preview, self.path, corrections))
 
     def advance(self) -> bool:
@@ -130,8 +162,24 @@ class TableChoices:
         except InputError as error:
             self.shown, self.problem = None, str(error)
         else:
-            self.problem = self.problem or self.shown.problem
+            self.problem = self.problem or self._why_not(self.shown)
         return True
+
+    def _why_not(self, shown: TablePreview) -> str:
+        """Why Scan4D cannot read the table so, and what the user can do; empty where it can."""
+        reason = f"{shown.problem[:1].upper()}{shown.problem[1:]}. " if shown.problem else ""
+        lacking = [axis for axis in AXES if axis not in self.roles]
+        has_columns = max(map(len, shown.cells), default=0) >= len(AXES)
+        if lacking and has_columns:
+            given = "columns" in self.texts
+            what = f"Choose a column for {_listed(lacking)}."
+            return what if given else reason + what
+        return reason.strip()
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Words in a sentence: "x, y and z"."""
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 @dataclass(eq=False)
@@ -198,8 +246,8 @@ class TableDialog(WindowPart):
         """Declare the problem and the buttons."""
         if choices.problem:
             imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(choices.problem)}")
-        elif choices.shown is not None:
-            imgui.text_disabled("Scan4D reads the rows of this table as points.")
+        else:
+            widgets.faint(printable(choices.summary))
         imgui.begin_disabled(not choices.can_open)
         if self._takes_keyboard and choices.can_open:
             imgui.set_keyboard_focus_here()
@@ -218,7 +266,7 @@ class TableDialog(WindowPart):
         elif leaves:
             self.choices = None
 
-    COMMANDS = (Command("read_table", "Read table...", ask, when="text table"),)
+    COMMANDS = (Command("read_table", READ_TABLE, ask, when="text table"),)
 
 
 def _draw_choices(choices: TableChoices) -> None:
@@ -229,23 +277,24 @@ def _draw_choices(choices: TableChoices) -> None:
         return
     _draw_word(choices, "separator", "Separator", SEPARATORS, shown.separator)
     _draw_word(choices, "decimal", "Decimal mark", DECIMALS, shown.decimal)
-    widgets.label("Lines to skip", "Number of lines above the first row of values; Scan4D skips them")
+    _draw_word(choices, "encoding", "Encoding", ENCODINGS, shown.encoding)
+    widgets.dialog_label("Lines to skip", "Number of lines above the first row of values; Scan4D skips them")
     changed, lines = imgui.input_int("##skip", shown.skip, 1, 10)
     if changed:
-        choices.state("skip", str(max(lines, 0)))
-    _draw_above(shown.lines[: shown.skip])
-    foot = imgui.get_text_line_height_with_spacing() + imgui.get_frame_height_with_spacing()
-    if choices.problem:
-        room = imgui.get_content_region_avail().x
-        foot += imgui.calc_text_size(f"     {choices.problem}", wrap_width=room).y
-    _draw_rows(choices, shown.cells, -foot)
+        choices.state("skip", str(min(max(lines, 0), _MOST_SKIPPED)))
+    names = choices.names
+    _draw_above(shown.lines[: shown.skip - bool(names)])
+    room, style = imgui.get_content_region_avail().x, imgui.get_style()
+    text = f"     {choices.problem}" if choices.problem else choices.summary
+    foot = imgui.calc_text_size(printable(text), wrap_width=room).y + 2 * style.item_spacing.y
+    _draw_rows(choices, names, shown.cells, -(foot + imgui.get_frame_height()))
 
 
 def _draw_word(choices: TableChoices, key: str, title: str, words: Mapping[str, str], found: str) -> None:
     """Declare a combo of one key. found: what Scan4D reads now."""
-    widgets.label(title)
+    widgets.dialog_label(title)
     stated = choices.texts.get(key, AUTO)
-    titles = {**words, AUTO: f"automatic: {words.get(found, found)}"}
+    titles = {**words, AUTO: "automatic" if key in choices.texts else f"automatic: {words.get(found, found)}"}
     chosen = widgets.combo(key, stated, [AUTO, *words], titles)
     if chosen != stated:
         choices.state(key, "" if chosen == AUTO else chosen)
@@ -263,8 +312,11 @@ def _draw_above(lines: Sequence[str]) -> None:
         imgui.end_child()
 
 
-def _draw_rows(choices: TableChoices, cells: Sequence[Sequence[str]], height: float) -> None:
-    """Declare the first rows, below a role for each column. height: of the table, negative: from the foot."""
+def _draw_rows(
+    choices: TableChoices, names: Sequence[str], cells: Sequence[Sequence[str]], height: float
+) -> None:
+    """Declare the first rows, below a role for each column. names: of the columns in the file, or none.
+    height: of the table, negative: from the foot."""
     width = min(max(map(len, cells), default=0), _MOST_COLUMNS)
     flags = imgui.TableFlags_.borders | imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_x
     flags |= imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_fixed_fit
@@ -273,19 +325,28 @@ def _draw_rows(choices: TableChoices, cells: Sequence[Sequence[str]], height: fl
     column_width = _COLUMN * imgui.get_font_size()
     for column in range(width):
         imgui.table_setup_column(str(column), imgui.TableColumnFlags_.width_fixed, column_width)
-    imgui.table_setup_scroll_freeze(0, 1)
+    imgui.table_setup_scroll_freeze(0, 2 if names else 1)
     imgui.table_next_row()
     roles = choices.roles
     for column in range(width):
         imgui.table_set_column_index(column)
         imgui.set_next_item_width(-1)
         words = list(ROLES) if roles[column] in ROLES else [roles[column], *ROLES]
-        role = widgets.combo(f"role {column}", roles[column], words, _ROLE_TITLES)
+        role = widgets.combo(f"role {column}", roles[column], words, ROLE_TITLES)
         if role != roles[column]:
             choices.state_role(column, role)
+    _draw_row([printable(name) for name in names[:width]], ["-"] * width)
     for row in cells:
-        imgui.table_next_row()
-        for column, word in enumerate(row[:width]):
-            imgui.table_set_column_index(column)
-            imgui.text_unformatted(printable(word))
+        _draw_row(row[:width], roles)
     imgui.end_table()
+
+
+def _draw_row(words: Sequence[str], roles: Sequence[str]) -> None:
+    """Declare a row, faint in columns that are not read."""
+    if not words:
+        return
+    imgui.table_next_row()
+    for column, word in enumerate(words):
+        imgui.table_set_column_index(column)
+        draw = imgui.text_disabled if roles[column] in UNREAD else imgui.text_unformatted
+        draw(printable(word))

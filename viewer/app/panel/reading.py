@@ -3,24 +3,29 @@ corrects each of them here."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
 from ...errors import InputError
-from ...scan.reading.corrections import CORRECTED
-from ...scan.reading.record import Decision, Reading
+from ...files import printable
+from ...scan.reading.corrections import CORRECTED, Corrections
+from ...scan.reading.record import Decision, Reading, in_words, shown_value
+from ...scan.times import frame_in_words
 from .. import widgets
-from ..files.frames_dialog import FramesDialog
+from ..files.frames_dialog import CHOOSE_FRAMES, FramesDialog
 from ..files.rereading import Rereading
-from ..files.table_dialog import TableDialog
+from ..files.table_dialog import READ_TABLE, TableDialog
 from ..part import Section, WindowPart
 from ..ui import Ui
 
 _MARKED = "Scan4D assumes this value. If the value is wrong, what you measure may be wrong too."
 _AUTOMATIC, _OTHER = "Automatic", "Other..."
+_MOST_FACTS = 4  # of one kind, such as files left aside
+_MOST_NAMED = 20  # entries of a tooltip
 
 
 @dataclass(eq=False)
@@ -48,24 +53,24 @@ class ReadingSection(WindowPart):
 
     def panel(self, ui: Ui) -> None:
         """Declare it."""
+        self._draw_dialogs(ui)
         record = self.rereading.record
         for key, decision in record.decisions.items():
             if decision.value is not None or self.rereading.is_corrected(key):
                 imgui.push_id(key)
                 self._draw(decision, record)
                 imgui.pop_id()
-        for name, text, help in _others(record):
-            widgets.fact(name, text)
-            widgets.tooltip(help)
-        self._draw_dialogs(ui)
+        for fact in other_facts(record):
+            widgets.fact(fact.name, printable(fact.text))
+            widgets.tooltip(printable(fact.help))
 
     def _draw_dialogs(self, ui: Ui) -> None:
         """Declare a button for each dialog that suits the scan."""
         buttons: dict[str, Callable[[], object]] = {}
         if self.table_dialog.table is not None:
-            buttons["Table..."] = self.table_dialog.ask
+            buttons[READ_TABLE] = self.table_dialog.ask
         if self.frames_dialog.files is not None:
-            buttons["Folder..."] = self.frames_dialog.ask
+            buttons[CHOOSE_FRAMES] = self.frames_dialog.ask
         if buttons:
             row = ui.row(*buttons)
             for act in buttons.values():
@@ -75,17 +80,16 @@ class ReadingSection(WindowPart):
     def _draw(self, decision: Decision, record: Reading) -> None:
         """Declare one decision: its name and its source on a line, and below them its value as a list."""
         key = decision.key
+        if key not in CORRECTED:
+            widgets.fact(decision.label, printable(decision.shown))
+            widgets.tooltip("\n".join(explanation(decision)))
+            return
         if decision.is_marked:
             widgets.dot()
         imgui.text_unformatted(decision.label)
         imgui.same_line()
         room = imgui.get_content_region_avail().x
-        source = "set by you" if decision.source == "user" else decision.shown_source
-        imgui.text_disabled(widgets.fitted(source, room))
-        if key not in CORRECTED:
-            imgui.text_wrapped(decision.shown)
-            widgets.tooltip("\n".join(explanation(decision)))
-            return
+        imgui.text_disabled(widgets.fitted(printable(decision.shown_source), room))
         gutter = imgui.get_frame_height() if self.rereading.is_corrected(key) else 0.0
         if self._field.subject == key:
             self._draw_field(key)
@@ -102,7 +106,9 @@ class ReadingSection(WindowPart):
         """Declare the list of values. gutter: width to leave at its right, pixels."""
         imgui.set_next_item_width(-1 - gutter if gutter else -1)
         room = imgui.get_content_region_avail().x - 2 * imgui.get_frame_height() - gutter
-        is_open = imgui.begin_combo("##value", widgets.unhidden(widgets.fitted(decision.shown, room)))
+        is_open = imgui.begin_combo(
+            "##value", widgets.unhidden(widgets.fitted(printable(decision.shown), room))
+        )
         if not is_open:
             widgets.tooltip("\n".join(explanation(decision)))
             return
@@ -110,7 +116,7 @@ class ReadingSection(WindowPart):
         if imgui.selectable(_AUTOMATIC, not is_corrected)[0] and is_corrected:
             self._correct(key, None)
         for text in choices(decision, record):
-            if imgui.selectable(widgets.labelled(text, text), False)[0]:
+            if imgui.selectable(widgets.labelled(printable(in_words(key, text)), text), False)[0]:
                 self._correct(key, text)
         if imgui.selectable(_OTHER, False)[0]:
             self._field.begin(key, self.rereading.text_of(key) or as_text(decision))
@@ -133,19 +139,25 @@ class ReadingSection(WindowPart):
 
 
 def as_text(decision: Decision) -> str:
-    """The value of a decision as `--read` takes it, for the user to change."""
+    """The value of a decision as `--read` takes it, for the user to change; empty without one."""
     value = decision.value
     if isinstance(value, dict) and {"fx", "fy", "cx", "cy"} <= value.keys():
         lens = value.get("distortion") or []
         return ",".join(f"{one:g}" for one in (*(value[name] for name in ("fx", "fy", "cx", "cy")), *lens))
-    return "" if value is None else decision.shown
+    if decision.key == "frames" and decision.source != "user":
+        return "*"
+    text = shown_value(value) if not isinstance(value, (list, tuple)) else " ".join(map(str, value))
+    try:
+        return Corrections.parse({decision.key: text}).texts[decision.key]
+    except InputError:
+        return ""
 
 
 def choices(decision: Decision, record: Reading) -> list[str]:
     """The values that the list of a decision offers, as `--read` takes them: its alternatives first."""
     takes = [take.name for take in record.takes] if decision.key == "take" else []
-    found = [*decision.alternatives, *takes, *CORRECTED[decision.key].choices]
-    return [text for text in dict.fromkeys(found) if text != decision.shown]
+    found, now = [*decision.alternatives, *takes, *CORRECTED[decision.key].choices], as_text(decision)
+    return [text for text in dict.fromkeys(found) if text != now]
 
 
 def words_on_assumed(record: Reading) -> str:
@@ -160,7 +172,7 @@ def words_on_assumed(record: Reading) -> str:
 
 def explanation(decision: Decision) -> list[str]:
     """Lines on a decision: its source, its reason, and how to change it on the command line."""
-    lines = [decision.shown, f"Source: {decision.shown_source}"]
+    lines = [decision.shown, f"Source: {decision.shown_source.removeprefix('from ')}"]
     if decision.is_marked:
         lines.append(_MARKED)
     if decision.why:
@@ -171,13 +183,47 @@ def explanation(decision: Decision) -> list[str]:
     return lines
 
 
-def _others(record: Reading) -> Iterator[tuple[str, str, str]]:
-    """Yield the other entries of the record: a name, a text, and a tooltip."""
-    for take in record.takes:
-        yield "Take", f"{take.name}, {take.frames} frames", take.pattern
-    for aside in record.aside:
-        yield "Left aside", aside.file, aside.why
-    for text in record.unused:
-        yield "Not used", text, "The file contains these data, but Scan4D does not use them"
-    for one in record.contradictions:
-        yield "Contradiction", one.what, "This frame contradicts what Scan4D decided for the whole scan"
+class OtherFact(NamedTuple):
+    """An entry of the record that is no decision. help: its tooltip."""
+
+    name: str
+    text: str
+    help: str
+
+
+def other_facts(record: Reading) -> list[OtherFact]:
+    """The other entries of the record, at most a few of each kind: a long sequence may have thousands."""
+    takes = [
+        OtherFact("Take", f"{take.name}, {take.frames} frames", f"Files: {take.pattern}")
+        for take in record.takes
+    ]
+    files: dict[str, list[str]] = {}
+    for one in record.aside:
+        files.setdefault(one.why, []).append(one.file)
+    aside = [
+        OtherFact("Left aside", f"{names[0] if len(names) == 1 else f'{len(names)} files'} ({why})",
+                  _listed(names))
+        for why, names in files.items()
+    ]  # fmt: skip
+    help = "The file contains these data, but Scan4D does not use them"
+    unused = [OtherFact("Not used", text, help) for text in record.unused]
+    help = "This frame contradicts what Scan4D decided for the whole scan"
+    contradictions = [
+        OtherFact("Contradiction", f"{frame_in_words(one.frame)}: {one.what}", help)
+        for one in record.contradictions
+    ]
+    return [fact for facts in (takes, aside, unused, contradictions) for fact in _first(facts)]
+
+
+def _first(facts: Sequence[OtherFact]) -> list[OtherFact]:
+    """The first facts of one kind, and one that counts the others."""
+    if len(facts) <= _MOST_FACTS:
+        return list(facts)
+    shown, rest = facts[: _MOST_FACTS - 1], facts[_MOST_FACTS - 1 :]
+    return [*shown, OtherFact(facts[0].name, f"and {len(rest)} more", _listed([one.text for one in rest]))]
+
+
+def _listed(texts: Sequence[str]) -> str:
+    """Texts below one another, the first ones of many."""
+    more = [f"and {len(texts) - _MOST_NAMED} more"] if len(texts) > _MOST_NAMED else []
+    return "\n".join([*texts[:_MOST_NAMED], *more])

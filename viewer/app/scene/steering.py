@@ -187,7 +187,8 @@ class Steering(WindowPart):
         if document.camera is None:
             return False
         if self.framing.extent.take_visited() and pose is not None and document.camera is self._first:
-            self.session.amend(camera=self.framing.first_camera(pose))
+            self._first = self.framing.first_camera(pose)
+            self.session.amend(camera=self._first)
             return True
         turned = self.turntable.turned(document.camera, document.pivot, now)
         self.session.change("Turntable", merge="turntable", camera=turned)

@@ -23,6 +23,7 @@ _REFERENCE = re.compile(
 )
 _NO_SCANS = (".", "~")  # hidden files, and the lock files of other programs, begin so
 _ALL = "*"
+USE_ALL = f" Use them with --read {KEY}='{_ALL}'"  # how, on the command line
 LIST = ";"  # between the files that a correction lists, in the order in which they play
 
 _WORDS = r"copy|copie|kopie|copia|cópia|kopia|kopija|duplicate|コピー|副本"
@@ -118,9 +119,9 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
     )
     used = in_order([name for name in rest if name not in odd])
     if not aside:
-        return FrameFiles(used, Decision(KEY, _counted(used), "folder"), ())
+        return FrameFiles(used, Decision(KEY, counted(used), "folder"), ())
     why = f"Scan4D leaves aside {', '.join(row.file for row in aside[:3])}, by the names"
-    return FrameFiles(used, Decision(KEY, _counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
+    return FrameFiles(used, Decision(KEY, counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
 
 
 def lists_files(corrections: Corrections) -> bool:
@@ -137,10 +138,10 @@ def _listed_files(names: Sequence[str], stated: str) -> FrameFiles:
     if not listed:
         raise InputError("the list of frames is empty", hint="Correct --read frames")
     aside = tuple(Aside(name, "not chosen") for name in in_order([*{*names} - {*listed}]))
-    return FrameFiles(listed, Decision(KEY, _counted(listed) or listed[0], "user", "--read"), aside)
+    return FrameFiles(listed, Decision(KEY, counted(listed) or listed[0], "user", "--read"), aside)
 
 
-def _counted(names: Sequence[str]) -> str | None:
+def counted(names: Sequence[str]) -> str | None:
     """The frames in words; None where there is one."""
     if len(names) < 2:
         return None
@@ -153,4 +154,4 @@ def message_of_files(frames: FrameFiles) -> str:
         return ""
     listed = ", ".join(f"{row.file} ({row.why})" for row in frames.aside[:3])
     more = f" and {len(frames.aside) - 3} more" if len(frames.aside) > 3 else ""
-    return f"Scan4D leaves aside {listed}{more}. Use them with --read frames='*'"
+    return f"Scan4D leaves aside {listed}{more}.{USE_ALL}"

@@ -39,10 +39,22 @@ ROLES = (  # of columns; a column with another role is a number by the name that
     "x", "y", "z", "nx", "ny", "nz", "r", "g", "b", "a", "intensity", "radius", "number", "row", "column",
     "frame", "time", "id", "label", "-",
 )  # fmt: skip
-_SOURCES = {  # as people read them, where no file is named
-    "file": "the file", "neighbour": "a file beside it", "folder": "file names", "user": "you",
-    "assumed": "assumed",
-}  # fmt: skip
+_SOURCES = {"file": "the file", "neighbour": "a file beside it", "folder": "file names"}  # without a name
+_WORDS = {  # as people read them: values of keys
+    "times": {"names": "file names", "index": "25 frames per second, without gaps", "stored": "stored"},
+    "decimal": {".": "point", ",": "comma"},
+    "separator": {
+        "blank": "blanks",
+        "tab": "tabs",
+        "comma": "commas",
+        "semicolon": "semicolons",
+        "bar": "bars",
+    },
+    "unit": {"units": "not known"},
+    "axes": {"unknown": "not known"},
+    "take": {"all": "all, as one scan"},
+}
+_FPS = "fps:"
 _SHORT = ("format", "columns", "decimal", "colors", "normals", "missing", "camera", "texture", "splats")
 _LISTED = 12  # entries of a list that a line shows
 
@@ -88,12 +100,16 @@ class Decision:
     @property
     def shown(self) -> str:
         """The value as people read it."""
-        return shown_value(self.value)
+        return in_words(self.key, self.value)
 
     @property
     def shown_source(self) -> str:
-        """The source as people read it: the file's name where there is one."""
-        return self.where or _SOURCES[self.source]
+        """The source as people read it: "from info.txt", "assumed", "set by you"."""
+        if self.source == "user":
+            return "set by you"
+        if self.source == "assumed":
+            return "assumed"
+        return f"from {self.where or _SOURCES[self.source]}"
 
     def to_json(self) -> dict[str, Any]:
         """Plain values; the key is not among them."""
@@ -248,6 +264,17 @@ class Reading:
             raise InputError(f"is not a record of how Scan4D read a scan: {shortened(data)}") from error
 
 
+def in_words(key: str, value: Any) -> str:
+    """A value of a key as people read it: "25 frames per second" of the times "fps:25"."""
+    if isinstance(value, str):
+        if key == "times" and value.startswith(_FPS):
+            return f"{value.removeprefix(_FPS)} frames per second"
+        return _WORDS.get(key, {}).get(value, value)
+    if key == "camera" and isinstance(value, Mapping):
+        value = {name: one for name, one in value.items() if (name, one) != ("kind", "z")}
+    return shown_value(value)
+
+
 def shown_value(value: Any) -> str:
     """A value of a decision as people read it: "x y z", "fx 290, fy 290", "yes"."""
     if value is None:
@@ -268,9 +295,9 @@ def shown_value(value: Any) -> str:
 
 def _in_full(decision: Decision) -> str:
     """A decision with its source, its reason and its alternatives, on one line."""
-    source = f"from {decision.where}" if decision.where else _SOURCES[decision.source]
-    if decision.source == "assumed" and decision.where:
-        source = f"assumed, {decision.where}"
+    source = decision.shown_source
+    if decision.source in ("assumed", "user") and decision.where:
+        source += f", {decision.where}"
     parts = [f"{decision.shown} ({source})", decision.why]
     if decision.alternatives:
         parts.append("Alternatives: " + ", ".join(decision.alternatives))

@@ -381,8 +381,9 @@ class TablePreview(NamedTuple):
     roles:     one for each column of `cells`; empty where there is a problem
     separator: "blank", "tab", "comma", "semicolon" or "bar"
     decimal:   "." or ","
+    encoding:  "utf-8", "utf-16", "utf-32" or "latin-1"
     skip:      lines above the first row
-    problem:   why it cannot be read; empty where it can
+    problem:   why it cannot be read, one clause; empty where it can
     row_count: rows among the lines
     """
 
@@ -391,6 +392,7 @@ class TablePreview(NamedTuple):
     roles: tuple[str, ...]
     separator: str
     decimal: str
+    encoding: str
     skip: int
     problem: str
     row_count: int
@@ -403,8 +405,8 @@ def preview(path: Path, corrections: Corrections = NOTHING_CORRECTED) -> TablePr
             data = stream.read(numbers.HEAD)
     except OSError as error:
         raise InputError(f"cannot be read ({error})", path) from error
-    encoding = numbers.codec_of(numbers.encoding_decision(data, corrections.get("encoding")), data)
-    lines = data.decode(encoding, "replace").removeprefix("\ufeff").splitlines()
+    encoding = numbers.encoding_decision(data, corrections.get("encoding"))
+    lines = data.decode(numbers.codec_of(encoding, data), "replace").removeprefix("\ufeff").splitlines()
     if len(data) == numbers.HEAD:
         lines = lines[:-1]
     shown = tuple(line[:1000] for line in lines[:_SHOWN])
@@ -414,14 +416,15 @@ def preview(path: Path, corrections: Corrections = NOTHING_CORRECTED) -> TablePr
         problem = ""
     except InputError as error:
         head = TableHead(corrections.get("skip", 0), _likely_dialect(lines, corrections), (), None)
-        roles, problem = (), str(error)
+        roles, problem = (), error.what
     if not problem and head.instead:
         problem = f"looks like {head.instead}, not like points"
     dialect = head.dialect
     rows = head.rows or tuple(tuple(split_line(line, dialect)) for line in lines[head.skip : _SHOWN])
     return TablePreview(
-        shown, rows, roles, dialect.separator, dialect.decimal, head.skip, problem, len(head.rows)
-    )
+        shown, rows, roles, dialect.separator, dialect.decimal, encoding.value, head.skip, problem,
+        len(head.rows),
+    )  # fmt: skip
 
 
 def _likely_dialect(lines: Sequence[str], corrections: Corrections) -> Dialect:

@@ -160,10 +160,12 @@ class FileRow(NamedTuple):
 
 
 class Split(NamedTuple):
-    """How the files of a folder split into scans. takes: none where they are of one scan."""
+    """How the files of a folder split into scans. takes: none where they are of one scan. times: the decision
+    about the times of the frames."""
 
     takes: tuple[Take, ...]
     files: tuple[FileRow, ...]
+    times: Decision
 
 
 def split(folder: Path, names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -> Split:
@@ -174,8 +176,8 @@ def split(folder: Path, names: Sequence[str], corrections: Corrections = NOTHING
     table = folder / TIMES_FILE if (folder / TIMES_FILE).is_file() else None
     used = frames.decide(names, corrections)
     takes = decide(used.names, corrections)
-    seconds = times.decide(takes.names, folder, table=table, corrections=corrections).seconds
-    at = dict(zip(takes.names, seconds.tolist(), strict=True))
+    moments = times.decide(takes.names, folder, table=table, corrections=corrections)
+    at = dict(zip(takes.names, moments.seconds.tolist(), strict=True))
     why = {row.file: row.why for row in (*used.aside, *takes.aside)}
     of_take = {name: take for take, found in zip(takes.takes, takes_in(used.names).values(), strict=False)
                for name in found}  # fmt: skip
@@ -190,4 +192,4 @@ def split(folder: Path, names: Sequence[str], corrections: Corrections = NOTHING
                 name in at, why.get(name, ""),
             )
         )  # fmt: skip
-    return Split(takes.takes, tuple(rows))
+    return Split(takes.takes, tuple(rows), moments.decision)
