@@ -177,7 +177,7 @@ class FrameChoices:
 
     @property
     def summary(self) -> str:
-        """How many files are frames, how long they play, and what the user changes with these choices."""
+        """A sentence on the number of frames and their times, and one on what the user changes."""
         times = [row.time for row in self.rows if row.time is not None]
         ends = f", from {min(times):.6g} to {max(times):.6g} s" if len(times) > 1 else ""
         changed = [key for key in self.KEYS if self._texts.get(key) != self._before.get(key)]

@@ -106,7 +106,7 @@ class Rereading(WindowPart):
         self._asked = wanted
 
     def refused(self, problem: str) -> bool:
-        """Take back the corrections that the scan cannot be read with, and show why; whether there are any."""
+        """Take back corrections that the scan cannot be read with, and show why; whether there are any."""
         if self._asked is None:
             return False
         self._asked = None

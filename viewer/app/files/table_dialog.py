@@ -111,7 +111,7 @@ class TableChoices:
 
     @property
     def names(self) -> list[str]:
-        """What the last line above the rows calls the columns; empty where it has another number of words."""
+        """Names of the columns in the last line above the rows; empty where their number differs."""
         if self.shown is None or not self.shown.cells or not 0 < self.shown.skip <= len(self.shown.lines):
             return []
         words = split_names(self.shown.lines[self.shown.skip - 1])
@@ -119,7 +119,7 @@ class TableChoices:
 
     @property
     def summary(self) -> str:
-        """What Scan4D reads from each row, and what the user changes with these choices."""
+        """A sentence on the columns that Scan4D reads, and one on what the user changes."""
         read = [ROLE_TITLES.get(role, role) for role in self.roles if role not in UNREAD]
         changed = [key for key in self.KEYS if self.texts.get(key) != self._before.get(key)]
         changes = ", ".join(KEYS[key].lower() for key in changed)

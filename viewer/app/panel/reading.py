@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from ...errors import InputError
 from ...files import printable
 from ...scan.reading.corrections import CORRECTED, Corrections
-from ...scan.reading.record import Decision, Reading, in_words, shown_value
+from ...scan.reading.record import Decision, Reading, shown_value, words_of_value
 from ...scan.times import frame_in_words
 from .. import widgets
 from ..files.frames_dialog import CHOOSE_FRAMES, FramesDialog
@@ -116,7 +116,7 @@ class ReadingSection(WindowPart):
         if imgui.selectable(_AUTOMATIC, not is_corrected)[0] and is_corrected:
             self._correct(key, None)
         for text in choices(decision, record):
-            if imgui.selectable(widgets.labelled(printable(in_words(key, text)), text), False)[0]:
+            if imgui.selectable(widgets.labelled(printable(words_of_value(key, text)), text), False)[0]:
                 self._correct(key, text)
         if imgui.selectable(_OTHER, False)[0]:
             self._field.begin(key, self.rereading.text_of(key) or as_text(decision))
@@ -192,7 +192,7 @@ class OtherFact(NamedTuple):
 
 
 def other_facts(record: Reading) -> list[OtherFact]:
-    """The other entries of the record, at most a few of each kind: a long sequence may have thousands."""
+    """Facts of the record that are no decisions, at most a few of each kind: there may be thousands."""
     takes = [
         OtherFact("Take", f"{take.name}, {take.frames} frames", f"Files: {take.pattern}")
         for take in record.takes

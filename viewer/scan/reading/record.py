@@ -100,7 +100,7 @@ class Decision:
     @property
     def shown(self) -> str:
         """The value as people read it."""
-        return in_words(self.key, self.value)
+        return words_of_value(self.key, self.value)
 
     @property
     def shown_source(self) -> str:
@@ -264,7 +264,7 @@ class Reading:
             raise InputError(f"is not a record of how Scan4D read a scan: {shortened(data)}") from error
 
 
-def in_words(key: str, value: Any) -> str:
+def words_of_value(key: str, value: Any) -> str:
     """A value of a key as people read it: "25 frames per second" of the times "fps:25"."""
     if isinstance(value, str):
         if key == "times" and value.startswith(_FPS):
