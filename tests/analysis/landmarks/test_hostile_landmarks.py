@@ -63,6 +63,7 @@ BAD = {
     ("m.csv", "name,x,y,z\na,1,2,0x10\n"): "'0x10' is not a number",
     ("m.csv", "name;x;y;z\na;1,5;2.5;3\n"): "Use a decimal point",
     ("m.csv", f"{LONG}landmark,0,0,a,1,2,3,placed\n"): "frames are counted from 1",
+    ("m.csv", "where,x,y,z\n1,two,3,4\n"): "'two' is not a number",
     ("m.csv", f"{LONG}landmark,1.5,0,a,1,2,3,placed\n"): "the frame is '1.5'",
     ("m.csv", f"{LONG}landmark,1,0,a,1,2,3,lost\n"): "unknown state 'lost'",
     ("m.csv", "name,x,y,z,unit\na,1,2,3,mm\nb,1,2,3,feet\n"): "lengths are in 'feet'",

@@ -117,7 +117,8 @@ def read_table(path: Path) -> LandmarkSet:
     names = _plain(head)
     if space := _space_of(names):
         if _first(names, _NAMES) is None and second is not None:
-            texts = (at for at, cell in enumerate(second[1][: len(head)]) if not _is_value(cell))
+            row = enumerate(second[1][: len(head)])
+            texts = (at for at, cell in row if not _is_value(cell) and names[at] not in space[0])
             if (at := next(texts, None)) is not None:
                 names[at] = "name"
         stated = {unit for name, own in zip(names, head, strict=True)
