@@ -177,12 +177,16 @@ def _whole(module: ModuleType, path: Path, frame: int, decided: Decided) -> Scan
 
 
 def _moments(module: ModuleType, path: Path, decided: Decided) -> MomentsOfCloud | None:
-    """The moments that columns of a file of one moment tell; None where they tell none. Raises InputError."""
+    """The moments that columns of a file of one moment tell; None where they tell none or cannot be read."""
     if not hasattr(module, "column_names"):
         return None
 
     def find() -> MomentsOfCloud | None:
-        if not may_hold_moments(ask(module.column_names, path, decided=decided), decided):
+        try:
+            names = ask(module.column_names, path, decided=decided)
+        except InputError:  # reading the points says why
+            return None
+        if not may_hold_moments(names, decided):
             return None
         cloud = _whole(module, path, 0, decided)
         return moments_of_cloud(cloud, decided) if isinstance(cloud, PointCloud) else None
