@@ -7,22 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from square import BLUE, GREEN, GREY, QUARTERS, RED, save_picture
 
 from viewer.scan.formats import read_faces
 from viewer.scan.formats._pictures import texture_colors
 from viewer.scan.open import open_scan
 from viewer.scan.reading import textures
-
-RED, GREEN, BLUE, GREY = [255, 0, 0], [0, 255, 0], [0, 0, 255], [128, 128, 128]
-QUARTERS = (RED, GREEN, BLUE, GREY)
-
-
-def save_picture(
-    path: Path, side: int = 64, quarters: tuple[list[int], ...] = (RED, GREEN, BLUE, GREY)
-) -> None:
-    """A picture of four colours: upper left, upper right, lower left, lower right."""
-    picture = np.array(quarters, np.uint8).reshape(2, 2, 3)
-    Image.fromarray(picture.repeat(side // 2, axis=0).repeat(side // 2, axis=1)).save(path)
 
 
 def save_square(path: Path, picture: str, height: float = 0.0, normals: bool = False) -> None:

@@ -12,10 +12,11 @@ import re
 import sys
 from array import array
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,14 @@ from numpy.typing import NDArray
 from ...errors import EmptyFrame, InputError
 from ...task import checkpoint
 from ..admission import admit, opened, read_exactly, read_records, size_of, too_few, whole_number
-from ..contents import PointContents, Stated
+from ..contents import PointContents, Stated, TextureContents
 from ..faces import Faces
 from ..points import PointCloud
 from ..reading.cloud import assemble, listed
 from ..reading.columns import has_positions, unit_in_names
 from ..reading.numbers import value
 from ..reading.sequence import Decided
+from ..texture import TexturedMesh
 from ._columns import (
     Columns,
     columns_from_cloud,
@@ -51,6 +53,7 @@ from ._ply_header import (
     negative_list,
     parse_header,
 )
+from ._ply_textures import in_materials, materials_of, mesh_at_faces, mesh_at_vertices, positions_of
 from ._topology import topology_of
 
 TITLE = "PLY"
@@ -62,7 +65,7 @@ _GRID, _CELL_BYTES = "range_grid", 64  # bytes of memory for a cell of it
 
 
 def contents(path: Path, frame: int = 0, decided: Decided | None = None) -> PointContents:
-    """The vertices of a PLY file, ascii or binary, and its remarks. Raises InputError."""
+    """The vertices of a PLY file, ascii or binary, its texture and its remarks. Raises InputError."""
     with opened(path) as stream:
         header = parse_header(stream.read(LONGEST_HEADER))
         names = [element.name for element in header.elements]
@@ -85,13 +88,66 @@ def contents(path: Path, frame: int = 0, decided: Decided | None = None) -> Poin
             columns = _read_ascii(stream, vertex, decided)
         else:
             columns = _read_binary(stream, vertex, header.encoding)
-        faces = _faces(stream, header, len(before) + 1)
+        passed, materials = len(before) + 1, materials_of(header.remarks, path.parent)
+        if materials:
+            mesh = _textured_mesh(stream, header, passed, columns, decided or Decided())
+        else:
+            mesh = _Mesh(topology_of(vertex.count, _faces(stream, header, passed)), None)
+        texture = None
+        if mesh.textured is not None:
+            textured = in_materials(mesh.textured, len(materials))
+            texture = TextureContents(mesh=textured, materials=materials)
         return PointContents(
             columns=columns,
             stated=Stated(unit=unit_in_names(properties)),
             remarks=header.remarks,
-            topology=topology_of(vertex.count, faces),
+            topology=mesh.topology,
+            texture=texture,
         )
+
+
+class _Mesh(NamedTuple):
+    """The topology of a file, and its faces with their positions in pictures; None where it has none."""
+
+    topology: str | None
+    textured: TexturedMesh | None
+
+
+def _textured_mesh(
+    stream: BinaryIO, header: PlyHeader, passed: int, columns: Columns, decided: Decided
+) -> _Mesh:
+    """The faces with positions in pictures, from a stream that stands behind so many elements.
+
+    Those of an earlier frame where the bytes of both are the same. Takes the positions of vertices from the
+    columns.
+    """
+    names, start = positions_of(columns), stream.tell()
+    uv = np.stack([np.asarray(columns.pop(name), np.float64) for name in names], axis=1) if names else None
+    number = next((columns.pop(name) for name in [*columns] if name.lower() == "texnumber"), None)
+    count = len(next(iter(columns.values())))
+    at_vertices = [part.tobytes() for part in (uv, number) if part is not None]
+    rest = stream.read() if decided.frames > 1 else b""
+    stream.seek(start)
+
+    def make() -> _Mesh:
+        faces = Faces.joined([])
+        with suppress(InputError, ValueError, IndexError, OverflowError):  # damaged faces cost no point
+            if (mesh := _mesh_at_faces(stream, header, passed)) is not None:
+                faces = Faces.of(mesh.vertices, mesh.sizes)
+                return _Mesh(topology_of(count, [faces]), mesh)
+            stream.seek(start)
+            faces = Faces.joined(_faces(stream, header, passed))
+        mesh = None if uv is None else mesh_at_vertices(faces, uv, number)
+        return _Mesh(topology_of(count, [faces]), mesh)
+
+    found = decided.shared("ply", (header.elements, at_vertices, rest), make)
+    return found
+
+
+def _mesh_at_faces(stream: BinaryIO, header: PlyHeader, passed: int) -> TexturedMesh | None:
+    """The faces with positions at their corners, from a stream that stands behind so many elements."""
+    at = _seek_rows(stream, header, passed, "face")
+    return None if at is None else mesh_at_faces(stream, header.elements[at], header.encoding)
 
 
 def column_names(path: Path) -> list[str]:
@@ -151,16 +207,23 @@ def _grid_sizes(head: bytes, name: bytes) -> list[bytes]:
 
 def _faces(stream: BinaryIO, header: PlyHeader, passed: int = 0, of: str = "face") -> Iterator[Faces]:
     """The faces, from a stream that stands behind so many elements. of: the element that has them."""
+    at = _seek_rows(stream, header, passed, of)
+    if at is not None:
+        yield from face_rows(stream, header.elements[at], header.encoding)
+
+
+def _seek_rows(stream: BinaryIO, header: PlyHeader, passed: int, of: str) -> int | None:
+    """Go on to the rows of an element, from behind so many; return its number, None where it has no rows."""
     names = [element.name for element in header.elements]
     at = names.index(of) if of in names else -1
     if at < 0 or not header.elements[at].count:
-        return
+        return None
     if at < passed:
         stream.seek(header.size)
         passed = 0
     for element in header.elements[passed:at]:
         _skip(stream, element, header.encoding)
-    yield from face_rows(stream, header.elements[at], header.encoding)
+    return at
 
 
 def write(path: Path, cloud: PointCloud) -> None:
