@@ -181,3 +181,65 @@ def test_pictures_are_reduced_where_points_need_less(name: str, tmp_path: Path) 
     assert (whole.shape, part.shape) == ((192, 256, 3), (48, 64, 3))
     means = whole.reshape(48, 4, 64, 4, 3).mean(axis=(1, 3))
     assert np.abs(part - means).mean() < 2
+
+
+def test_a_damaged_picture_adds_no_points(tmp_path: Path) -> None:
+    """Its header is whole, so that Scan4D finds out late."""
+    save_picture(tmp_path / "a.png", 256)
+    (tmp_path / "a.png").write_bytes((tmp_path / "a.png").read_bytes()[:300])
+    save_square(tmp_path / "a.obj", "a.png")
+    with open_scan(tmp_path / "a.obj") as timeline:
+        assert len(timeline.pose(0).cloud) == 5
+        assert timeline.pose(0).cloud.colors is None
+        assert timeline.reading["texture"].value == "none"
+        assert len([message for message in timeline.messages if "a.png" in message.text]) == 1
+
+
+MATERIALS = {
+    "3dMD": "newmtl skin\r\n\tKa 0.2 0.2 0.2\r\n\tKd 0.8 0.8 0.8\r\n\tmap_Kd .\\The Skin.png\r\n",
+    "Vectra": "newmtl skin\nKd 0.000 0.000 0.000\nmap_Kd   the skin.PNG  \n",
+    "Blender": "# Blender\nnewmtl skin\nmap_Kd -s 1.0 1.0 1.0 -bm 0.5 /home/of/others/The Skin.png\n",
+    "quotes": 'newmtl skin\nmap_Kd "The Skin.png"\n',
+    "another material first": "newmtl a\nKd 1 0 0\nmap_Kd no.png\nnewmtl SKIN\nmap_Kd C:\\x\\The Skin.png\n",
+    "offset": "newmtl skin\nmap_Kd -o 3 -2 0 -clamp off The Skin.png\n",
+}
+
+
+@pytest.mark.parametrize("materials", MATERIALS.values(), ids=MATERIALS)
+def test_materials_as_programs_write_them(materials: str, tmp_path: Path) -> None:
+    save_picture(tmp_path / "The Skin.png")
+    save_square(tmp_path / "a b.obj", "")
+    (tmp_path / "a b.mtl").write_text(materials, newline="")
+    with open_scan(tmp_path / "a b.obj", read={"texture": "dense"}) as timeline:
+        cloud = timeline.pose(0).cloud
+    added = cloud.world()[5:, :2]
+    is_inside = (np.abs(added - 0.5) > 1 / 64).all(axis=1)
+    np.testing.assert_array_equal(cloud.colors[5:, :3][is_inside], quarter(added[is_inside]))
+
+
+def test_scale_turns_the_picture(tmp_path: Path) -> None:
+    save_picture(tmp_path / "a.png")
+    save_square(tmp_path / "a.obj", "-s 1 -1 1 a.png")
+    with open_scan(tmp_path / "a.obj", read={"texture": "dense"}) as timeline:
+        cloud = timeline.pose(0).cloud
+    added = cloud.world()[5:, :2]
+    is_inside = (np.abs(added - 0.5) > 1 / 64).all(axis=1)
+    turned = added[is_inside] * (1, -1) + (0, 1)
+    np.testing.assert_array_equal(cloud.colors[5:, :3][is_inside], quarter(turned))
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_picture_with_the_name_of_the_file_is_assumed(named: bool, tmp_path: Path) -> None:
+    """Where the file of materials is missing, or none is named."""
+    save_picture(tmp_path / "a.png", 4)
+    save_square(tmp_path / "a.obj", "a.png")
+    (tmp_path / "a.mtl").unlink()
+    if not named:
+        text = (tmp_path / "a.obj").read_text()
+        (tmp_path / "a.obj").write_text(text.replace("mtllib a.mtl\n", ""))
+    with open_scan(tmp_path / "a.obj") as timeline:
+        assert timeline.pose(0).cloud.colors is not None
+        decision = timeline.reading["texture"]
+        assert any("materials" in message.text for message in timeline.messages) == named
+    assert (decision.value, decision.source, decision.where) == ("vertices", "assumed", "a.png")
+    assert decision.alternatives == ("dense", "none")

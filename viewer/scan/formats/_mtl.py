@@ -48,9 +48,11 @@ def _with_picture(material: Material, rest: str, folder: Path) -> Material:
                 break
             values.append(words[0])
             rest = words[1]
+    if not (name := rest.strip("\"' ")) or name in (".", ".."):
+        return material
     return replace(
         material,
-        image=file_beside(folder, rest.strip("\"' ")),
+        image=file_beside(folder, name),
         scale=_pair(options.get("-s", []), 1.0),
         offset=_pair(options.get("-o", []), 0.0),
         is_clamped="on" in map(str.lower, options.get("-clamp", [])),
@@ -72,8 +74,6 @@ def file_beside(folder: Path, name: str) -> Path:
     name = name.encode("utf-8", "surrogateescape").decode("latin-1") if _is_escaped(name) else name
     parts = PureWindowsPath(name.replace("/", "\\"))
     names = [part for part in parts.parts if part != "."]
-    if not names:
-        return folder / "a name that is empty"
     if not parts.is_absolute() and not parts.drive and ".." not in names:
         inside = folder
         for each in names:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 DEPTH_KINDS = ("PNG", "TIFF")  # as Pillow names them
 COLOR_KINDS = ("PNG", "JPEG", "TIFF")
-TEXTURE_KINDS = ("PNG", "JPEG", "TIFF", "BMP", "TGA")
+TEXTURE_KINDS = ("PNG", "JPEG", "TIFF", "BMP", "TGA", "WEBP")
 
 _BYTES = {
     "1": 4,

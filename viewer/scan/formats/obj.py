@@ -276,7 +276,7 @@ def _materials(lines: ObjLines, path: Path, decided: Decided) -> dict[str, Mater
     """The materials of the files that `mtllib` names; {} where none of them has a picture."""
     found: dict[str, Material] = {}
     for line in lines.others(b"mtllib"):
-        for name in _file_names(line[len("mtllib") :].strip(), path.parent):
+        for name in _file_names(line[len("mtllib") :].strip("\"' \t"), path.parent):
             try:
                 found |= read_materials(file_beside(path.parent, name))
             except (InputError, OSError, ValueError):
@@ -286,7 +286,7 @@ def _materials(lines: ObjLines, path: Path, decided: Decided) -> dict[str, Mater
 
 def _file_names(text: str, folder: Path) -> list[str]:
     """The names behind `mtllib`: one that may contain blanks, or several."""
-    return [text] if file_beside(folder, text).is_file() else text.split()
+    return [text] if text and file_beside(folder, text).is_file() else text.split()
 
 
 def _picture_of_name(lines: ObjLines, path: Path) -> Path | None:

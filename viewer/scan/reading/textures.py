@@ -104,6 +104,9 @@ def paint(contents: PointContents, decided: Decided, pictures: PictureReaders) -
         return
     plan = frame.plan(_most_points(decided) if decision.value == DENSE else 0)
     at_vertices, between = frame.colors(plan)
+    if decided.frames == 1 and frame.unread and len(frame.unread) == sum(one is not None for one in found):
+        decided.replace(_without_pictures(texture))
+        return
     for name in color_columns(contents.columns):
         del contents.columns[name]
     if len(plan.between):
@@ -231,6 +234,7 @@ class _Frame:
     """A frame with a texture, whose pictures are read one after the other, so that few are in memory.
 
     count: vertices. found: the picture of each material, None where it cannot be read. texels: (G,), of all.
+    unread: pictures that turned out to be damaged when they were read.
     """
 
     texture: TextureContents
@@ -239,6 +243,7 @@ class _Frame:
     texels: NDArray[np.float64]
     pictures: PictureReaders
     decided: Decided
+    unread: list[Path] = field(default_factory=list)
     _plans: dict[int, _Plan] = field(default_factory=dict)
 
     @cached_property
@@ -304,6 +309,7 @@ class _Frame:
         try:
             return self.decided.shared((KEY, group), key, lambda: self.pictures.colors(image, part))
         except InputError as error:
+            self.unread.append(image)
             _report(image, error, self.decided)
             return None
 
