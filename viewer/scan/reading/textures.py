@@ -104,7 +104,8 @@ def paint(contents: PointContents, decided: Decided, pictures: PictureReaders) -
         return
     plan = frame.plan(_most_points(decided) if decision.value == DENSE else 0)
     at_vertices, between = frame.colors(plan)
-    if decided.frames == 1 and frame.unread and len(frame.unread) == sum(one is not None for one in found):
+    usable = {one.image for one, picture in zip(texture.materials, found, strict=True) if picture}
+    if decided.frames == 1 and usable == {*frame.unread}:
         decided.replace(_without_pictures(texture))
         return
     for name in color_columns(contents.columns):
