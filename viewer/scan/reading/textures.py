@@ -105,7 +105,7 @@ def paint(contents: PointContents, decided: Decided, pictures: PictureReaders) -
     plan = frame.plan(_most_points(decided) if decision.value == DENSE else 0)
     at_vertices, between = frame.colors(plan)
     usable = {one.image for one, picture in zip(texture.materials, found, strict=True) if picture}
-    if decided.frames == 1 and usable == {*frame.unread}:
+    if decided.frames == 1 and usable and usable == {*frame.unread}:
         decided.replace(_without_pictures(texture))
         return
     for name in color_columns(contents.columns):
