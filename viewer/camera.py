@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
@@ -152,14 +153,14 @@ class Camera:
         """World to view rotation, (3, 3): its rows are the picture's right, up and backward axes."""
         back = np.subtract(self.eye, self.target)
         back /= np.linalg.norm(back)
-        right = np.cross(self.up, back)
+        right = _across(self.up, back)
         length = np.linalg.norm(right)
         if length <= 1e-12 * np.linalg.norm(self.up):
             # Up is parallel to the view axis: any right will do; take the most orthogonal axis.
-            right = np.cross(np.eye(3)[np.abs(back).argmin()], back)
+            right = _across(np.eye(3)[np.abs(back).argmin()], back)
             length = np.linalg.norm(right)
         right = right / length
-        return np.stack([right, np.cross(back, right), back])
+        return np.array([right, _across(back, right), back])
 
     def place_in_picture(self, point: Vector) -> tuple[float, float] | None:
         """Position of a point in the picture, right of and above its centre, in picture heights; None behind
@@ -367,3 +368,9 @@ def _rotate(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> 
     """Rodrigues' rotation of v about a unit axis, angle in radians."""
     cos, sin = math.cos(angle), math.sin(angle)
     return v * cos + np.cross(axis, v) * sin + axis * (axis @ v) * (1 - cos)
+
+
+def _across(a: Sequence[float] | NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The cross product of two vectors, (3,): that of np.cross without its checks, for each view."""
+    (ax, ay, az), (bx, by, bz) = a, b
+    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])

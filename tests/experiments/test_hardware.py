@@ -48,6 +48,14 @@ def test_frames_are_measured_without_libraries_of_the_window() -> None:
     assert rows[0]["errors"] == 0
 
 
+def test_the_work_of_the_cpu_is_measured_beside_that_of_the_driver() -> None:
+    few = "--sizes", "2000", "--pictures", "3", "--table", "cpu", "--rows", "points"
+    (row,) = rows_without("hardware", *few)
+    assert 0 < row["least, ms"] <= row["outside the driver, ms"]
+    assert row["calls of the driver"] > 10
+    assert row["new programs"] > 0
+
+
 def test_a_first_picture_is_drawn_in_a_process_of_its_own() -> None:
     (row,) = rows_without("hardware", "--sizes", "2000", "--table", "cold", "--rows", "cold points")
     assert row["nothing stored, ms"] > 0

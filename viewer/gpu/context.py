@@ -176,6 +176,11 @@ class Gpu:
         program.extra = Built(sources, values)
         return program
 
+    @property
+    def programs(self) -> int:
+        """How many programs were compiled so far."""
+        return sum(isinstance(key, tuple) and key[0] is Gpu._compile for key in self._cached)
+
     def cached(self, make: Callable[..., T], *args: Hashable) -> T:
         """Make, once for these arguments, `make(gpu, *args)`: small things that live as long as this."""
         key = (make, *args)

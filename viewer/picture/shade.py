@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -240,6 +241,7 @@ def _finite(value: float) -> float:
     return min(max(value, -_MOST), _MOST)
 
 
+@lru_cache(256)
 def _fractions(color: str) -> Vec4:
     """A colour of a look, each channel from 0 to 1."""
     red, green, blue, alpha = (c / 255 for c in rgba(color))

@@ -12,10 +12,11 @@ maps     how often a frame maps a buffer that shaders write; reads: copies to th
 moved    messages of the driver in ten frames that a buffer moved from the memory of the card
 
 sketch, GL_POINTS and CUDA draw the same points with nothing beside: a plain compute shader in the same
-context, points of OpenGL, a kernel by CuPy. Rows whose name begins with "new" bring other points with each
-picture, which are on the CPU already. "cold" is the time to the first picture in a process of its own, once
-without and once with what the process before stored. "frame" is the time of a frame on the GPU, with what is
-in no pass.
+context, points of OpenGL, a kernel by CuPy. Rows whose name begins with "new" bring other points with
+each picture, which are on the CPU already. "cold" is the time to the first picture in a process of its
+own, once without and once with what the process before stored. "cpu" is what the CPU does for a picture
+outside the driver, at any number of points, and how many programs the first picture compiles. "frame" is
+the time of a frame on the GPU, with what is in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
@@ -47,6 +48,7 @@ import numpy as np
 
 from experiments.pictures import renderer
 from experiments.script import Script
+from experiments.speed.driver_clock import DriverClock, driver_clock
 from experiments.speed.sketches import CudaScatter, GlPoints, Sketch, elapsed_ms, has_cuda
 from experiments.tables import Column, Row, Table, at, code
 from viewer.backends import backend as find_backend
@@ -265,6 +267,42 @@ def orbit(options: Namespace) -> Iterator[Row]:
                 yield from _row(name, points, make, options, limit)
         shape.cache_clear()
         renderer().gpu.collect()
+
+
+def cpu(options: Namespace) -> Iterator[Row]:
+    """The CPU's own work for a picture, without what the driver takes, and the programs of the first one."""
+    limit, gpu = Limit(options), renderer().gpu
+    _choose(options)
+    for points in _sizes(options):
+        for name, case in CASES.items():
+            if points > case.most or not limit.wants(name):
+                continue
+            drawn, before = (
+                Drawn(case, Pose(0, 0.0, "turning", case.cloud(points)), options.size),
+                gpu.programs,
+            )
+            drawn.submit(0)
+            programs = gpu.programs - before
+            _settle(drawn, limit)
+            with driver_clock() as clock:
+                found = [_outside(drawn, clock, step) for step in range(options.pictures)]
+            drawn.release()
+            yield {
+                "row": name,
+                "points": points,
+                "outside the driver, ms": 1e3 * float(np.median([seconds for seconds, _ in found])),
+                "least, ms": 1e3 * min(seconds for seconds, _ in found),
+                "calls of the driver": float(np.median([calls for _, calls in found])),
+                "new programs": programs,
+            }
+        shape.cache_clear()
+
+
+def _outside(drawn: Drawn, clock: DriverClock, step: int) -> tuple[float, int]:
+    """Seconds of a picture outside the driver, and the calls of the driver."""
+    seconds, calls, start = clock.seconds, clock.calls, time.perf_counter()
+    drawn.submit(step)
+    return time.perf_counter() - start - (clock.seconds - seconds), clock.calls - calls
 
 
 def new_pose(options: Namespace) -> Iterator[Row]:
@@ -584,7 +622,7 @@ TABLES = [
     Table("hardware_cold", _columns("nothing stored, ms", "stored, ms", "context, ms"), "cold", empty=_EMPTY),
 ]
 EXPERIMENT = Script(
-    [orbit, new_pose, cold],
+    [orbit, new_pose, cold, cpu],
     {
         "sizes": [100_000, 1_000_000, 10_000_000],
         "huge": False,
