@@ -40,6 +40,10 @@ _SEEN_THROUGH = (
     "equal depths, rounding decide how much shows through"
 )
 
+_WIDE_MEAN = (
+    "the depth is a mean of splats whose centres lie far outside the picture, so that rounding turns them by "
+    "more than the nearest one"
+)
 
 _VARIANTS = ("tiles", *FEEDS)
 _TWO = ("two", "two_large")  # values of `passes`
@@ -83,7 +87,7 @@ class Params:
         group="Surface",
         unless={"passes": ("one_blended", "one_no_depth", "sorted")},
     )
-    surface: str = surface_param("nearest", "Surface", when={"passes": ("auto", "one", "two", "two_large")})
+    surface: str = surface_param("local", "Surface", when={"passes": ("auto", "one", "two", "two_large")})
     radius: str = param(
         "auto",
         "auto: the scan's own radii, enlarged if they leave gaps; without any, the size of the gaps around "
@@ -139,7 +143,10 @@ class Surfels(Backend):
     blends = True
     fills = True
     limits = {
-        "zoomed in to a millionth of the scan's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
+        "zoomed in to a millionth of the scan's width": (
+            Limit(0.0, _SEEN_THROUGH, _SORTED),
+            Limit(0.0, _WIDE_MEAN),
+        ),
         "zoomed in to 1/1000 of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
         "zoomed in to a millionth of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
         "each point 1000 times in a row": Limit(0.5, _SEEN_THROUGH, _SORTED),

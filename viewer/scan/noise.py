@@ -74,11 +74,12 @@ def _noise(cloud: PointCloud) -> Noise:
 
 
 def _noise_of_distinct(cloud: PointCloud) -> Noise:
-    """The noise of the positions of a cloud, each of them once: copies of a point would hide it."""
-    distinct = np.unique(cloud.positions, axis=0)
-    return (
-        _noise(PointCloud(positions=distinct, origin=cloud.origin)) if len(distinct) < len(cloud) else _NONE
-    )
+    """The noise of the positions of a cloud, each of them once: copies of a point would hide it.
+
+    The positions stay in order, so that copies do not change the result.
+    """
+    rows = np.sort(np.unique(cloud.positions, axis=0, return_index=True)[1])
+    return _noise(PointCloud(positions=cloud.positions[rows], origin=cloud.origin))
 
 
 def _sample_rows(cloud: PointCloud) -> list[int]:

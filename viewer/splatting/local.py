@@ -24,7 +24,7 @@ from ..task import Task, in_background
 from .splats import Splats
 
 NEAREST, LOCAL = SURFACES = ("nearest", "local")  # values of the parameter `surface`
-_DETAIL = 0.05  # deviations in spacings up to which curvature may be taken for noise
+_DETAIL = 0.08  # deviations in spacings up to which curvature may be taken for noise
 _THICK = 6.0  # deviations from the nearest splat of a layer to the farthest
 _SMOOTHEST = 0.5  # factor on the falloff of weights where noise is a third of a spacing or more
 _NOISY = 1 / 3

@@ -5,7 +5,7 @@
 #endif
 
 #if LOCAL
-const float LAYER_STEPS = 2047.0;
+const float LAYER_STEPS = 8191.0;
 
 // How thick the layer is along the view axis, scan units. normal: of the nearest splat, of any length; 0: unknown.
 float layer_depth(vec3 normal, vec2 pixel) {

@@ -78,13 +78,7 @@ float visible_look(int k, out vec3 rgb, out vec3 n) {
 void blend_block(usamplerBuffer list, int first, int last) {
     float weight_sum[PIXELS];
     vec3 light_sum[PIXELS], normal_sum[PIXELS];
-#if LOCAL
-    float layer_sum[PIXELS];
-#endif
     for (int k = 0; k < PIXELS; ++k) {
-#if LOCAL
-        layer_sum[k] = 0.0;
-#endif
         weight_sum[k] = 0.0;
         light_sum[k] = normal_sum[k] = vec3(0.0);
     }
@@ -106,7 +100,7 @@ void blend_block(usamplerBuffer list, int first, int last) {
                 light_sum[k] += weight * rgb;
                 normal_sum[k] += turned(weight, n, visible[k]) * n;
 #if LOCAL
-                layer_sum[k] += weight * layer_steps(front[k], here, per_key[k]);
+                layer_total[k] += int(weight * layer_steps(front[k], here, per_key[k]));
 #endif
             }
         } while (found != uvec4(0u));
@@ -116,9 +110,6 @@ void blend_block(usamplerBuffer list, int first, int last) {
         total[k] += int(weight_sum[k]);
         light[k] += uvec3(light_sum[k]);
         normal[k] += ivec3(normal_sum[k]);
-#if LOCAL
-        layer_total[k] += int(layer_sum[k]);
-#endif
     }
 }
 

@@ -52,13 +52,14 @@ class Drawing:
     params: dict[str, Any]
 
 
+_ONE_PASS = {"passes": "one", "surface": "nearest"}
 DRAWINGS = (
     Drawing("codeword", BACKEND, {}),
     Drawing("codeword, lighting own", BACKEND, {"lighting": "own"}),
     Drawing("codeword, exact", BACKEND, {"quality": "exact"}),
     Drawing(WITHOUT_GL, "", {}),
     Drawing(f"{WITHOUT_GL}, exact", "", {"quality": "exact"}),
-    Drawing("surfels, one pass", "surfels", {"passes": "one", "radius": "own", "epsilon": 0.0}),
+    Drawing("surfels, one pass", "surfels", {**_ONE_PASS, "radius": "own", "epsilon": 0.0}),
     Drawing("points", "points", {}),
 )
 

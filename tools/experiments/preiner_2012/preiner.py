@@ -34,6 +34,7 @@ PAPER = figures("preiner_2012")
 PRECOMPUTED = "precomputed"
 SIZE = (1760, 900)  # the paper's
 PLANE_POINTS = 10  # points that a precomputed plane goes through
+_PAPER = {"surface": "nearest"}  # the paper shows the nearest splat, and blends colours and normals
 DEEP = "horses"  # its depth complexity is 5 to 6
 _MODELS = ("bunny", "armadillo", "igea", "dragon")  # Fig. 6
 _TWO_SCALES = "two-bunnies"  # Fig. 7
@@ -59,13 +60,13 @@ def groups() -> list[Group]:
     """Pictures that are judged: with and without hidden neighbours, and with the paper's two savings."""
     declared = backend(BACKEND)
     compared = (
-        Contender(BACKEND, declared.params({})),
-        Contender(BACKEND, declared.params({"hidden_neighbors": False}), "hidden_neighbors"),
-        Contender(PRECOMPUTED, backend("surfels").params({"passes": "two"}), drawn=drawn_by_planes),
+        Contender(BACKEND, declared.params(_PAPER)),
+        Contender(BACKEND, declared.params({**_PAPER, "hidden_neighbors": False}), "hidden_neighbors"),
+        Contender(PRECOMPUTED, backend("surfels").params({**_PAPER, "passes": "two"}), drawn=drawn_by_planes),
     )
     switches = [(cull, refine) for cull in (False, True) for refine in (False, True)]
     saving = (
-        Contender(BACKEND, declared.params({"cull": cull, "refine": refine}), "cull, refine")
+        Contender(BACKEND, declared.params({**_PAPER, "cull": cull, "refine": refine}), "cull, refine")
         for cull, refine in switches
     )
     return [*(Group(scene, compared) for scene in (*_MODELS, _TWO_SCALES)), Group(DEEP, tuple(saving))]

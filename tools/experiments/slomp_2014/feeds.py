@@ -13,7 +13,7 @@ from viewer.splatting.amplify import FEEDS
 BACKEND = "surfels"
 # As theirs: two passes, twice the splat in the second, back faces left out. One radius for all: others are in
 # a buffer of their own, which the feed of uniform buffers does not bring.
-_METHOD = {"passes": "two", "enlarge": 2.0, "cull_back": True, "radius": "uniform"}
+_METHOD = {"passes": "two", "enlarge": 2.0, "cull_back": True, "radius": "uniform", "surface": "nearest"}
 
 
 def groups() -> list[Group]:

@@ -87,7 +87,7 @@ class Params:
         choices=("one", "two"),
         group=_SPLATS,
     )
-    surface: str = surface_param("nearest", _SPLATS)
+    surface: str = surface_param("local", _SPLATS)
     elliptical: bool = param(
         False,
         "Stretch splats along the direction in which neighbours lie farther apart; off: round splats",

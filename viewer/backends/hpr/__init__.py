@@ -70,7 +70,7 @@ class Params:
         group=_SHOWN,
         when={"output": ("splats", "reconstruction")},
     )
-    surface: str = surface_param("nearest", _SHOWN, when={"output": ("splats",)})
+    surface: str = surface_param("local", _SHOWN, when={"output": ("splats",)})
     mode: str = param(
         MODES[0],
         "hull: a point is visible if it lies on the convex hull of the flipped points; combined: a "

@@ -110,7 +110,7 @@ class Params:
         group="Octants",
         when={"shape": ("discs",)},
     )
-    surface: str = surface_param("nearest", "Octants", when={"shape": ("discs",)})
+    surface: str = surface_param("local", "Octants", when={"shape": ("discs",)})
     least: float = param(
         0.75,
         "Smallest half edge of a cube, in radii of the disc that would replace it. Larger cubes "
