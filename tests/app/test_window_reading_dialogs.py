@@ -110,6 +110,50 @@ def test_the_keyboard_alone_leaves_a_take_and_opens(screen: Screen, tmp_path: Pa
 
 
 @pytest.mark.slow
+def test_the_keyboard_alone_gives_a_role_and_skips_lines(screen: Screen, tmp_path: Path) -> None:
+    path = numbered(tmp_path / "points.xyz")
+    with running_app(screen, tmp_path, path) as app:
+        app.press("Escape")
+        assert app.settle().record["columns"]["value"] == ["number", "x", "y", "z"]
+        open_by_keys(app)
+        app.press("Tab", "Tab")  # from Open past Reset to Cancel
+        app.press(*["Tab"] * 4)  # separator, decimal mark, encoding, lines to skip
+        app.screen.do("key", "ctrl+a")
+        app.screen.do("type", "--delay", "30", "2")
+        app.press("Return")
+        app.press("Tab", "Tab", "Tab")  # its buttons, and the role of the first column
+        app.press("space")
+        assert app.settle().lists == 2
+        app.press("Escape")
+        assert app.settle().lists == 1, "Escape closes the list alone"
+        app.press("space", "End", "Return")  # the last role: not read
+        app.press(*["shift+Tab"] * 9, "Return")  # back to Open
+        app.see(points=78, lists=0)
+        assert app.settle().document["reading"] == {"columns": "- x y z", "skip": "2"}
+        open_by_keys(app)
+        app.press("Tab", "Return")  # Reset
+        app.press("shift+Tab", "Return")
+        app.see(points=80, lists=0)
+        app.press("ctrl+z")
+        app.see(points=78)
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+def test_the_keyboard_alone_leaves_a_file_aside(screen: Screen, tmp_path: Path, takes: Path) -> None:
+    with running_app(screen, tmp_path, takes) as app:
+        app.press("Escape")
+        open_by_keys(app)
+        app.press(*["Tab"] * 6, "space")  # Reset, Cancel, take, times, all files, the first file
+        app.press(*["shift+Tab"] * 6, "Return")
+        app.see(lambda state: state.document["reading"].get("frames") == "anna_1.npy;anna_2.npy;", lists=0)
+        app.settle()
+        app.press("End")
+        assert app.settle().frame == 1
+    assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
 def test_escape_leaves_the_scan_and_its_corrections_as_they_are(screen: Screen, tmp_path: Path) -> None:
     with running_app(screen, tmp_path, numbered(tmp_path / "points.xyz")) as app:
         app.press("Escape")

@@ -207,6 +207,11 @@ def dialog_label(text: str, help: str = "") -> None:
     imgui.set_next_item_width(min(_FIELD * em, imgui.get_content_region_avail().x))
 
 
+def join_next_to_tabs() -> None:
+    """Have Tab and the arrows go to the widgets of the next table that scrolls, as to those around it."""
+    imgui.internal.set_next_window_child_flags(imgui.ChildFlags_.nav_flattened.value, True)
+
+
 def same_line(width: float) -> None:
     """Go on beside the last widget, or below it where the next one, of this width, has no room there."""
     end = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x

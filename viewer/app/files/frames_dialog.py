@@ -336,6 +336,7 @@ def _draw_files(choices: FrameChoices, height: float) -> None:
     flags = imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_outer | imgui.TableFlags_.borders_inner_h
     flags |= imgui.TableFlags_.resizable
     columns = _columns(choices)
+    widgets.join_next_to_tabs()
     if not imgui.begin_table("files", len(columns), flags, ImVec2(0, height)):
         return
     em = imgui.get_font_size()

@@ -320,6 +320,7 @@ def _draw_rows(
     width = min(max(map(len, cells), default=0), _MOST_COLUMNS)
     flags = imgui.TableFlags_.borders | imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_x
     flags |= imgui.TableFlags_.scroll_y | imgui.TableFlags_.sizing_fixed_fit
+    widgets.join_next_to_tabs()
     if not width or not imgui.begin_table("rows", width, flags, ImVec2(0, height)):
         return
     column_width = _COLUMN * imgui.get_font_size()
