@@ -1,4 +1,4 @@
-// Nodes of an octree (viewer/backends/voxels/tree.py). A node has a number among all, level after level, and a cell: its
+// Nodes of an octree (viewer/backends/voxels/gpu_cut.py). A node has a number among all, level after level, and a cell: its
 // coordinates among those of its level, 21 bits each, in two words.
 uvec3 cell_of(uvec2 words) {
     return uvec3(words.x & 0x1FFFFFu, words.x >> 21 | (words.y & 0x3FFu) << 11, words.y >> 10);
