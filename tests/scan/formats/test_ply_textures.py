@@ -137,3 +137,11 @@ def test_damaged_faces_cost_no_point(tmp_path: Path) -> None:
     with open_scan(path) as timeline:
         assert len(timeline.pose(0).cloud) == 5
         assert timeline.pose(0).cloud.colors is None
+
+
+def test_a_damaged_name_of_a_picture_costs_no_point(tmp_path: Path) -> None:
+    path = save(tmp_path / "a.ply", ENCODINGS[1], ["TextureFile ab.png"], ("s", "t"))
+    path.write_bytes(path.read_bytes().replace(b"ab.png", b"a\0.png"))
+    with open_scan(path) as timeline:
+        assert len(timeline.pose(0).cloud) == 5
+        assert any("a.png" in message.text for message in timeline.messages)

@@ -72,7 +72,7 @@ def file_beside(folder: Path, name: str) -> Path:
     Names that are no UTF-8 are Latin-1.
     """
     name = name.encode("utf-8", "surrogateescape").decode("latin-1") if _is_escaped(name) else name
-    parts = PureWindowsPath(name.replace("/", "\\"))
+    parts = PureWindowsPath(name.replace("/", "\\").replace("\0", ""))  # damaged files hold zeros
     names = [part for part in parts.parts if part != "."]
     if not parts.is_absolute() and not parts.drive and ".." not in names:
         inside = folder
