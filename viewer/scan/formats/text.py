@@ -31,7 +31,7 @@ from ..reading.tables import NAMES_HELP, TableHead, head_of
 from ..times import DEFAULT_FPS
 from ._columns import bounded_lines, named
 
-_SOME_ROWS = 1 << 12  # which tell the scale of colours
+_SOME_ROWS = 1 << 8  # which tell the scale of colours, in a small part of the time of a table
 
 TITLE = "a text table"
 SUFFIXES = (".xyz", ".csv", ".txt", ".pts", ".asc", ".xyzn", ".xyzrgb", ".xyznrgb", ".xyzi")
