@@ -2,10 +2,9 @@
 
 The radius of a point reaches to the farthest corner of its cell in the Voronoi diagram of its tangent plane:
 smaller discs leave that corner open, larger ones show beside the outline. It goes by the points around
-alone, so that it follows the density of the scan however much that varies, and is found without a tree:
-points are listed by the cells of a grid, and each looks at those of the 27 cells around. Where a scan is much
-sparser than elsewhere, the search goes on with larger cells. A point is beside the surface where it is much
-farther from all others than these are from one another.
+alone, so that it follows the density of the scan, and is found without a tree: points are listed by the cells
+of a grid, and each looks at those of the 27 cells around. Where a scan is much sparser than elsewhere,
+the search goes on with larger cells.
 
 Radii that a scan stores are held to this at a sample of its points. Where they leave gaps, they are enlarged.
 """
@@ -40,9 +39,7 @@ _ROWS = 4.0  # times as far, where points lie in rows: to opposite sides alike
 _CELL = {"DIRECTIONS": 8, "KNOWN": _KNOWN, "BORDER": _BORDER, "ROWS": _ROWS}
 _ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out
 _SPARE = 1.2  # times the radii found: these go by some directions, in a plane
-# A point is beside the surface where all others within ALIKE times the distance to the nearest one are
-# farther than LONE_REACHES times as far as their own cells reach.
-_LONE = {"ALIKE": 3.0, "LONE_REACHES": 6.0}
+_STRAY = 4.0  # usual radii: what is farther from all others is beside the surface
 _FEW = 2000  # one in so many may be left without a radius of its own
 _SAMPLE = 1 << 13  # points, about, at which stored radii are looked at
 _OPEN = 0.1  # of these: where more have too small a radius, the scan's leave gaps
@@ -53,7 +50,7 @@ _SLOT = 16  # bytes
 class GapRadii:
     """The radii of a pose's points; see the module. Made with `GpuPose.cached`.
 
-    texels: a radius for each row, scan units, once all are found; 0 where a point is beside the surface: it
+    texels: a radius for each row, scan units, once all are found; 0 where a point is far from all others: it
     is to be as large as usual. None where no point has any, where there are more points than the driver
     takes, and where the radii that the scan stores leave no gaps: else none is smaller than these.
     usual, largest: the radius that nine of ten do not exceed, and that none does.
@@ -109,7 +106,7 @@ class GapRadii:
         known = radii[radii > 0]
         if known.size:
             usual = np.quantile(known, 0.9)
-            radii = np.maximum(radii, np.float32(0))
+            radii = np.where(radii > _STRAY * usual, np.float32(0), radii)
             if stored is not None:
                 radii = np.maximum(radii, stored)
                 usual = np.quantile(radii[radii > 0], 0.9)
@@ -161,7 +158,6 @@ class _Search:
         self._lists = 1 << max((count - 1).bit_length(), 8)
         self._bins, self._listed = Bins(gpu, self._lists + 2), IndexList(gpu, count)
         self._radii = gl.BufferTexture(gpu.buffer(reserve=4 * count), gl.R32F)
-        self._before = gl.BufferTexture(gpu.buffer(reserve=4 * count), gl.R32F)  # of the last round
         self._gpu.clear(self._radii.buffer, 0)
         self._bins.reserve(count + count // 16)
         self._grid, shared = self._fit()
@@ -169,7 +165,7 @@ class _Search:
 
     def release(self) -> None:
         """Delete what it holds."""
-        self._gpu.discard(self._bins, self._listed, self._radii, self._before)
+        self._gpu.discard(self._bins, self._listed, self._radii)
 
     def leave_gaps(self, radii: NDArray[np.float32], sample: NDArray[np.uint32]) -> bool:
         """Whether radii (N,), 0 where unknown, leave gaps, as far as a sample of the rows tells; at
@@ -182,7 +178,7 @@ class _Search:
         return bool((radii < reach)[known].mean() > _OPEN) if known.any() else False
 
     def radii(self) -> Generator[None, None, NDArray[np.float32]]:
-        """The radii (N,), 0 where a point is alone, negative where it is beside the surface."""
+        """The radii (N,), 0 where a point is alone."""
         grid = self._grid
         yield from self._round(grid, self._visits(grid), None)
         for _ in range(1, _ROUNDS):
@@ -242,21 +238,16 @@ class _Search:
             bins.items.bind(Texture.LISTED)
             slots.buffer.bind_to_storage_buffer(Storage.SLOTS)
             gpu.dispatch(gpu.compute("surfels/gaps/arrange.comp"), length)
-            is_later = listed is not None and not ended
-            if is_later:
-                gpu.ctx.copy_buffer(self._before.buffer, self._radii.buffer)
             for first in range(0, length if listed is None else 1, _AT_ONCE):
                 if first:
                     yield
-                rules = {"LISTED": int(listed is not None), "ENDED": int(ended), "LONE": int(is_later)}
-                defines = {**rules, **_CELL, **_LONE}
+                defines = {"LISTED": int(listed is not None), "ENDED": int(ended), **_CELL}
                 program = gpu.compute("surfels/gaps/radii.comp", defines, params=grid)
                 for texels, unit in (
                     (self._positions, Texture.POSITIONS),
                     (self._normals, Texture.NORMALS),
                     (slots, Texture.SLOTS),
                     (bins.starts, Texture.STARTS),
-                    (self._before, Texture.RADII),
                 ):
                     texels.bind(unit)
                 self._radii.buffer.bind_to_storage_buffer(Storage.RADII)

@@ -5,8 +5,7 @@
 // At a border a cell does not end; it counts as BORDER times as far as it reaches to most sides. Where it reaches about
 // as far to opposite sides, points lie in rows that are far apart: it counts up to ROWS times as far.
 // LISTED: invocations are of the points in the list, else of slots. ENDED: no radius at a border or on a line. What
-// cells cannot tell stays 0. LONE: a point that is far from all others, as far as these are from one another, gets a
-// negative radius: it is beside the surface.
+// cells cannot tell stays 0.
 #include "common/item.glsl"
 #if LISTED
 #include "common/list.glsl"
@@ -20,9 +19,6 @@ layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float radii[]; };
 
-#if LONE
-layout(binding = TEXTURE_RADII) uniform samplerBuffer found;  // as they were before this round, 0: not known
-#endif
 
 #if !LISTED
 uniform uint first;
@@ -79,9 +75,6 @@ void main() {
     n = has_normal ? n / len : vec3(0.0, 0.0, 1.0);
     vec3 u = tangent_of(n), v = cross(n, u);
     clear_cell();
-#if LONE
-    float nearest = UNKNOWN, alike = UNKNOWN;  // squared distances to any other point, and to one of as sparse a place
-#endif
     ivec3 cell = cell_of(place);
     for (int z = -1; z <= 1; ++z)
         for (int y = -1; y <= 1; ++y) {
@@ -91,13 +84,6 @@ void main() {
                 vec3 d = (other.xyz - place) / cell_size;
                 float squared = dot(d, d);
                 bound_cell(vec2(dot(d, u), dot(d, v)) / max(squared, 1e-30));
-#if LONE
-                float reach = texelFetch(found, int(floatBitsToUint(other.w))).r / cell_size * LONE_REACHES;
-                bool is_other = squared > 0.0;
-                nearest = is_other ? min(nearest, squared) : nearest;
-                bool is_alike = is_other && (reach <= 0.0 || squared <= reach * reach);
-                alike = is_alike ? min(alike, squared) : alike;
-#endif
             }
         }
     float most_sides = fourth(-lowest[0], highest[0]);
@@ -113,8 +99,5 @@ void main() {
     float inverse = least_of(min(bounded(forth, back, most_sides, rows), bounded(back, forth, most_sides, rows)));
     float reach = 0.5 / max(inverse, 1e-30);
     if (reach > KNOWN) return;
-#if LONE
-    if (alike > ALIKE * ALIKE * nearest) reach = -reach;
-#endif
     radii[row] = reach * cell_size;
 }
