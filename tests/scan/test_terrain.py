@@ -66,11 +66,11 @@ def test_degrees_become_lengths_around_the_middle() -> None:
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"right": 0.0}, "its cells have the unusable size 0 x -20, starting at 376000"),
-        ({"down": np.nan}, "its cells have the unusable size 30 x nan"),
+        ({"right": 0.0}, "the cells have the unusable size 0 x -20, starting at 376000"),
+        ({"down": np.nan}, "the cells have the unusable size 30 x nan"),
         ({"left": np.inf}, "starting at inf"),
-        ({"degrees": True}, "its centre is at .* degrees of latitude"),
-        ({"degrees": True, "first": 40.0, "down": -0.1, "unit": "units"}, "its heights are in 'units', but"),
+        ({"degrees": True}, "the centre of the terrain is at .* degrees of latitude"),
+        ({"degrees": True, "first": 40.0, "down": -0.1, "unit": "units"}, "the heights are in 'units', but"),
     ],
 )
 def test_grounds_that_are_none(changes: dict[str, object], reason: str) -> None:

@@ -121,7 +121,7 @@ def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
     if (budget := _shared.get()) is not None:
         held, needed = max(held, budget.held), needed + budget.retained
     if needed > most_memory(held, ratio):
-        what = f"reading its {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
+        what = f"reading the {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
         hint = f"If you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"
         raise InputError(what, hint=hint)
 

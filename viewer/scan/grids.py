@@ -135,7 +135,7 @@ def _axes(
     lengths = np.linalg.norm(slopes, axis=1, keepdims=True)
     left, sizes, right = np.linalg.svd(slopes / np.where(lengths > 0, lengths, 1), full_matrices=False)
     if sizes[1] < _FLATTEST:
-        raise InputError("its points lie along a line, so they form no surface")
+        raise InputError("the points lie along a line, so they form no surface")
     x, y = left @ right
     return np.stack([x, y, np.cross(x, y)])
 

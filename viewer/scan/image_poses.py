@@ -19,7 +19,7 @@ def from_camera_to_world(pose: NDArray[np.float64]) -> NDArray[np.float64]:
     Raises InputError where it is not a rotation and a translation, up to some rounding.
     """
     if not is_rigid(pose, _ROUNDED):
-        raise InputError("its pose is not a rotation and a translation")
+        raise InputError("the pose is not a rotation and a translation")
     left, _, right = np.linalg.svd(pose[:3, :3])
     return IMAGE_AXES @ rigid_matrix((left @ right).T, -(left @ right).T @ pose[:3, 3])
 
@@ -27,7 +27,7 @@ def from_camera_to_world(pose: NDArray[np.float64]) -> NDArray[np.float64]:
 def from_world_to_camera(matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """The world_to_camera of a range view, (4, 4), of the inverse of such a matrix. Raises InputError."""
     if not is_rigid(matrix, _ROUNDED):
-        raise InputError("its pose is not a rotation and a translation")
+        raise InputError("the pose is not a rotation and a translation")
     return from_camera_to_world(np.asarray(np.linalg.inv(matrix), np.float64))
 
 

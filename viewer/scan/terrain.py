@@ -63,16 +63,16 @@ def terrain_view(heights: NDArray, there: NDArray[np.bool_], ground: Ground, nam
     right, down = ground.right, ground.down
     if not (np.isfinite([x, y]).all() and right and down):
         raise InputError(
-            f"its cells have the unusable size {right:g} x {down:g}, starting at {ground.left:g}, "
+            f"the cells have the unusable size {right:g} x {down:g}, starting at {ground.left:g}, "
             f"{ground.first:g}"
         )
     if ground.degrees:
         if abs(y) >= 90:
-            raise InputError(f"its centre is at {y:g} degrees of latitude")
+            raise InputError(f"the centre of the terrain is at {y:g} degrees of latitude")
         metre = conversion(METRE, ground.unit)
         if metre is None:
             raise InputError(
-                f"its heights are in '{ground.unit}', but its ground coordinates are in degrees",
+                f"the heights are in '{ground.unit}', but the ground coordinates are in degrees",
                 hint="Convert the heights into metres",
             )
         east, north = metres_of_a_degree(y)

@@ -236,8 +236,8 @@ def test_colours_of_another_shape_are_left_out_and_told(path: Path) -> None:
 @pytest.mark.parametrize(
     ("arrays", "reason"),
     [
-        ({"K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]}, "principal point 319.5, 239.5 of its camera"),
-        ({"K": K, "width": 64, "height": 36}, "its camera is for 64 x 36, the picture has 32 x 24"),
+        ({"K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]}, "principal point 319.5, 239.5 of the camera"),
+        ({"K": K, "width": 64, "height": 36}, "the camera is for 64 x 36, the picture has 32 x 24"),
     ],
 )
 def test_cameras_of_another_picture(arrays: dict[str, object], reason: str, path: Path) -> None:
@@ -270,7 +270,7 @@ def test_points_count_more_than_depth_without_a_camera(path: Path) -> None:
         ({"xyz": np.ones((2, 2))}, r"array 'xyz' has shape \(2, 2\), expected \(H, W, 3\)"),
         ({"xyz": np.ones((2, 2, 3), int)}, "'xyz' is of type int64, expected floats"),
         ({"xyz": np.full((9, 9, 3), np.nan)}, "has only 0 points, too few for a surface"),
-        ({"xyz": np.ones((9, 9, 3))}, "its points lie along a line"),
+        ({"xyz": np.ones((9, 9, 3))}, "the points lie along a line"),
         ({"depth": np.ones((2, 2)), "mask": np.ones((2, 3))}, r"\(2, 3\), but 'depth' has shape \(2, 2\)"),
         ({"depth": np.ones((2, 2)), "color": np.ones((2, 2, 2))}, r"array 'color' has shape \(2, 2, 2\)"),
         ({"depth": np.full((2, 2), "a")}, "array 'depth' is of type <U1, expected numbers"),
@@ -279,22 +279,22 @@ def test_points_count_more_than_depth_without_a_camera(path: Path) -> None:
         ({"depth": np.ones((2, 2)), "kind": "height"}, "is not a calibration: it lacks fx, fy, cx, cy"),
         ({"depth": np.ones((2, 2)), "kind": "far"}, "unknown kind of depth 'far'"),
         ({"depth": np.ones((2, 2)), "kind": 3}, r"array 'kind' is \(\) int64, expected a word"),
-        ({"depth": np.ones((2, 2)), "depth_scale": 0}, "its depth_scale is 0"),
+        ({"depth": np.ones((2, 2)), "depth_scale": 0}, "the depth_scale is 0"),
         (
             {"depth": np.ones((2, 2)), "depth_scale": np.ones(2)},
             "is not a calibration: depth_scale is",
         ),
         (
             {"depth": np.ones((2, 2)), "intrinsics": np.eye(2)},
-            "its matrix has shape .2, 2., expected 9 numbers",
+            "the matrix has shape .2, 2., expected 9 numbers",
         ),
         (
             {"depth": np.ones((2, 2)), "intrinsics": np.zeros((3, 3))},
             "is not a calibration: fx is 0 and fy 0",
         ),
         ({"depth": np.ones((2, 2)), "pose": np.eye(3)}, "'pose' is .3, 3. float64, expected 16 numbers"),
-        ({"depth": np.ones((2, 2)), "pose": 2 * np.eye(4)}, "its pose is not a rotation and a translation"),
-        ({"depth": np.ones((2, 2)), "world_to_camera": np.zeros((4, 4))}, "its pose is not a rotation"),
+        ({"depth": np.ones((2, 2)), "pose": 2 * np.eye(4)}, "the pose is not a rotation and a translation"),
+        ({"depth": np.ones((2, 2)), "world_to_camera": np.zeros((4, 4))}, "the pose is not a rotation"),
         (
             {"depth": np.ones((2, 2)), "distortion": np.ones(2000)},
             "'distortion' is .2000,. float64",
@@ -304,7 +304,7 @@ def test_points_count_more_than_depth_without_a_camera(path: Path) -> None:
             "has 3 coefficients of distortion, expected 4, 5 or 8",
         ),
         ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add dx and dy"),
-        ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "its cells have the unusable size 0 x -1"),
+        ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "the cells have the unusable size 0 x -1"),
         (
             {"normals": np.ones((2, 3))},
             r"has no array of points, only: normals \(2, 3\). Name points 'positions'",

@@ -292,7 +292,7 @@ def test_eyes_count_where_their_cameras_are_known(tmp_path: Path) -> None:
     [
         (
             {"worldToCamera": np.eye(4, dtype=np.float32)},
-            "its worldToNDC does not describe an upright camera",
+            "the attribute worldToNDC does not describe an upright camera",
         ),
         ({"worldToCamera": np.zeros((4, 4), np.float32)}, "Singular matrix"),
         (
@@ -321,7 +321,7 @@ def test_damaged_parts_are_refused_and_standard_output_stays_clean(
         with pytest.raises(InputError):
             formats.read(path)
     path.write_bytes(whole[:-300])
-    with pytest.raises(InputError, match="only 1 of its 2 parts can be decoded"):
+    with pytest.raises(InputError, match="only 1 of the 2 parts can be decoded"):
         formats.read(path)
     assert capsys.readouterr().out == ""
 
@@ -355,7 +355,7 @@ def test_a_huge_window_is_refused_before_it_is_allocated(tmp_path: Path) -> None
     window, huge = struct.pack("<4i", 0, 0, 47, 39), struct.pack("<4i", 0, 0, 99_999, 99_999)
     path.write_bytes(path.read_bytes().replace(window, huge))
     tracemalloc.start()
-    with pytest.raises(InputError, match=r"reading its .* bytes would take 230,000 MB"):
+    with pytest.raises(InputError, match=r"reading the .* bytes would take 230,000 MB"):
         formats.read(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()

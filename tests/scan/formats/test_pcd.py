@@ -110,7 +110,7 @@ def test_damaged_compressed_data(path: Path) -> None:
     whole = body_of("binary_compressed")
     packed, unpacked = struct.unpack("<II", whole[:8])
     cases = {
-        whole[:20]: f"holds 12 of its {packed} bytes",
+        whole[:20]: f"holds 12 of {packed} bytes",
         whole[:4]: "ends early: 4 bytes where 8 should be",
         struct.pack("<II", packed, 10**9)
         + whole[8:]: "holds 1000000000 bytes of points, but its header promises",
@@ -223,7 +223,7 @@ def test_its_viewpoint_is_the_pose_of_the_camera(path: Path) -> None:
     assert view.positions() == pytest.approx(grid[seen] * (-1, -1, 1) + (1, 2, 3), abs=1e-6)
     for words in ("1 2 3 0 0 0 0", "1 2 3 nan 0 0 0", "1 2 3", "a b c d e f g"):
         organised(path, VIEWPOINT=words)
-        with pytest.raises(InputError, match=r"its VIEWPOINT is not a pose|is not a rotation"):
+        with pytest.raises(InputError, match=r"the VIEWPOINT is not a pose|is not a rotation"):
             read(path)
 
 

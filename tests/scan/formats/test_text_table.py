@@ -65,8 +65,8 @@ def test_the_count_of_a_pts_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(cloud.scalars["intensity"], [200, 90, 1])
     np.testing.assert_array_equal(cloud.colors[:, :3], [[10, 20, 30], [40, 50, 60], [1, 1, 1]])
     (report,) = decided.reports()
-    assert (
-        report.text == "scan.pts: the count above its rows is 2, but there are 3 rows. Scan4D reads all rows"
+    assert report.text == (
+        "scan.pts: the number of points above the rows is 2, but there are 3 rows. Scan4D reads all rows"
     )
     assert len(read(save(path, "1000000000\n1 2 3\n"))) == 1
 
@@ -118,7 +118,7 @@ def test_guesses_without_names(values: list[float], names: str) -> None:
         ("1 2\n3 4\n", "fewer than three numbers"),
         ("1 2 3\n4 5\n", "row 2 has 2 values, but column 3 is read"),
         ("1 2 3\n4 5 six\n", "row 2, column 3: 'six' is not a number"),
-        ("nan nan nan 1 2 3 4\n", "none of its 1 points has finite coordinates"),
+        ("nan nan nan 1 2 3 4\n", "none of the 1 points has finite coordinates"),
     ],
 )
 def test_files_that_cannot_be_used(text: str, reason: str, tmp_path: Path) -> None:

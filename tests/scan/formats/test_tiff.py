@@ -150,12 +150,12 @@ def big_endian(numbers: np.ndarray, packed: bool) -> bytes:
 @pytest.mark.parametrize(
     ("tags", "reason"),
     [
-        (GROUND | {SCALE: (30.0,)}, "its tag 33550 is not 2 finite numbers"),
-        (GROUND | {SCALE: (np.nan, 1.0, 0.0)}, "its tag 33550 is not 2 finite numbers"),
-        (GROUND | {SCALE: (0.0, 20.0, 0.0)}, "its cells have the unusable size 0 x -20"),
-        (GROUND | {TIE: (0.0, 0.0)}, "its tag 33922 is not 6 finite numbers"),
-        ({TRANSFORMATION: (1.0, 0.5, *(0.0,) * 14)}, "its rows do not go from west to east"),
-        (GROUND | {KEYS: keys(model=2)}, "its centre is at 3.80797e.06 degrees of latitude"),
+        (GROUND | {SCALE: (30.0,)}, "the tag 33550 is not 2 finite numbers"),
+        (GROUND | {SCALE: (np.nan, 1.0, 0.0)}, "the tag 33550 is not 2 finite numbers"),
+        (GROUND | {SCALE: (0.0, 20.0, 0.0)}, "the cells have the unusable size 0 x -20"),
+        (GROUND | {TIE: (0.0, 0.0)}, "the tag 33922 is not 6 finite numbers"),
+        ({TRANSFORMATION: (1.0, 0.5, *(0.0,) * 14)}, "the rows of the picture do not go from west to east"),
+        (GROUND | {KEYS: keys(model=2)}, "the centre of the terrain is at 3.80797e.06 degrees of latitude"),
     ],
 )
 def test_grounds_that_cannot_be_used(tags: dict[int, Any], reason: str, path: Path) -> None:

@@ -142,7 +142,7 @@ def test_forms_of_a_calibration(tmp_path: Path, name: str, text: str) -> None:
         (json.dumps(CAMERA | {"kind": []}), "unknown kind of depth"),
         (
             json.dumps(CAMERA | {"width": 640, "height": 480}),
-            "a.png: its camera is for 640 x 480, the picture has 6 x 4",
+            "a.png: the camera is for 640 x 480, the picture has 6 x 4",
         ),
         (json.dumps({"intrinsic_matrix": [1, 2]}), "9 numbers"),
     ],
@@ -186,7 +186,7 @@ def test_a_folder_that_lacks_its_depth_says_what_it_looks_like(tmp_path: Path) -
     for number in range(3):
         write_color(tmp_path / f"frame-{number}.color.png", colors())
         write_matrix(tmp_path / f"frame-{number}.pose.txt", np.diag([1.0, 2, 3, 1]))
-    assert "looks like 7-Scenes, but its depth pictures, frame-N.depth.png, are missing" in refusal(tmp_path)
+    assert "looks like 7-Scenes, but the depth pictures, frame-N.depth.png, are missing" in refusal(tmp_path)
     for number in range(3):
         (tmp_path / f"frame-{number}.color.png").unlink()
     assert "looks like 7-Scenes" in refusal(tmp_path)
@@ -194,9 +194,9 @@ def test_a_folder_that_lacks_its_depth_says_what_it_looks_like(tmp_path: Path) -
     emptied()
     for name, told in (
         ("groundtruth.txt", "TUM's RGB-D images, but depth.txt"),
-        ("trajectory.log", "Open3D's RGB-D images, but its folder 'depth' of 16-bit PNG"),
-        ("camera_intrinsics.json", "TrueDepth frames, but its frames, frame-N.npz, are"),
-        ("calibration.json", "a stereo pair of Middlebury's, but its disparity"),
+        ("trajectory.log", "Open3D's RGB-D images, but the folder 'depth' of 16-bit PNG"),
+        ("camera_intrinsics.json", "TrueDepth frames, but the frames, frame-N.npz, are"),
+        ("calibration.json", "a stereo pair of Middlebury's, but the picture of disparity"),
     ):
         (tmp_path / name).write_text("0.0 1 2 3 0 0 0 1\n")
         assert f"looks like {told}" in refusal(tmp_path)
@@ -245,7 +245,7 @@ def test_broken_frames_are_left_out(tmp_path: Path) -> None:
     assert "color_3.jpg: is not a valid PNG or JPEG" in told[3]
     assert "depth_5.png: has no camera pose" in told[5]
     assert "pose_6.txt: holds 9 numbers" in told[6]
-    assert "pose_7.txt: its pose is not a rotation" in told[7]
+    assert "pose_7.txt: the pose is not a rotation" in told[7]
 
 
 def test_a_frame_may_lack_colours(tmp_path: Path) -> None:

@@ -132,7 +132,7 @@ def test_a_pod_may_miss_a_frame_but_not_its_texture(tmp_path: Path) -> None:
         ({"fx": 0}, "fx is 0"),
         ({"kind": "far"}, "unknown kind of depth 'far'"),
         ({"pose": [1, 2]}, "has a pose that is not a 4 x 4 matrix"),
-        ({"pose": np.zeros((4, 4)).tolist()}, "its pose is not a rotation and a translation"),
+        ({"pose": np.zeros((4, 4)).tolist()}, "the pose is not a rotation and a translation"),
         ({"name": ""}, "the name of pod0 is"),
     ],
 )

@@ -242,8 +242,8 @@ def test_depth_without_a_camera_opens_with_an_assumed_one(tmp_path: Path) -> Non
 def test_a_camera_of_another_shape_or_outside_is_refused(tmp_path: Path) -> None:
     put(tmp_path)
     for stored, reason in (
-        (PINHOLE | {"width": 640, "height": 360}, "its camera is for 640 x 360, the picture has 32 x 24"),
-        (PINHOLE | {"cx": 319.5}, "principal point 319.5, 11.5 of its camera is outside the picture"),
+        (PINHOLE | {"width": 640, "height": 360}, "the camera is for 640 x 360, the picture has 32 x 24"),
+        (PINHOLE | {"cx": 319.5}, "principal point 319.5, 11.5 of the camera is outside the picture"),
     ):
         (tmp_path / "camera.json").write_text(json.dumps(stored))
         with pytest.raises(InputError) as caught:

@@ -119,7 +119,7 @@ def test_a_table_without_rows_is_an_empty_frame_of_a_sequence(text: str, tmp_pat
 
 
 def test_a_table_that_lacks_the_rows_it_promises_is_damaged(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the count above them is 7") as refused:
+    with pytest.raises(InputError, match="the count above the rows is 7") as refused:
         formats.read(save(tmp_path / "scan.pts", "7\n"))
     assert not isinstance(refused.value, EmptyFrame)
 

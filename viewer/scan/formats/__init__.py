@@ -216,7 +216,7 @@ def read_faces(path: Path | str, frame: int = 0, decided: Decided | None = None)
     module = _readable(path)
     if not hasattr(module, "read_faces"):
         return Faces.joined([])
-    with one_message(path, f"its faces cannot be read as {module.TITLE}"):
+    with one_message(path, f"the faces cannot be read as {module.TITLE}"):
         held, taken, pieces = path.stat().st_size, 0, []
         for piece in ask(module.read_faces, path, frame, decided=decided or Decided()):
             taken += piece.nbytes
@@ -245,7 +245,7 @@ def frames(path: Path | str, decided: Decided | None = None) -> Callable[[int], 
 
 def _with_points(scanned: Scanned) -> Scanned:
     if isinstance(scanned, PointCloud) and not len(scanned):
-        what = f"none of its {scanned.dropped} points has finite coordinates"
+        what = f"none of the {scanned.dropped} points has finite coordinates"
         raise EmptyFrame(what if scanned.dropped else "holds no points")
     return scanned
 

@@ -153,7 +153,7 @@ def _projection(to_ndc: NDArray[np.float64], width: int, height: int) -> dict[st
     expected[[0, 1, 2], [0, 1, axis]] = pixels[0, 0], pixels[1, 1], 1
     expected[:2, axis] = pixels[:2, axis]
     if not np.allclose(pixels, expected, rtol=0, atol=_UNSKEWED * abs(pixels[0, 0])):
-        raise InputError("its worldToNDC does not describe an upright camera with a straight axis")
+        raise InputError("the attribute worldToNDC does not describe an upright camera with a straight axis")
     fx, fy, cx, cy = pixels[0, 0], pixels[1, 1], pixels[0, axis], -pixels[1, axis]
     return {"kind": "height" if parallel else "z", "fx": fx, "fy": fy, "cx": cx, "cy": cy}
 

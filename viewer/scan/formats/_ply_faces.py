@@ -31,7 +31,7 @@ def face_rows(stream: BinaryIO, element: Element, encoding: str) -> Iterator[Fac
     lists = {p.name: number for number, p in enumerate(element.properties) if p.length_type}
     corners = next((lists[name] for name in _LISTS if name in lists), None)
     if corners is None:
-        raise InputError("its faces refer to no vertices")
+        raise InputError("the faces refer to no vertices")
     for row in property_rows(stream, element, encoding, corners):
         yield Faces.of(row.values, row.sizes)
 

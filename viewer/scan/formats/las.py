@@ -105,7 +105,7 @@ def _unpack_beside(packed: Path, plain: Path) -> None:
     if process.returncode:
         words = said.decode(errors="replace").strip().splitlines()
         raise InputError(
-            f"its points cannot be unpacked ({words[-1][:_SAID] if words else process.returncode})"
+            f"the points cannot be unpacked ({words[-1][:_SAID] if words else process.returncode})"
         )
 
 
@@ -121,7 +121,7 @@ def _checked_format(head: bytes, held: int) -> int:
     if _SMALLEST_RECORD * records > held:
         raise InputError(f"promises {records:,} records before its points, more than the file can hold")
     if begin > held:
-        raise InputError(f"states that its points begin at byte {begin:,}, but has only {held:,} bytes")
+        raise InputError(f"states that the points begin at byte {begin:,}, but has only {held:,} bytes")
     return form
 
 

@@ -156,7 +156,7 @@ def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
     except ValueError:
         numbers = np.empty(0)
     if numbers.shape != (7,) or not np.isfinite(numbers).all():
-        raise InputError(f"its VIEWPOINT is not a pose: {shortened(' '.join(viewpoint))}")
+        raise InputError(f"the VIEWPOINT is not a pose: {shortened(' '.join(viewpoint))}")
     return from_camera_to_world(rigid_matrix(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
 
 
@@ -233,7 +233,7 @@ def _read_ascii(stream: BinaryIO, header: _Header, decided: Decided) -> Columns:
         raise too_few(len(table), header.points, "points")
     ends = np.cumsum([f.count for f in header.fields])
     if table.shape[1] < ends[-1]:
-        raise InputError(f"its rows hold {table.shape[1]} values, but the header promises {ends[-1]}")
+        raise InputError(f"the rows hold {table.shape[1]} values, but the header promises {ends[-1]}")
     blocks = np.split(table, ends[:-1], axis=1)
     return _unpacked(
         _columns(
@@ -257,13 +257,13 @@ def _read_compressed(stream: BinaryIO, header: _Header, decided: Decided) -> Col
         raise InputError(f"holds {unpacked} bytes of points, but its header promises {promised}")
     held = size_of(stream) - stream.tell()
     if packed > held:
-        raise InputError(f"holds {held} of its {packed} bytes of compressed data")
+        raise InputError(f"holds {held} of {packed} bytes of compressed data")
     if unpacked > packed * _LZF_MAX_RATIO:
         raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked} bytes")
     admit(size_of(stream), packed + 2 * unpacked)  # the library has two, and so have the fields
     data = lzf.decompress(read_exactly(stream, packed), unpacked)
     if data is None or len(data) != unpacked:
-        raise InputError("its compressed data are damaged")
+        raise InputError("the compressed data are damaged")
     blocks, start = [], 0
     for f in header.fields:
         block = np.frombuffer(data, f"<{f.type}", header.points * f.count, start)

@@ -195,7 +195,7 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
     points = np.full((len(cloud) + cloud.dropped, 3), np.nan)
     points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
     if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():
-        raise InputError("its range grid has several vertices in one cell, or a missing vertex")
+        raise InputError("the range grid has several vertices in one cell, or a missing vertex")
     grid = np.full((cells, 3), np.nan)
     grid[lists.sizes == 1] = points[lists.corners]
     return grid.reshape(*sizes, 3)
@@ -272,7 +272,7 @@ def _read_ascii(stream: BinaryIO, element: Element, decided: Decided | None) -> 
         table = parse_table(text_lines(stream), element.count, decided)
         if len(table) and table.shape[1] < len(element.properties):
             promised = len(element.properties)
-            raise InputError(f"its rows hold {table.shape[1]} values, but the header promises {promised}")
+            raise InputError(f"the rows hold {table.shape[1]} values, but the header promises {promised}")
     if len(table) < element.count:
         raise too_few(len(table), element.count, _rows_of(element))
     return named(

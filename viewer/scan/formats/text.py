@@ -61,7 +61,7 @@ def _whole(path: Path, decided: Decided) -> PointContents:
     _report_doubts(head, path, decided)
     promised = None if head.promised is None else head.promised + sum(loose.counts)
     if promised not in (None, len(table)):
-        what = f"the count above its rows is {promised:,}, but there are {len(table):,} rows"
+        what = f"the number of points above the rows is {promised:,}, but there are {len(table):,} rows"
         decided.report("contradiction", f"{path.name}: {what}. Scan4D reads all rows")
     if loose.behind:
         what = f"{path.name}: Scan4D leaves out {len(loose.behind)} lines of text below the rows, such as"

@@ -95,7 +95,8 @@ def _ground(tags: dict[int, Any]) -> Ground:
         matrix = _floats(tags, _TRANSFORMATION, 16).reshape(4, 4)
         if matrix[0, 1] or matrix[1, 0]:
             raise InputError(
-                "its rows do not go from west to east", hint="Resample it to a grid along the axes"
+                "the rows of the picture do not go from west to east",
+                hint="Resample the terrain to a grid along the axes",
             )
         left, first, right, down = matrix[0, 3], matrix[1, 3], matrix[0, 0], matrix[1, 1]
     else:
@@ -146,5 +147,5 @@ def _floats(tags: dict[int, Any], tag: int, least: int) -> NDArray[np.float64]:
     except (TypeError, ValueError):
         numbers = np.empty(0)
     if len(numbers) < least or not np.isfinite(numbers).all():
-        raise InputError(f"its tag {tag} is not {least} finite numbers")
+        raise InputError(f"the tag {tag} is not {least} finite numbers")
     return numbers

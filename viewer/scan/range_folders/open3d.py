@@ -60,7 +60,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
 def lacks(names: Sequence[str]) -> str:
     """The folder of depth pictures, where logs or pairs stand without."""
     known = [name for name in (_PAIRS, *_LOGS) if name in names]
-    return f"its folder '{_DEPTH_FOLDER}' of 16-bit PNG is missing" if known else ""
+    return f"the folder '{_DEPTH_FOLDER}' of 16-bit PNG is missing" if known else ""
 
 
 def read_log(path: Path) -> NDArray[np.float64]:

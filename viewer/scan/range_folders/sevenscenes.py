@@ -46,4 +46,4 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
 def lacks(names: Sequence[str]) -> str:
     """The pictures of depth, where there are poses without."""
     has_poses = any(name.endswith(_POSE) for name in names)
-    return f"its depth pictures, frame-N{_DEPTH}, are missing" if has_poses else ""
+    return f"the depth pictures, frame-N{_DEPTH}, are missing" if has_poses else ""

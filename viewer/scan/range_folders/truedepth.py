@@ -53,7 +53,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
 
 def lacks(names: Sequence[str]) -> str:
     """The frames, where their calibration stands without."""
-    return f"its frames, {_FRAME}N.npz, are missing" if _CAMERA in names else ""
+    return f"the frames, {_FRAME}N.npz, are missing" if _CAMERA in names else ""
 
 
 def _view(file: Path, camera: NDArray[np.float64], turns: int, decided: Decided) -> RangeView:

@@ -66,7 +66,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
 
 def lacks(names: Sequence[str]) -> str:
     """The list of depth pictures, where poses stand without."""
-    return f"{_DEPTH}, the list of its depth pictures, is missing" if _POSES in names else ""
+    return f"{_DEPTH}, the list of depth pictures, is missing" if _POSES in names else ""
 
 
 def nearest_once(times: NDArray[np.float64], others: NDArray[np.float64], most: float) -> NDArray[np.int64]:

@@ -107,7 +107,7 @@ def as_points(array: ArrayT, decided: Decided) -> ArrayT:
     """The array with the coordinates of a point last, where they stand in front, which the record says."""
     axis = _coordinates_first(array.shape) if array.dtype.names is None else 0
     if axis and 3 in (array.shape[0], array.shape[-3:][0]):
-        why = f"The array {array.shape} has its coordinates in front of its points"
+        why = f"The array {array.shape} has the axis of coordinates before the axis of points"
         decided.note(Decision("columns", ["x", "y", "z"], "assumed", why=why, changes_numbers=True))
     return array.with_last(axis) if axis else array
 

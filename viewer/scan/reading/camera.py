@@ -24,7 +24,7 @@ CENTER = 0.5  # of a pixel: files have that of the first one at 0, 0, range view
 MILLIMETRES = 1000.0  # steps in a metre, which most recorders store
 
 _SAME_ASPECT = 0.01  # how far the ratio of two aspect ratios may be from 1
-_STATE_IT = "State it with --read camera=fx,fy,cx,cy, or in a camera.json beside the pictures"
+_STATE_IT = "State the camera with --read camera=fx,fy,cx,cy, or in a camera.json beside the pictures"
 _SCALES = ("1000", "5000", "10000", "1")
 
 
@@ -213,13 +213,13 @@ def camera_for(camera: StatedCamera, size: Size, of_color: Size | None = None) -
         if (camera.width, camera.height) == size:
             return camera
         if not have_same_aspect((camera.width, camera.height), size):
-            return f"its camera is for {camera.width} x {camera.height}, the picture has {_shown(size)}"
+            return f"the camera is for {camera.width} x {camera.height}, the picture has {_shown(size)}"
         return scaled(camera, size)
     if _is_inside(camera, size):
         return camera
     if of_color is not None and have_same_aspect(of_color, size) and _is_inside(camera, of_color):
         return scaled(replace(camera, width=of_color[0], height=of_color[1]), size)
-    outside = f"the principal point {camera.cx:g}, {camera.cy:g} of its camera is outside the picture"
+    outside = f"the principal point {camera.cx:g}, {camera.cy:g} of the camera is outside the picture"
     return f"{outside}, which has {_shown(size)}"
 
 

@@ -376,7 +376,7 @@ def _pinhole_of(value: Any) -> dict[str, Any]:
     if numbers.size == 4 and numbers.ndim == 1:
         return dict(zip(PINHOLE, numbers.tolist(), strict=True))
     if numbers.size not in (9, 12, 16):
-        raise InputError(f"its matrix has shape {numbers.shape}, expected 9 numbers, or 12 or 16")
+        raise InputError(f"the matrix has shape {numbers.shape}, expected 9 numbers, or 12 or 16")
     matrix = numbers.reshape((4, 4) if numbers.size == 16 else (3, -1))
     if _is_by_columns(matrix):
         matrix = matrix.T
@@ -425,7 +425,7 @@ def _lens(stated: Mapping[str, Any]) -> tuple[float, ...]:
     if not any(lens):
         return ()
     if any(word in model for word in _FISHEYE):
-        raise InputError(f"its lens is of the kind {shortened(stated['model'])}, which Scan4D cannot undo")
+        raise InputError(f"the lens is of the kind {shortened(stated['model'])}, which Scan4D cannot undo")
     while len(lens) > max(_COUNTS) and lens[-1] == 0:
         lens = lens[:-1]
     if len(lens) not in _COUNTS:
@@ -437,7 +437,7 @@ def _words_of_lens(value: Any) -> Sequence[Any]:
     """A name of a model is no list of coefficients, and no error."""
     if isinstance(value, str):
         return ()
-    raise InputError("its distortion is not a list of numbers")
+    raise InputError("the distortion is not a list of numbers")
 
 
 def _kind(value: Any) -> DepthKind:
@@ -455,7 +455,7 @@ def _depth_scale(value: Any) -> float:
             "depth_scale is the number of depth steps in one unit, such as 1000 for millimetres where "
             "the unit is m"
         )
-        raise InputError(f"its depth_scale is {scale:g}", hint=hint)
+        raise InputError(f"the depth_scale is {scale:g}", hint=hint)
     return float(f"{1 / scale:.6g}") if scale < 1 else scale
 
 

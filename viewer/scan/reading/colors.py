@@ -104,7 +104,7 @@ def settled_scale(colors: NDArray, decided: Decided, others: Callable[[], Iterab
 
     full: int = decided.settle(KEY, settle).value
     if contradicts(evidence, full):
-        decided.contradict(KEY, f"its colours reach {evidence.top:g}, but full brightness is {full}")
+        decided.contradict(KEY, f"the colours reach {evidence.top:g}, but full brightness is {full}")
     return full
 
 

@@ -150,7 +150,7 @@ def decide_named(names: Sequence[str]) -> Decision:
     canonical = canonical_names(names)
     roles = [_ROLE_OF.get(name.lower(), name) for name in canonical]
     others = [name for name, own in zip(names, canonical, strict=True) if name != own]
-    return Decision(KEY, roles, why=f"The file calls them {', '.join(names[:20])}." if others else "")
+    return Decision(KEY, roles, why=f"The file names the columns {', '.join(names[:20])}." if others else "")
 
 
 def has_positions(names: Sequence[str]) -> bool:
@@ -218,7 +218,7 @@ def decide(
         fronts = [front for front, _ in _fronts(table) if len(front) + len(by_suffix) == width]
         roles = [*(fronts[0] if fronts else ()), *by_suffix]
         roles += _left_over(width, roles)
-        return Decision(KEY, roles, "file", suffix, f"The suffix {suffix} states them.")
+        return Decision(KEY, roles, "file", suffix, f"The suffix {suffix} states the columns.")
     finite = np.isfinite(table).all(axis=1)
     found = _candidates(table if finite.all() else table[finite], suffix == ".pts")
     roles = found[0].roles
@@ -446,7 +446,7 @@ def moments_of(
         stated,
         numbers,
         None if ids is None else ids[order],
-        f"Its {len(key)} rows have {len(numbers)} {'times' if frame is None else 'frames'}.",
+        f"The {len(key)} rows have {len(numbers)} {'times' if frame is None else 'frames'}.",
     )
 
 

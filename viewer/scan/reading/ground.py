@@ -30,7 +30,7 @@ def decide_ground(
         why = "The edges are possible degrees, and lengths would make cliffs of the heights"
     else:
         found, other = LENGTHS, DEGREES
-        why = "The file does not state what its ground is in"
+        why = "The file does not state the unit of its ground coordinates"
     return Decision(KEY, found, "assumed", why=why, alternatives=(other,), changes_numbers=True)
 
 

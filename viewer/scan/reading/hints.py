@@ -11,10 +11,10 @@ from typing import NamedTuple
 _CLOUDCOMPARE = "Convert it into PLY with CloudCompare"
 _MESHLAB = "Convert it into PLY or OBJ with MeshLab or Blender"
 _PARAVIEW = "Convert it into PLY with ParaView"
-_VOLUMES = "It holds a volume, no points. Make a surface of it in 3D Slicer, and save that as PLY"
-_RECORDING = "It holds a recording. Export depth pictures and the camera of it into a folder with"
-_ARCHIVE = "It is an archive. Unpack it, and open the folder"
-_SPLATS = "It holds packed Gaussian splats. Convert it into PLY with SuperSplat"
+_VOLUMES = "The file holds a volume, no points. Make a surface in 3D Slicer, and save the surface as PLY"
+_RECORDING = "The file holds a recording. Export its depth pictures and camera into a folder with"
+_ARCHIVE = "The file is an archive. Unpack it, and open the folder"
+_SPLATS = "The file holds packed Gaussian splats. Convert it into PLY with SuperSplat"
 
 _DEPTH = "Scan4D reads depth from 16-bit PNG files with a camera.json beside them"
 _DICOM_AT, _DICOM = 128, b"DICM"  # the mark of DICOM files, which often have no suffix
@@ -28,7 +28,7 @@ _HINTS = {
     **dict.fromkeys((".fls", ".lsproj", ".fws"), ("FARO scans", _CLOUDCOMPARE)),
     **dict.fromkeys((".rcp", ".rcs"), ("ReCap projects", "Export E57 or PTS in ReCap, then convert it")),
     **dict.fromkeys((".zfs", ".zfprj", ".ptg"), ("this scanner's format", _CLOUDCOMPARE)),
-    ".bin": ("BIN", "A .bin of CloudCompare: save it as PLY. Of COLMAP: 'colmap model_converter' writes TXT"),
+    ".bin": ("BIN", "Save .bin of CloudCompare as PLY. Convert one of COLMAP with 'colmap model_converter'"),
     **dict.fromkeys(
         (".stl", ".off", ".3mf", ".3ds", ".dae", ".fbx", ".wrl", ".x3d"), ("this mesh format", _MESHLAB)
     ),
@@ -41,7 +41,7 @@ _HINTS = {
     **dict.fromkeys((".bag",), ("bags", f"{_RECORDING} 'rs-convert' (RealSense) or ROS")),
     **dict.fromkeys((".db3", ".mcap"), ("bags", f"{_RECORDING} ROS")),
     ".mkv": ("MKV", f"{_RECORDING} Open3D's 'azure_kinect_mkv_reader.py'"),
-    ".r3d": ("R3D", "It is a zip archive of Record3D. Export PLY or EXR with RGB-D in Record3D"),
+    ".r3d": ("R3D", "The file is a zip archive of Record3D. Export PLY or EXR with RGB-D in Record3D"),
     ".oni": ("ONI", f"{_RECORDING} OpenNI"),
     ".svo2": ("recordings of ZED", f"{_RECORDING} the ZED SDK"),
     **dict.fromkeys((".dcm", ".dicom", ".ima"), ("DICOM", _VOLUMES)),
@@ -53,9 +53,9 @@ _HINTS = {
     **dict.fromkeys((".mp4", ".mov", ".avi"), ("films", "A film holds no depth. Open the scan's own files")),
     **dict.fromkeys(
         (".png", ".jpg", ".jpeg", ".bmp"),
-        ("a picture alone", "Open its folder: depth pictures need the camera beside them"),
+        ("a picture alone", "Open the folder of the picture: depth pictures need the camera beside them"),
     ),
-    **dict.fromkeys((".c3d", ".trc"), ("marker recordings", "It holds landmarks. Import it in the window")),
+    **dict.fromkeys((".c3d", ".trc"), ("marker recordings", "Import the landmarks in the window")),
 }  # fmt: skip
 
 

@@ -151,7 +151,7 @@ class _Search:
             raise InputError(_not_names(*self.unnamed), hint=NAMES_HELP)
         what = f"holds no rows of numbers in its first {MOST_ABOVE:,} lines"
         if self.promised:
-            raise InputError(f"{what}, but the count above them is {self.promised:,}")
+            raise InputError(f"{what}, but the count above the rows is {self.promised:,}")
         raise EmptyFrame(what)
 
     def _take_comment(self, line: str) -> None:
@@ -321,7 +321,7 @@ def _uneven_rows(rows: Sequence[Sequence[str]]) -> str:
     widths = _widths(rows)
     if not widths or min(widths) == max(widths):
         return ""
-    return f"its rows have {min(widths)} to {max(widths)} values. Scan4D reads as many as the first row has"
+    return f"the rows have {min(widths)} to {max(widths)} values. Scan4D reads as many as the first row has"
 
 
 def split_names(line: str) -> list[str]:

@@ -141,7 +141,7 @@ def _decide(contents: PointContents, frame: _Frame) -> Decision:
 
 def _without_pictures(texture: TextureContents) -> Decision:
     """Decide about the colours of a frame of which no picture can be read."""
-    why = "Scan4D cannot read its pictures"
+    why = "Scan4D cannot read the pictures of the materials"
     if len({material.color for material in texture.materials if material.color is not None}) < 2:
         return Decision(KEY, NONE, "assumed", _names(texture), why)
     why += ", and uses the colors of the materials"

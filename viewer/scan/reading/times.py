@@ -107,7 +107,9 @@ def _as_stated(labels: Sequence[str], folder: Path | None, stated: str, count: i
     if stated.startswith(_FPS):
         return Times(counted_times(labels, float(stated.removeprefix(_FPS)), count), decision)
     if stated.startswith(_COLUMN):
-        raise InputError(f"there is no column for '{shortened(stated)}'", hint="Use it for a table of frames")
+        raise InputError(
+            f"there is no column for '{shortened(stated)}'", hint="Use a column name for a table of frames"
+        )
     path = Path(stated) if folder is None or Path(stated).is_absolute() else folder / stated
     return Times(read_times_csv(path, labels).seconds, decision, is_measured=True)
 

@@ -131,7 +131,9 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> StatedTimes:
         times[frame], lines[frame] = number, row.line
     if np.isnan(times).any():
         missing = labels[int(np.isnan(times).argmax())]
-        raise InputError(f"no time for '{missing}'", path, "Add a row for it, or move the frame elsewhere")
+        raise InputError(
+            f"no time for '{missing}'", path, "Add a row for the frame, or move the frame to another folder"
+        )
     for before, after in pairwise(range(len(labels))):
         if times[before] >= times[after]:
             raise _bad_row(path, lines[after], f"'{labels[after]}' is not later than '{labels[before]}'")
@@ -176,7 +178,9 @@ def _rows_of(path: Path) -> tuple[list[_Row], str | None]:
                 rows += [_Row(reader.line_num, row)] if any(row) else []
         return [row for row in rows if not is_comment(row.cells[0])], separator
     except (OSError, csv.Error) as error:
-        raise InputError(f"cannot be read ({error})", path, "It should be comma-separated text") from error
+        raise InputError(
+            f"cannot be read ({error})", path, "A table of times is comma-separated text"
+        ) from error
 
 
 def _separator(line: str) -> str | None:

@@ -121,7 +121,7 @@ def _of_rows(text: str, is_from_world: bool) -> CameraTrajectory:
     rows = np.array([line.split() for line in text.splitlines() if line.strip()], np.float64)
     if not is_from_world:
         if rows.ndim != 2 or rows.shape[1] not in (12, 16):
-            raise ValueError(f"its rows are of shape {rows.shape}, expected 12 or 16 numbers each")
+            raise ValueError(f"the rows are of shape {rows.shape}, expected 12 or 16 numbers each")
         poses = np.tile(np.eye(4), (len(rows), 1, 1))
         poses.reshape(len(rows), 16)[:, : rows.shape[1]] = rows
         return CameraTrajectory(poses)

@@ -77,7 +77,9 @@ def note_in_frame(contents: PointContents, decided: Decided) -> None:
     if known.value is None or known.source == "assumed":
         decided.replace(found)
     elif known.source == "file" and known.value != found.value:
-        decided.contradict(KEY, f"its unit is {found.value}, but that of the scan is {known.value}")
+        decided.contradict(
+            KEY, f"the unit of the file is {found.value}, but that of the scan is {known.value}"
+        )
 
 
 def guess_unit(bounds: Bounds, up: str) -> tuple[str, str] | None:
