@@ -246,7 +246,7 @@ class Opener(WindowPart):
         """A problem with a scan; of a text table it offers to state how Scan4D reads that."""
         if scan is None or not is_table(scan) or not os.path.isfile(scan):
             return problem
-        is_open = known_as(scan) == known_as(self.session.scan)
+        is_open = self._has_begun and known_as(scan) == known_as(self.session.scan)
         ask = partial(self.ask_for_table, None if is_open else scan)
         return Refusal(problem, {READ_TABLE: ask}, "refusal")
 
