@@ -22,7 +22,7 @@ from .reading.corrections import NOTHING_CORRECTED, Corrections
 from .reading.hints import foreign_files
 from .reading.record import Aside, Decision
 from .reading.sequence import Decided
-from .reading.times import Times, counted_times, times_in_names
+from .reading.times import STORED, Times, counted_times, times_in_names
 from .reading.times import decide as decide_times
 from .reading.times_table import read_times_csv
 from .reading.unit import decide as decide_unit
@@ -75,7 +75,9 @@ def open_scan(
     unit_decision = decide_unit(stated, corrections=corrections)
     timeline = Timeline(source, times.seconds, unit_decision.value)
     timeline.is_measured = times.is_measured
-    timeline.decided.replace(unit_decision, times.decision)
+    timeline.decided.replace(unit_decision)
+    if not times.decision.value == timeline.reading["times"].value == STORED:  # whose unit a reader doubts
+        timeline.decided.replace(times.decision)
     if isinstance(source, MultiFrameFile):
         timeline.decided.note(Decision("frames", f"{len(source)} in one file", "file"))
     aside = {row.file for row in timeline.reading.aside}

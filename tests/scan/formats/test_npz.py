@@ -337,3 +337,16 @@ def test_sequences_by_other_names_have_their_frames(path: Path) -> None:
         assert frame_count(path) == 4
         np.testing.assert_array_equal(read(path, 2).world(), SEQUENCE[2])
         np.testing.assert_array_equal(read_times(path), np.arange(4) / 10)
+
+
+def test_time_stamps_without_a_unit_are_marked_where_they_may_be_milliseconds(path: Path) -> None:
+    np.savez(path, positions=SEQUENCE, timestamps=np.arange(4) * 100)
+    with open_scan(path) as scan:
+        assert scan.times.tolist() == [0, 100, 200, 300]
+        assert (scan.reading["times"].source, scan.reading["times"].is_marked) == ("assumed", True)
+    with open_scan(path, fps=10) as scan:
+        assert scan.reading["times"].source == "user"
+    np.savez(path, positions=SEQUENCE, timestamps_ms=np.arange(4) * 100)
+    with open_scan(path) as scan:
+        assert scan.times == pytest.approx([0, 0.1, 0.2, 0.3])
+        assert scan.reading["times"].source == "file"

@@ -10,18 +10,24 @@ from viewer.scan.reading.depths import measured_depths
 from viewer.scan.reading.sequence import Decided
 
 
-@pytest.mark.parametrize("far", [65504, 1e10, 1e30, np.inf, np.nan, -9999])
+@pytest.mark.parametrize("far", [65504, 1e10, 1e30, np.inf, np.nan, -9999, -999, -1])
 def test_far_values_were_not_measured(far: float) -> None:
     depth = np.linspace(1, 2, 48, dtype=np.float32).reshape(6, 8)
     depth[2] = far
     decided = Decided()
     assert measured_depths(depth, decided).all(axis=1).tolist() == [True, True, False, True, True, True]
     decision = decided.reading["missing"]
-    if far in (65504, -9999):
+    if far in (65504, -9999, -999, -1):
         assert (decision.value, decision.source) == (f"{far:g}", "assumed")
     assert measured_depths(depth, Decided(Corrections.parse({"missing": "none"}))).sum() == 40 + 8 * bool(
         np.isfinite(far)
     )
+
+
+def test_minus_one_is_a_depth_beside_others_that_are_not_ahead() -> None:
+    heights = np.linspace(-2, 2, 48).reshape(6, 8)
+    heights[2] = -1
+    assert measured_depths(heights, Decided()).all()
 
 
 def test_plain_depth_is_all_measured() -> None:

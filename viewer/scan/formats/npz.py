@@ -33,6 +33,7 @@ from ..pose import Scanned
 from ..reading.arrays import (
     PointArray,
     as_points,
+    doubtful_times,
     point_array,
     points_among,
     stated_times,
@@ -119,7 +120,11 @@ def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
         if frames == 1 and images:
             return None
         stated = stated_times(arrays, frames)
-        return None if stated is None else stated[0]
+        if stated is None:
+            return None
+        if (doubtful := doubtful_times(*stated)) is not None:
+            decided.note(doubtful)
+        return stated[0]
 
 
 def read(path: Path, frame: int, decided: Decided) -> Scanned:

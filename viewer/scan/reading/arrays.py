@@ -26,6 +26,7 @@ from ..contents import ArrayInFile
 from .corrections import NOTHING_CORRECTED, Corrections
 from .record import Decision
 from .sequence import Decided
+from .times_table import doubt_of
 
 Meaning = Literal["cloud", "rows", "image", "images"]
 
@@ -264,6 +265,15 @@ def stated_times(arrays: Mapping[str, ArrayInFile], frames: int) -> tuple[NDArra
             step = number if name in _STEPS else 1 / number
             return np.arange(frames, dtype=np.float64) * step, by_name[name]
     return None
+
+
+def doubtful_times(times: NDArray[np.float64], name: str) -> Decision | None:
+    """The decision that marks times, (T,) seconds, of the array `name` where milliseconds are as likely."""
+    has_unit = name.lower() not in _TIMES or name.lower() == "times"  # which are seconds, see formats/npz.py
+    doubt = "" if has_unit else doubt_of(times, "array")
+    if not doubt:
+        return None
+    return Decision("times", "stored", "assumed", name, doubt, ("index", "fps:30"), changes_numbers=True)
 
 
 def states_times(name: str) -> bool:

@@ -11,6 +11,7 @@ from .record import Decision
 from .sequence import Decided
 
 _ALIKE = 0.02  # how far the ratio of aspect ratios of colours and depth may be from 1
+_NOTHING_AHEAD = -1.0  # what some programs write where they measured nothing
 _FARTHEST = 1e10  # what renderers write where nothing is, and more
 
 
@@ -34,6 +35,8 @@ def measured_depths(stored: NDArray, decided: Decided, always: tuple[float, ...]
     values = list(always)
     if (found := unmeasured_value(stored)) is not None and found not in values:
         values.append(found)
+    if _means_nothing(stored, measured):
+        values.append(_NOTHING_AHEAD)
     removing = []
     for value in values:
         rows = stored == stored.dtype.type(value)
@@ -44,6 +47,14 @@ def measured_depths(stored: NDArray, decided: Decided, always: tuple[float, ...]
         why = f"Scan4D leaves out {measured.size - int(np.count_nonzero(measured)):,} pixels of the picture"
         decided.note(Decision(KEY, ", ".join(removing), "assumed", why=why, alternatives=(NONE,)))
     return measured
+
+
+def _means_nothing(stored: NDArray, measured: NDArray[np.bool_]) -> bool:
+    """Whether -1 means "not measured": all other depths are above 0, as depths ahead of a camera are."""
+    if stored.dtype.kind == "u" or not stored.size or stored.min(initial=0, where=measured) != _NOTHING_AHEAD:
+        return False
+    others = measured & (stored != _NOTHING_AHEAD)
+    return bool(others.any() and (stored[others] > 0).all())
 
 
 def lying_over(image: NDArray, depth: NDArray, what: str, decided: Decided) -> NDArray | None:

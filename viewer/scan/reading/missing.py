@@ -23,7 +23,7 @@ NONE = "none"  # the correction that retains all points
 _LEAST = 8  # points that share a value
 _SHARE = 0.02  # of the points, at (0, 0, 0)
 _FAR = 10.0  # spacings from the origin to the nearest measured point
-SENTINELS = (9999.0, -9999.0, 32767.0, -32768.0, 65504.0, 65535.0, 99999.0, -99999.0)
+SENTINELS = (9999.0, -999.0, -9999.0, 32767.0, -32768.0, 65504.0, 65535.0, 99999.0, -99999.0)
 _HUGE = 1e10  # renderers write this and more where a ray hits nothing
 
 

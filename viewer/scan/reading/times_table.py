@@ -139,17 +139,17 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> StatedTimes:
             raise _bad_row(path, lines[after], f"'{labels[after]}' is not later than '{labels[before]}'")
     if found.is_clock and len(times):
         times -= times[0]
-    return StatedTimes(times, columns.why, _doubt(times) if found.is_doubtful else "")
+    return StatedTimes(times, columns.why, doubt_of(times, "column") if found.is_doubtful else "")
 
 
-def _doubt(times: NDArray[np.float64]) -> str:
-    """Why times without a stated unit may be no seconds; empty where they are likely to be."""
+def doubt_of(times: NDArray[np.float64], what: str) -> str:
+    """Why times without a stated unit may be no seconds; empty where they likely are. what: holds them."""
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     if step <= _LONG_STEP:
         return ""
     return (
         f"No unit is stated, and {step:g} seconds between frames are long. If these are milliseconds, call "
-        "the column time_ms"
+        f"the {what} time_ms"
     )
 
 
