@@ -169,7 +169,7 @@ def test_what_is_under_the_mouse_tells_its_level(levels: RunningApp) -> None:
         rows, columns = np.nonzero((view == rgba(LEVEL_COLORS[level - 1])[:3]).all(axis=2))
         place = len(rows) // 2
         app.screen.do("mousemove", left + columns[place], top + rows[place])
-        assert f"filled from level {level}" in app.settle().pointed
+        assert f"in a hole that the renderer filled from level {level}" in app.settle().pointed
     app.press("m")
     app.screen.do("click", 1)
     app.told("filled")
