@@ -17,8 +17,9 @@ def test_far_values_were_not_measured(far: float) -> None:
     decided = Decided()
     assert measured_depths(depth, decided).all(axis=1).tolist() == [True, True, False, True, True, True]
     decision = decided.reading["missing"]
-    if far in (65504, -9999, -999, -1):
-        assert (decision.value, decision.source) == (f"{far:g}", "assumed")
+    expected = (f"{far:g}", "assumed") if np.isfinite(far) else ("not finite", "file")
+    assert (decision.value, decision.source) == expected
+    assert "8 pixels" in decision.why
     assert measured_depths(depth, Decided(Corrections.parse({"missing": "none"}))).sum() == 40 + 8 * bool(
         np.isfinite(far)
     )

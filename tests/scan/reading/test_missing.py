@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from viewer.scan.reading import missing
+from viewer.scan.reading.cloud import cloud_of
 from viewer.scan.reading.corrections import Corrections
+from viewer.scan.reading.sequence import Decided
 
 RNG = np.random.default_rng(4)
 FACE = RNG.random((800, 3)) * (150, 200, 190) + (-75, -100, 805)
@@ -88,6 +90,57 @@ def test_rows_of_such_a_value_count_however_few() -> None:
 )
 def test_a_value_that_may_be_measured_stays(values: np.ndarray) -> None:
     assert missing.unmeasured_value(values) is None
+
+
+@pytest.mark.parametrize("dtype", ["f4", "f8", "i4"])
+def test_points_at_minus_one_far_from_all_others_were_not_measured(dtype: str) -> None:
+    found = missing.unmeasured_points(np.vstack([FACE, np.full((40, 3), -1)]).astype(dtype))
+    assert found is not None
+    assert (found.value, found.rows.sum()) == ("-1 -1 -1", 40)
+    assert missing.unmeasured_points(np.vstack([FACE, np.full((7, 3), -1)])) is None  # too few
+
+
+def test_a_floor_at_minus_one_stays() -> None:
+    x, y = np.meshgrid(np.arange(-20.0, 20.0), np.arange(-20.0, 20.0))
+    floor = np.column_stack([x.ravel(), y.ravel(), np.full(1600, -1.0)])
+    assert missing.unmeasured_points(np.vstack([floor, np.full((100, 3), -1.0)])) is None
+    assert missing.unmeasured_points(np.vstack([floor, FACE])) is None
+
+
+@pytest.mark.parametrize(
+    ("value", "named"),
+    [
+        (np.nan, "not finite"),
+        (np.inf, "not finite"),
+        (-np.inf, "not finite"),
+        (1e30, "1e+30"),
+        (-np.finfo(np.float32).max, "-3.40282e+38"),
+    ],
+)
+def test_the_record_names_what_is_no_position(value: float, named: str) -> None:
+    points = np.vstack([FACE, np.full((40, 3), value)]).astype(np.float32)
+    decided = Decided()
+    assert len(cloud_of([points], {}, {}, decided=decided)) == 800
+    decision = decided.reading["missing"]
+    assert decision.value == named
+    assert "40 points" in decision.why
+
+
+def test_the_record_counts_zeros_and_points_that_are_not_finite() -> None:
+    decided = Decided()
+    cloud_of([with_zeros(np.vstack([FACE, np.full((20, 3), np.nan)]), 500)], {}, {}, decided=decided)
+    decision = decided.reading["missing"]
+    assert (decision.value, decision.source) == ("0 0 0", "assumed")
+    assert "500 points" in decision.why
+    assert "20 points" in decision.why
+
+
+@pytest.mark.parametrize("place", [0, -1])
+def test_a_later_frame_may_have_fewer_points_at_the_place(place: int) -> None:
+    decided = Decided()
+    for count in (100, 3):
+        points = np.vstack([FACE, np.full((count, 3), place)])
+        assert len(cloud_of([points], {}, {}, decided=decided.at(count))) == 800
 
 
 @pytest.mark.parametrize(

@@ -205,6 +205,7 @@ def cloud_of(
     cloud = PointCloud.from_arrays(
         points, **given, scalars=scalars, origin=origin, precise=True, unmeasured=unmeasured
     )
+    missing.note(unmeasured, cloud.dropped_by, decided)
     return with_usable_normals(cloud, decided)
 
 

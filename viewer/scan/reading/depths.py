@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..points import NOT_FINITE
 from .camera import Size, have_same_aspect
 from .missing import KEY, NONE, unmeasured_value
-from .record import Decision
+from .record import Decision, Source
 from .sequence import Decided
 
 _ALIKE = 0.02  # how far the ratio of aspect ratios of colours and depth may be from 1
@@ -37,15 +38,21 @@ def measured_depths(stored: NDArray, decided: Decided, always: tuple[float, ...]
         values.append(found)
     if _means_nothing(stored, measured):
         values.append(_NOTHING_AHEAD)
-    removing = []
+    removing, named = [], 0  # values, and how many pixels have one of them
     for value in values:
         rows = stored == stored.dtype.type(value)
         if rows.any():
             removing.append(f"{value:g}")
+            named += int(np.count_nonzero(rows))
             measured &= ~rows
-    if removing:
-        why = f"Scan4D leaves out {measured.size - int(np.count_nonzero(measured)):,} pixels of the picture"
-        decided.note(Decision(KEY, ", ".join(removing), "assumed", why=why, alternatives=(NONE,)))
+    removed = measured.size - int(np.count_nonzero(measured))
+    if removed:
+        why = f"Scan4D leaves out {removed:,} pixels of the picture"
+        source: Source = "assumed" if removing else "file"
+        alternatives = (NONE,) if removing else ()
+        if removed > named:
+            removing.append(NOT_FINITE)
+        decided.note(Decision(KEY, ", ".join(removing), source, why=why, alternatives=alternatives))
     return measured
 
 
