@@ -31,6 +31,13 @@ HEADER = {
 }
 
 
+def test_a_header_in_utf_16_gets_a_message_that_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "scan.pcd"
+    path.write_bytes("# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\n".encode("utf-16"))
+    with pytest.raises(InputError, match="is UTF-16 text, but PCD files are ASCII or UTF-8"):
+        read(path)
+
+
 def body_of(encoding: str) -> bytes:
     """ROWS as the encoding has them."""
     columns = [*ROWS["p"].T, ROWS["rgba"], *ROWS["moment"].T, ROWS["label"]]

@@ -27,6 +27,15 @@ def path(tmp_path: Path) -> Path:
     return tmp_path / "scan.ply"
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-32"])
+def test_a_header_in_utf_16_gets_a_message_that_says_so(encoding: str, path: Path) -> None:
+    save(path, f"element vertex 1\n{XYZ}", "1 2 3\n")
+    path.write_bytes(path.read_text().encode(encoding))
+    with pytest.raises(InputError, match=encoding[:6].upper()) as refused:
+        read(path)
+    assert "UTF-8" in (refused.value.hint or "")
+
+
 @pytest.mark.parametrize("real", ["f4", "f8"])
 @pytest.mark.parametrize("encoding", ["ascii", "binary_little_endian", "binary_big_endian"])
 def test_all_encodings_hold_the_same(encoding: str, real: str, path: Path) -> None:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from viewer.scan.contents import PointContents
 from viewer.scan.reading import splats
+from viewer.scan.reading.cloud import assemble
 from viewer.scan.reading.corrections import Corrections
+from viewer.scan.reading.sequence import Decided
 
 RNG = np.random.default_rng(6)
 NAMES = ["x", "y", "z", "nx", "ny", "nz", *splats.COLORS, "opacity", *splats.SCALES, *splats.ROTATION]
@@ -31,6 +34,21 @@ def test_columns_are_found_in_any_case_and_only_all_together() -> None:
     of_two = splats.splat_columns([name for name in NAMES if name != "scale_2"])
     assert of_two is not None
     assert of_two.scales == ("scale_0", "scale_1")
+
+
+@pytest.mark.parametrize("scales", [2, 3])
+def test_splats_without_opacity_are_opaque(scales: int) -> None:
+    names = [*splats.COLORS, *splats.SCALES[:scales], *splats.ROTATION]
+    columns = (
+        dict.fromkeys("xyz", np.arange(20.0)) | dict.fromkeys(names, np.zeros(20)) | {"rot_0": np.ones(20)}
+    )
+    decided = Decided()
+    cloud = assemble(PointContents(columns=columns), decided)
+    assert decided.reading["splats"].value is True
+    assert not cloud.scalars
+    assert cloud.axes is not None
+    assert cloud.colors is not None
+    np.testing.assert_array_equal(cloud.colors[0], (128, 128, 128, 255))
 
 
 @pytest.mark.parametrize(("count", "text"), [(45, "1 to 3"), (24, "1 to 2"), (9, "1")])

@@ -18,6 +18,7 @@ from ..reading.columns import canonical_names
 from ..reading.sequence import Decided
 from ._precision import is_enough
 
+_START = 16  # bytes of a file that tell its encoding
 _AT_ONCE = 1 << 18  # points worked on together, so that no second table of them is needed
 Columns = dict[str, NDArray]  # name -> (N,)
 T = TypeVar("T")
@@ -98,6 +99,16 @@ def records(columns: Columns) -> NDArray[np.void]:
 def text_lines(stream: BinaryIO) -> Iterator[str]:
     """The lines of a stream from where it stands, as `bounded_lines`; Latin-1 takes any byte."""
     return (line.decode("latin-1") for line in bounded_lines(stream))
+
+
+def check_encoding(head: bytes, kind: str) -> None:
+    """Raise InputError where the first bytes of a file of this kind, such as "PLY", are UTF-16 or UTF-32."""
+    encoding = numbers.encoding_of(head[:_START])
+    if encoding.startswith(("utf-16", "utf-32")):
+        raise InputError(
+            f"is {encoding[:6].upper()} text, but {kind} files are ASCII or UTF-8",
+            hint="Open the file in a text editor, and save it with the encoding UTF-8",
+        )
 
 
 def bounded_lines(stream: IO[AnyStr]) -> Iterator[AnyStr]:

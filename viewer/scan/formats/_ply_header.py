@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError, unknown_name
 from ..admission import MOST_COLUMNS, check_count
+from ._columns import check_encoding
 
 LONGEST_HEADER = 1 << 20  # bytes looked at
 _LONGEST_WORD = 40  # of a file, in a message
@@ -124,6 +125,7 @@ class PlyHeader:
 
 def parse_header(head: bytes) -> PlyHeader:
     """The header that a file begins with, perhaps behind a byte-order mark. Raises InputError."""
+    check_encoding(head, "PLY")
     mark = len(BOM_UTF8) if head.startswith(BOM_UTF8) else 0
     head = head[mark:]
     end = re.search(rb"\nend_header[ \t\r]*(\n|\Z)", head)

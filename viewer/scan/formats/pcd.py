@@ -43,6 +43,7 @@ from ..reading.camera import note_fitted
 from ..reading.sequence import Decided
 from ._columns import (
     Columns,
+    check_encoding,
     columns_from_cloud,
     declared,
     named,
@@ -188,6 +189,7 @@ def write(path: Path, cloud: PointCloud) -> str | None:
 
 
 def _read_header(head: bytes) -> _Header:
+    check_encoding(head, "PCD")
     end = re.search(rb"^DATA[ \t]+(\w+)[ \t\r]*(\n|\Z)", head, re.MULTILINE)
     if end is None:
         raise InputError("is not a PCD file: it has no DATA line")

@@ -110,7 +110,8 @@ def _splats(columns: dict[str, NDArray], points: NDArray, decided: Decided) -> d
         decided.note_unused(text)
     for name in (*found.higher, *_complete(_NORMALS, columns)):  # programs write zeros as normals
         del columns[name]
-    rgba = splats.splat_colors(_taken(columns, found.colors), _taken(columns, [found.opacity])[:, 0])
+    opacity = _taken(columns, found.opacity)[:, 0] if found.opacity else None
+    rgba = splats.splat_colors(_taken(columns, found.colors), opacity)
     scales, rotation = _taken(columns, found.scales), _taken(columns, found.rotation)
     half_axes, normals = splats.splat_ellipses(scales, rotation, points)
     decided.note(Decision("normals", "stored", "file", "the rotations of splats"))

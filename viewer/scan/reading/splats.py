@@ -1,7 +1,8 @@
 """Gaussian splats (3DGS, 2DGS): named columns of a training program become colours, normals and ellipses.
 
-The columns are `f_dc_0..2`, colour as the first spherical harmonic; `opacity` before the logistic function;
-`scale_0..2`, logarithms of half-axes (2D splats have two); `rot_0..3`, a quaternion w x y z.
+The columns are `f_dc_0..2`, colour as the first spherical harmonic; `opacity` before the logistic function,
+without which splats are opaque; `scale_0..2`, logarithms of half-axes (2D splats have two); `rot_0..3`, a
+quaternion w x y z.
 See Kerbl et al. 2023, "3D Gaussian Splatting for Real-Time Radiance Field Rendering", section 4.
 """
 
@@ -30,10 +31,13 @@ _AT_ONCE = 1 << 17  # rows
 
 
 class SplatColumns(NamedTuple):
-    """The columns of splats by their names in the file. higher: of harmonics that Scan4D does not use."""
+    """The columns of splats by their names in the file.
+
+    opacity: one name; () where splats are opaque. higher: of harmonics that Scan4D does not use.
+    """
 
     colors: tuple[str, ...]
-    opacity: str
+    opacity: tuple[str, ...]
     scales: tuple[str, ...]
     rotation: tuple[str, ...]
     higher: tuple[str, ...]
@@ -41,7 +45,7 @@ class SplatColumns(NamedTuple):
     @property
     def all(self) -> tuple[str, ...]:
         """Every column that is part of the splats."""
-        return (*self.colors, self.opacity, *self.scales, *self.rotation, *self.higher)
+        return (*self.colors, *self.opacity, *self.scales, *self.rotation, *self.higher)
 
 
 class Ellipses(NamedTuple):
@@ -54,23 +58,28 @@ class Ellipses(NamedTuple):
 def splat_columns(names: Iterable[str]) -> SplatColumns | None:
     """The columns of splats among those of a file; None where it holds none. Names count in any case."""
     known = {name.lower(): name for name in names}
-    if not {*COLORS, OPACITY, *SCALES[:2], *ROTATION} <= known.keys():
+    if not {*COLORS, *SCALES[:2], *ROTATION} <= known.keys():
         return None
-    scales = tuple(known[name] for name in SCALES if name in known)
+    opacity, scales = (tuple(known[name] for name in names if name in known) for names in ([OPACITY], SCALES))
     higher = tuple(name for lower, name in known.items() if _HIGHER.fullmatch(lower))
     return SplatColumns(
-        tuple(known[name] for name in COLORS), known[OPACITY], scales,
+        tuple(known[name] for name in COLORS), opacity, scales,
         tuple(known[name] for name in ROTATION), higher,
     )  # fmt: skip
 
 
-def splat_colors(harmonics: NDArray, opacity: NDArray) -> NDArray[np.uint8]:
-    """Colours and alpha, (N, 4), of first harmonics (N, 3) and opacities (N,) as files hold them."""
+def splat_colors(harmonics: NDArray, opacity: NDArray | None = None) -> NDArray[np.uint8]:
+    """Colours and alpha, (N, 4), of first harmonics (N, 3) and opacities (N,) as files hold them.
+
+    Without opacities, alpha is full.
+    """
     rgba = np.empty((len(harmonics), 4), np.uint8)
     for start in range(0, len(rgba), _AT_ONCE):
         part = slice(start, start + _AT_ONCE)
-        with np.errstate(over="ignore"):
-            alpha = 1 / (1 + np.exp(-opacity[part].astype(np.float32)))
+        alpha: NDArray = np.ones(len(rgba[part]), np.float32)
+        if opacity is not None:
+            with np.errstate(over="ignore"):
+                alpha = 1 / (1 + np.exp(-opacity[part].astype(np.float32)))
         color = 0.5 + _FIRST_HARMONIC * harmonics[part].astype(np.float32)
         shares = np.nan_to_num(np.column_stack([color, alpha]))
         rgba[part] = np.rint(255 * np.clip(shares, 0, 1))
