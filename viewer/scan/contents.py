@@ -51,6 +51,9 @@ class ArrayInFile(Protocol):
     def read(self, frame: int | None = None) -> NDArray:
         """The whole array, or one entry along its first axis. Raises InputError."""
 
+    def first(self, count: int) -> NDArray:
+        """The first entries along the first axis; `read` still works then. Raises InputError."""
+
     def memory(self, frame: int | None = None) -> int:
         """Bytes that `read` takes."""
 

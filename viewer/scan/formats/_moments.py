@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..admission import MOST_FRAMES, check_count
 from ..points import PointCloud
+from ..reading.arrays import CLOUD, KEY
 from ..reading.columns import MomentColumns, Moments, moment_columns, moments_of
 from ..reading.record import Decision
 from ..reading.sequence import Decided
@@ -43,7 +44,7 @@ class MomentsOfCloud:
 
 def may_hold_moments(names: Sequence[str], decided: Decided) -> bool:
     """Whether columns of these names can tell moments. A time alone does not: scanners store one a point."""
-    return decided.corrections.get("frames") != "cloud" and _can_tell(moment_columns(names))
+    return decided.corrections.get(KEY) != CLOUD and _can_tell(moment_columns(names))
 
 
 def _can_tell(found: MomentColumns) -> bool:
@@ -64,6 +65,6 @@ def moments_of_cloud(cloud: PointCloud, decided: Decided) -> MomentsOfCloud | No
         return None
     check_count(len(moments.numbers), MOST_FRAMES, "frames")
     used = [names[at] for at in found[:3] if at is not None]
-    decided.note(Decision("frames", f"by column {used[0]}", why=moments.why))
+    decided.note(Decision(KEY, f"by column {used[0]}", why=moments.why))
     others = {name: values for name, values in cloud.scalars.items() if name not in used}
     return MomentsOfCloud(replace(cloud, scalars=others), moments)

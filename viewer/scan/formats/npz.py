@@ -5,7 +5,8 @@ otherwise, such as `points` or `world_points`; optional `normals` (…, N, 3), `
 scale, `radii` (…, N), `axes` (…, N, 4) as `PointCloud` has them, further scalars (…, N) by their names,
 `origin` (3,) that is to be added to the positions, `viewpoint` (3,), where the scanner stood, `times` (T,) in
 seconds or a rate such as `fps`, `faces` (F, 3) whole numbers, which tell the topology of all frames.
-Attributes of a sequence may lack T: then all frames share them. Scan4D passes over arrays of other shapes.
+Attributes of a sequence may lack T: then all frames share them. Or each frame has arrays of its own, whose
+names end in its number. Scan4D passes over arrays of other shapes.
 Without `positions`, `depth`, `xyz` or `elevation` make a range view; see `_array_views`.
 """
 
@@ -14,7 +15,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import BinaryIO
@@ -41,6 +42,7 @@ from ..reading.arrays import (
     without_batch,
 )
 from ..reading.cloud import assemble, cloud_of, stored_colors
+from ..reading.numbered_arrays import ArraysOfFrame, arrays_of_frames
 from ..reading.range_arrays import (
     COLORS,
     RangeArrays,
@@ -85,7 +87,10 @@ _FAR = 16  # radii of the points from their origin, where float32 still tells a 
 
 def frame_count(path: Path, decided: Decided) -> int:
     """How many frames the points or the range views have."""
-    with opened(path) as stream, _arrays(stream, decided) as arrays:
+    with opened(path) as stream, _archive(stream) as archive:
+        if frames := archive.frames(decided):
+            return len(frames)
+        arrays = archive.of_frame(0, decided)
         if _axes(arrays):
             return 1
         return found.frames if (found := _images(arrays)) else _points(arrays, decided).frames
@@ -111,14 +116,17 @@ def column_names(path: Path, decided: Decided) -> list[str]:
 
 def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
     """Seconds of the frames, (T,) float64, of an array of times, a rate or a step; or None."""
-    with opened(path) as stream, _arrays(stream, decided) as arrays:
+    with opened(path) as stream, _archive(stream) as archive:
+        arrays = archive.of_frame(0, decided)
         if _axes(arrays):
             return None
-        images = _images(arrays)
-        points = None if images else _points(arrays, decided)
-        frames = images.frames if images else points.frames if points and points.sequence else 1
-        if frames == 1 and images:
-            return None
+        frames = len(archive.frames(decided))
+        if not frames:
+            images = _images(arrays)
+            points = None if images else _points(arrays, decided)
+            frames = images.frames if images else points.frames if points and points.sequence else 1
+            if frames == 1 and images:
+                return None
         stated = stated_times(arrays, frames)
         if stated is None:
             return None
@@ -129,7 +137,7 @@ def read_times(path: Path, decided: Decided) -> NDArray[np.float64] | None:
 
 def read(path: Path, frame: int, decided: Decided) -> Scanned:
     """One frame; it reads no array that is not needed, and no other frame. Raises InputError."""
-    with opened(path) as stream, _arrays(stream, decided) as arrays:
+    with opened(path) as stream, _arrays(stream, decided, frame) as arrays:
         if axes := _axes(arrays):
             return assemble(_columns(arrays, axes, size_of(stream)), decided)
         if (images := _images(arrays)) is not None:
@@ -170,7 +178,7 @@ def read(path: Path, frame: int, decided: Decided) -> Scanned:
 
 def read_colors(path: Path, frame: int, decided: Decided) -> NDArray | None:
     """The colours of a frame as stored, (N, C), or None. Raises InputError."""
-    with opened(path) as stream, _arrays(stream, decided) as arrays:
+    with opened(path) as stream, _arrays(stream, decided, frame) as arrays:
         held = size_of(stream)
         if axes := _axes(arrays):
             return stored_colors(_columns(arrays, axes, held))
@@ -189,15 +197,16 @@ def read_colors(path: Path, frame: int, decided: Decided) -> NDArray | None:
         return stored.read(shares["colors"]).reshape(points.count, -1)
 
 
-def read_faces(path: Path, frame: int = 0) -> Iterator[Faces]:
+def read_faces(path: Path, frame: int = 0, decided: Decided | None = None) -> Iterator[Faces]:
     """The triangles of the array `faces`, in pieces; none where it has another shape. Raises InputError."""
-    with opened(path) as stream, _arrays(stream) as arrays:
+    with opened(path) as stream, _arrays(stream, decided or Decided(), frame) as arrays:
         yield from _faces(arrays, size_of(stream))
 
 
 def read_arrays(path: Path, *names: str) -> list[NDArray]:
     """Some arrays of an archive by name, whatever they hold. Raises InputError where one is not there."""
-    with opened(path) as stream, _arrays(stream) as arrays:
+    with opened(path) as stream, _archive(stream) as archive:
+        arrays = {name: archive.array(name) for name in archive.members}
         if missing := [name for name in names if name not in arrays]:
             raise InputError(f"has no array '{missing[0]}', only: {', '.join(arrays) or 'none'}")
         admit(size_of(stream), sum(arrays[name].memory() for name in names))
@@ -242,19 +251,49 @@ def write(path: Path, cloud: PointCloud) -> None:
                     npy.write_array(stream, np.asarray(array), allow_pickle=False)
 
 
+@dataclass(frozen=True)
+class _Archive:
+    """The arrays of an open file. members: by the names of arrays."""
+
+    archive: ZipFile
+    members: dict[str, ZipInfo]
+    streams: ExitStack
+
+    def array(self, name: str) -> StoredArray:
+        """An array whose header this reads. Raises InputError."""
+        member = self.members[name]
+        stream = self.streams.enter_context(self.archive.open(member))
+        return StoredArray.open(name, stream, member.file_size)
+
+    def frames(self, decided: Decided) -> list[ArraysOfFrame]:
+        """The arrays of each frame where each has its own; [] where none has. Raises InputError."""
+        names = [*self.members]
+        return decided.shared("arrays", names, lambda: arrays_of_frames(names, self.array, decided))
+
+    def of_frame(self, frame: int, decided: Decided) -> dict[str, StoredArray]:
+        """The arrays that a frame may use, as `_with_positions` names them. Raises InputError."""
+        frames = self.frames(decided)
+        chosen = frames[frame] if frames else {name: name for name in self.members}
+        arrays = {called: self.array(name) for called, name in chosen.items()}
+        return _with_positions(without_batch(arrays), decided)
+
+
 @contextmanager
-def _arrays(stream: BinaryIO, decided: Decided | None = None) -> Iterator[dict[str, StoredArray]]:
-    """All arrays of the archive by name, open as long as the context lasts."""
+def _archive(stream: BinaryIO) -> Iterator[_Archive]:
+    """The arrays of a file, open as long as the context lasts. Raises InputError."""
     _check_directory(stream)
-    with ZipFile(stream) as archive, ExitStack() as members:
+    with ZipFile(stream) as archive, ExitStack() as streams:
         infos = [info for info in archive.infolist() if info.filename.endswith(".npy")]
         _check_members(infos, size_of(stream))
-        arrays = {
-            name: StoredArray.open(name, members.enter_context(archive.open(info)), info.file_size)
-            for info in infos
-            for name in [info.filename.removesuffix(".npy")]
-        }
-        yield _with_positions(without_batch(arrays), decided or Decided())
+        members = {info.filename.removesuffix(".npy"): info for info in infos}
+        yield _Archive(archive, members, streams)
+
+
+@contextmanager
+def _arrays(stream: BinaryIO, decided: Decided, frame: int = 0) -> Iterator[dict[str, StoredArray]]:
+    """The arrays of a frame by name, open as long as the context lasts."""
+    with _archive(stream) as archive:
+        yield archive.of_frame(frame, decided)
 
 
 def _with_positions(arrays: dict[str, StoredArray], decided: Decided) -> dict[str, StoredArray]:

@@ -34,6 +34,7 @@ ArrayT = TypeVar("ArrayT", bound=ArrayInFile)
 
 KEY = "frames"
 ROWS, IMAGE = "rows", "image"  # what `--read frames=` takes for (A, B, 3)
+CLOUD = "cloud"  # and where columns or numbers of arrays may count frames
 POINT_ARRAYS = (  # what programs call the array of points; the first that is there
     "positions", "points", "vertices", "xyz", "world_points", "pts3d", "point_map", "point_maps", "points3d",
     "pointmap", "pointmaps", "pcd", "point_cloud", "pointcloud", "pc", "cloud", "verts", "vertex", "position",

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
@@ -37,6 +38,7 @@ _SOURCES: dict[Kind, tuple[str, ...]] = {  # the first one that is there makes t
     "xyz": ("xyz",),
     "elevation": ("elevation",),
 }  # fmt: skip
+IMAGE_ARRAYS = (*chain(*_SOURCES.values()),)
 COLORS = ("color", "colors", "colour", "colours", "rgb", "rgbs", "image", "images", "img", "imgs")
 _PARTNERS = {
     "color": COLORS,
