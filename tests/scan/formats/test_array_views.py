@@ -199,6 +199,19 @@ def test_poses_of_several_frames(name: str, poses: np.ndarray, x: float, path: P
     np.savez(path, depth=DEPTHS, K=K, **{name: poses})
     with open_scan(path) as scan:
         assert scan.pose(2).views[0].eye.tolist() == pytest.approx([x, 0, 0])
+        assert ("extrinsics" in scan.reading.assumed) == name.startswith("extrinsic")
+
+
+@pytest.mark.parametrize("name", ["extrinsics", "extrinsic"])
+def test_extrinsics_may_lead_to_the_world(name: str, path: Path) -> None:
+    np.savez(path, depth=DEPTHS, K=K, **{name: POSES})
+    with open_scan(path) as scan:
+        scan.pose(0)
+        decision = scan.reading["extrinsics"]
+        assert (decision.value, decision.alternatives) == ("to-camera", ("to-world",))
+    with open_scan(path, read={"extrinsics": "to-world"}) as scan:
+        assert scan.pose(2).views[0].eye.tolist() == pytest.approx([2, 0, 0])
+        assert scan.reading["extrinsics"].source == "user"
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,7 @@ def _of_depth(
         depth=depth,
         mask=measured_depths(stored, decided, () if stored.dtype.kind == "f" else (0,)),
         **camera,
-        world_to_camera=UPRIGHT if (stated := _world_to_camera(images, frame)) is None else stated,
+        world_to_camera=UPRIGHT if (stated := _world_to_camera(images, frame, decided)) is None else stated,
         name="camera",
         unit=_unit(said) or UNKNOWN_UNIT,
     )
@@ -145,7 +145,7 @@ def _of_grid(
 ) -> tuple[RangeView, _Turned]:
     if grid.dtype.kind != "f":
         raise InputError(f"array '{images.source.name}' is of type {grid.dtype}, expected floats")
-    unit, stated = _unit(said) or UNKNOWN_UNIT, _world_to_camera(images, frame)
+    unit, stated = _unit(said) or UNKNOWN_UNIT, _world_to_camera(images, frame, decided)
     view = view_of_camera(grid, UPRIGHT if stated is None else stated, "camera", unit)
     if view is not None:
         note_fitted(view, decided)
@@ -193,8 +193,8 @@ def _camera(stored: NDArray, said: StatedArrays, decided: Decided) -> tuple[floa
     return camera.depth_scale, found
 
 
-def _world_to_camera(images: RangeArrays, frame: int) -> NDArray[np.float64] | None:
-    stated = stated_pose(images, frame)
+def _world_to_camera(images: RangeArrays, frame: int, decided: Decided) -> NDArray[np.float64] | None:
+    stated = stated_pose(images, frame, decided)
     if stated is None:
         return None
     return from_world_to_camera(stated.matrix) if stated.is_to_camera else from_camera_to_world(stated.matrix)

@@ -137,6 +137,7 @@ CORRECTED = {
     "texture": Key(_texture, "vertices, dense, dense:500000 or none", ("vertices", "dense", "none")),
     "splats": _words("yes or no", "yes", "no"),
     "camera": Key(_camera, "fx,fy,cx,cy in pixels, then 4, 5 or 8 lens coefficients or none; or a file"),
+    "extrinsics": _words("to-camera or to-world", "to-camera", "to-world"),
     "depth-scale": Key(_positive, "a number of steps in one unit, above 0"),
     "depth-channel": Key(str, "a channel of the EXR file"),
     "axes": Key(
@@ -161,7 +162,7 @@ class Corrections(Mapping[str, Any]):
     missing:       "none", a float, or (x, y, z)
     camera:        tuple (fx, fy, cx, cy, *lens), in pixels with the centre of the first one at (0, 0); or a
                    file's name
-    depth-channel, unit, frames, take: str
+    depth-channel, extrinsics, unit, frames, take: str
     texture:       "none", "vertices", "dense", or "dense:500000", with the largest number of points
     times:         "names", "index", "fps:50", "column:NAME", or a file's name
 

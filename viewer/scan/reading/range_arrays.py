@@ -25,6 +25,9 @@ from ...errors import EmptyFrame, InputError
 from ..admission import MOST_FRAMES, check_count
 from ..contents import ArrayInFile, StatedCamera
 from .camera_files import cameras_of, field_of
+from .corrections import NOTHING_CORRECTED, Corrections
+from .record import Decision
+from .sequence import Decided
 
 Kind = Literal["depth", "xyz", "elevation"]
 ArrayT = TypeVar("ArrayT", bound=ArrayInFile)
@@ -51,8 +54,10 @@ _TO_WORLD = (
 )  # fmt: skip
 _TO_CAMERA = (
     "world_to_camera", "world2camera", "world2cam", "world_to_cam", "w2c", "t_cw", "camera_from_world",
-    "extrinsics", "extrinsic",
 )  # fmt: skip
+_EITHER = ("extrinsics", "extrinsic")  # to the camera by definition, but some programs mean the inverse
+KEY = "extrinsics"
+TO_CAMERA, TO_WORLD = "to-camera", "to-world"  # what `--read extrinsics=` takes
 _CHANNELS = (3, 4)
 _MATRICES = ((3, 3), (3, 4), (4, 4))
 _POSES = ((4, 4), (3, 4), (16,), (12,))
@@ -213,9 +218,9 @@ class StatedPose(NamedTuple):
     is_to_camera: bool
 
 
-def stated_pose(images: RangeArrays, frame: int) -> StatedPose | None:
+def stated_pose(images: RangeArrays, frame: int, decided: Decided) -> StatedPose | None:
     """The pose that the arrays state of a frame; None where they state none. Raises InputError."""
-    name = next((name for name in (*_TO_WORLD, *_TO_CAMERA) if name in images.arrays), None)
+    name = next((name for name in (*_TO_WORLD, *_TO_CAMERA, *_EITHER) if name in images.arrays), None)
     if name is None:
         return None
     array = images.arrays[name]
@@ -226,4 +231,16 @@ def stated_pose(images: RangeArrays, frame: int) -> StatedPose | None:
         raise InputError(f"array '{array.name}' is {array.shape} {array.dtype}, expected {expected}")
     rows = plain.read(frame if is_each else None).astype(np.float64).reshape(-1, 4)
     matrix = rows if len(rows) == 4 else np.vstack([rows, [0, 0, 0, 1]])
-    return StatedPose(array.name, matrix, name in _TO_CAMERA)
+    is_to_camera = name in _TO_CAMERA
+    if name in _EITHER:
+        decided.note(decision := decide_extrinsics(array.name, decided.corrections))
+        is_to_camera = decision.value == TO_CAMERA
+    return StatedPose(array.name, matrix, is_to_camera)
+
+
+def decide_extrinsics(name: str, corrections: Corrections = NOTHING_CORRECTED) -> Decision:
+    """Whether the matrices in the array of this name lead from the world to the camera, or back."""
+    if (by_user := corrections.decision(KEY)) is not None:
+        return by_user
+    why = f"Some programs store matrices from the camera to the world as '{name}'"
+    return Decision(KEY, TO_CAMERA, "assumed", name, why, (TO_WORLD,), changes_numbers=True)

@@ -30,6 +30,7 @@ KEYS = {
     "axes": "Axes",
     "ground": "Ground",
     "camera": "Camera",
+    "extrinsics": "Extrinsics",
     "depth-scale": "Depth scale",
     "depth-channel": "Depth channel",
     "texture": "Texture",
