@@ -11,6 +11,7 @@ import pytest
 
 from viewer.errors import InputError
 from viewer.scan.formats import read
+from viewer.scan.open import open_scan
 
 RNG = np.random.default_rng(5)
 COUNT = 100_000  # more than are unpacked at once
@@ -47,6 +48,41 @@ def test_points_colours_and_scalars_are_those_that_were_written(
 
 def test_room_for_colours_alone_is_no_colour(tmp_path: Path) -> None:
     assert read(save(tmp_path / "a.las")).colors is None
+
+
+@pytest.mark.parametrize("suffix", [".las", ".laz"])
+@pytest.mark.parametrize(("dimension", "frames"), [("frame", 3), ("confidence", 1)])
+def test_an_extra_dimension_may_tell_the_frames(
+    suffix: str, dimension: str, frames: int, tmp_path: Path
+) -> None:
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    header.scales = np.full(3, 1e-3)
+    header.add_extra_dim(laspy.ExtraBytesParams(name=dimension, type=np.int32))
+    written = laspy.LasData(header)
+    written.x, written.y, written.z = (POINTS[:300] - (4e5, 5e6, 0)).T
+    written[dimension] = np.repeat([0, 10, 20], 100)
+    written.write(tmp_path / f"a{suffix}")
+    with open_scan(tmp_path / f"a{suffix}") as scan:
+        assert len(scan) == frames
+        last = scan.pose(frames - 1).cloud
+    assert len(last) == 300 // frames
+    if frames == 3:
+        np.testing.assert_allclose(last.world(), POINTS[200:300] - (4e5, 5e6, 0), atol=1e-3)
+
+
+@pytest.mark.parametrize(("up", "decision"), [(1, "stored"), (0, "dropped")])
+def test_normals_that_are_all_the_same_are_normals(up: float, decision: str, tmp_path: Path) -> None:
+    header = laspy.LasHeader(point_format=3, version="1.2")
+    for name in ("nx", "ny", "nz"):
+        header.add_extra_dim(laspy.ExtraBytesParams(name=name, type=np.float32))
+    written = laspy.LasData(header)
+    written.x, written.y, written.z = np.mgrid[:10, :10, :1].reshape(3, -1)
+    written["nz"] = np.full(100, up)
+    written.write(tmp_path / "a.las")
+    with open_scan(tmp_path / "a.las") as scan:
+        normals = scan.pose(0).cloud.normals
+        assert scan.reading["normals"].value == decision
+    assert (normals is None) == (decision == "dropped")
 
 
 @pytest.mark.slow

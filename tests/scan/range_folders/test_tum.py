@@ -58,6 +58,19 @@ def test_pictures_and_poses_belong_together_by_time(tmp_path: Path) -> None:
         np.testing.assert_array_equal(view.color, colors(frame))
 
 
+def test_commas_may_separate_the_values_of_lists(tmp_path: Path) -> None:
+    put(tmp_path, [1, 1.1], [1, 1.1], "1.0 0 0 0 0 0 0 1\n1.1 1 0 0 0 0 0 1\n")
+    write_camera(tmp_path)
+    for name, separator in (("depth.txt", ","), ("rgb.txt", ", "), ("groundtruth.txt", ",")):
+        rows = (tmp_path / name).read_text().splitlines()
+        text = "".join((row if row[0] == "#" else row.replace(" ", separator)) + "\n" for row in rows)
+        (tmp_path / name).write_text(text)
+    with open_scan(tmp_path) as scan:
+        np.testing.assert_allclose(scan.times, [0, 0.1], atol=1e-5)
+        np.testing.assert_array_equal(scan.pose(1).views[0].color, colors(1))
+        np.testing.assert_allclose(scan.pose(1).views[0].eye, [1, 0, 0], atol=1e-6)
+
+
 def test_each_partner_belongs_to_one_at_most() -> None:
     times, others = np.array([0.0, 0.01, 0.1, 0.5]), np.array([0.008, 0.119, 0.121, 0.479])
     np.testing.assert_array_equal(nearest_once(times, others, 0.02), [-1, 0, 1, -1])

@@ -5,7 +5,7 @@ done in a process of its own.
 
 Coordinates are whole numbers times a scale and an offset, as float64. Colours are of 16 bit, or of 8 bit as
 many programs write them. Intensity, classification, returns, times and extra dimensions
-are scalars; those that are the same for all points are left out.
+are scalars; Scan4D leaves out those that are the same for all points.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from ...task import checkpoint
 from ...unfinished import temporary_folder
 from ..admission import MOST_COLUMNS, admit, check_count, opened, size_of, too_few
 from ..contents import PointContents
+from ..reading.cloud import GEOMETRY
 from ._columns import named
 
 if TYPE_CHECKING:
@@ -62,6 +63,17 @@ def contents(path: Path, frame: int = 0) -> PointContents:
         _unpack_beside(path, plain)
         with laspy.open(plain) as reader:
             return PointContents(columns=_columns(reader, plain.stat().st_size))
+
+
+def column_names(path: Path) -> list[str]:
+    """The names of the dimensions of a point, from the header. Raises InputError."""
+    import laspy
+
+    with opened(path) as stream:
+        _checked_format(stream.read(_FIRST.size), size_of(stream))
+        stream.seek(0)
+        with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
+            return [*reader.header.point_format.dimension_names]
 
 
 def unpack_laz(packed: str, plain: str) -> None:
@@ -151,7 +163,7 @@ def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:
     if not any(columns[name].any() for name in _COLORS if name in columns):  # room for them alone
         for name in _COLORS:
             columns.pop(name, None)
-    for name in columns.keys() - {"x", "y", "z", *_COLORS}:
+    for name in [name for name in columns if name.lower() not in GEOMETRY]:
         if (columns[name] == columns[name][0]).all():
             del columns[name]
     return named(columns.items())

@@ -109,6 +109,8 @@ def _rows(path: Path) -> tuple[NDArray[np.float64], list[list[str]]]:
     """Times (N,), increasing, and the words behind them. Raises InputError."""
     by_time: dict[float, list[str]] = {}
     for number, words in rows_of(path, PICTURE_BYTES):
+        if "," in words[0]:
+            words = " ".join(words).replace(",", " ").split() or words
         by_time.setdefault(_time(words, path, number), words[1:])
     times = sorted(by_time)
     return np.array(times), [by_time[time] for time in times]
