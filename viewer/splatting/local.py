@@ -24,7 +24,7 @@ from ..task import Task, in_background
 from .splats import Splats
 
 NEAREST, LOCAL = SURFACES = ("nearest", "local")  # values of the parameter `surface`
-_DETAIL = 0.08  # deviations in spacings up to which curvature may be taken for noise
+DETAIL = 0.08  # deviations in spacings up to which curvature may be taken for noise
 _THICK = 6.0  # deviations from the nearest splat of a layer to the farthest
 _SMOOTHEST = 0.5  # factor on the falloff of weights where noise is a third of a spacing or more
 _NOISY = 1 / 3
@@ -66,8 +66,8 @@ class Layer:
     def __init__(self, noise: Noise | None) -> None:
         self.known = noise is not None
         self.thickness, self.smoothing = 0.0, 1.0
-        if noise is not None and noise.deviation > _DETAIL * noise.spacing:
-            self.thickness = _THICK * math.sqrt(noise.deviation**2 - (_DETAIL * noise.spacing) ** 2)
+        if noise is not None and noise.deviation > DETAIL * noise.spacing:
+            self.thickness = _THICK * math.sqrt(noise.deviation**2 - (DETAIL * noise.spacing) ** 2)
             noisy = min(noise.deviation / (_NOISY * noise.spacing), 1.0)
             self.smoothing = 1 - (1 - _SMOOTHEST) * noisy
 

@@ -8,14 +8,16 @@ Neighbours can also be hidden points of the same surface, so that neighbourhoods
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from ...gpu.pose import GpuPose
 from ...params import param
 from ...picture.surface import Surface
+from ...scan.noise import Noise
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
-from ...splatting.local import layer_of, surface_param
+from ...splatting.local import DETAIL, PoseNoise, layer_of, surface_param
 from ...splatting.packed import VARIANTS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .grids import border_of
@@ -27,6 +29,11 @@ _HIDDEN_COPIES = (
 )
 
 _FEW = 200  # points
+_NO_NOISE = Noise(0.0, 0.0)
+_USUAL_COUNT = 10  # points of a neighborhood, for which the next numbers hold
+# How many more radii of neighborhoods planes take in for a spacing of noise more, and how many at most: they
+# give about the least errors of normals on models whose surface is known.
+_WIDENING, _WIDEST = 3.2, 2.0
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
 
 
@@ -164,7 +171,11 @@ class AutoSplats(Backend):
         """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
         params: Params = frame.params
         found = surface.cached(Neighborhoods)
-        search = search_of(params, pose)
+        # Estimated in the background; until then, planes are those of points without noise.
+        noise = (
+            pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None) if params.adaptive else _NO_NOISE
+        )
+        search = search_of(params, pose, noise or _NO_NOISE)
         anew = bool(frame.changed - {"parameters", "values"})
         border = border_of(pose.cloud, frame.view, params.k)
         found.find(pose, surface, frame.view, search, frame.share, anew, border)
@@ -173,7 +184,7 @@ class AutoSplats(Backend):
             surface.clear()
             surface.own("normal")
             give_value(found, surface, params.radius_scale)
-            return surface.stats.share < 1
+            return surface.stats.share < 1 or noise is None
         instancing, scale = params.instancing, params.radius_scale
         if not found.is_whole:
             draw_depths(_points(pose, found, params), surface, instancing=instancing, radius_scale=scale)
@@ -189,7 +200,7 @@ class AutoSplats(Backend):
             layer=layer,
         )
         give_value(found, surface, params.radius_scale)
-        return surface.stats.share < 1 or not layer.known
+        return surface.stats.share < 1 or not layer.known or noise is None
 
 
 def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:
@@ -204,8 +215,8 @@ def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:
     )
 
 
-def search_of(params: Params, pose: GpuPose) -> Search:
-    """The search that parameters ask for."""
+def search_of(params: Params, pose: GpuPose, noise: Noise) -> Search:
+    """The search that parameters ask for, of points with some noise."""
     return Search(
         k=params.k,
         hidden_neighbors=params.hidden_neighbors,
@@ -216,4 +227,16 @@ def search_of(params: Params, pose: GpuPose) -> Search:
         adaptive=params.adaptive,
         elliptical=params.elliptical,
         by_scanner=params.orient == "scanner" and bool(pose.views),
+        widening=_widening(noise, params.k),
     )
+
+
+def _widening(noise: Noise, k: int) -> float:
+    """How many radii of a neighborhood of k points the points reach that determine its plane.
+
+    More neighbors than usual determine the plane too, so that a ball needs less to add.
+    """
+    if noise.deviation <= DETAIL * noise.spacing:
+        return 1.0
+    radii = min(1 + _WIDENING * (noise.deviation / noise.spacing - DETAIL), _WIDEST)
+    return radii * min(math.sqrt(_USUAL_COUNT / k), 1.0)

@@ -64,7 +64,8 @@ class Search:
     second point must lie, in usual ones; others are outliers. drops: whether these have no splat. by_scanner:
     whether normals point to the side that a range view saw, not to the eye. adaptive: whether planes go
     through as few of the nearest as noise allows. elliptical: whether splats are longer where neighbors are
-    farther apart; else only those of lines of points are no discs.
+    farther apart; else only those of lines of points are no discs. widening: radii of a neighborhood within
+    which points determine its plane, nearer ones with more weight; up to 1: those of the neighborhood do.
     """
 
     k: int = 10
@@ -76,6 +77,7 @@ class Search:
     by_scanner: bool = False
     adaptive: bool = False
     elliptical: bool = False
+    widening: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -359,6 +361,8 @@ class Neighborhoods:
                 with self._gpu.timers.measure("unknown"):
                     list_flagged(self._gpu, "auto_splats/unknown.glsl", self.count, listed, self._bind_next)
             self._run_search(pose, search, number, first, listed)
+        if search.widening > 1:
+            self._steady_normals(pose, search, first)
         self._join_lines(pose, search)
 
     def read_rounds(self) -> dict[str, int]:
@@ -377,7 +381,7 @@ class Neighborhoods:
             "FIRST_BALL": _FIRST_BALL,
             "LANES": _LANES if number == 2 else 1,
             "HAS_COLORS": int(pose.cloud.colors is not None),
-            "ADAPTIVE": int(search.adaptive),
+            "ADAPTIVE": int(search.adaptive and search.widening <= 1),
             "ELLIPTICAL": str(search.elliptical).lower(),
             "DIRECTIONS": _DIRECTIONS,
         }
@@ -392,6 +396,14 @@ class Neighborhoods:
                 self._gpu.dispatch(program, self.count - first)
             else:
                 listed.run(program)
+
+    def _steady_normals(self, pose: GpuPose, search: Search, first: int) -> None:
+        """Fit the planes of those listed from `first` on to more points than their neighborhoods have."""
+        defines = {"LANES": 1, "ELLIPTICAL": str(search.elliptical).lower()}
+        with self._gpu.timers.measure("steady"):
+            program = self._searching("auto_splats/steady.comp", pose, search, defines)
+            self._gpu.set(program, first=first, widening=search.widening)
+            self._gpu.dispatch(program, self.count - first)
 
     def _join_lines(self, pose: GpuPose, search: Search) -> None:
         """Have splats of points on a line reach halfway to the lines beside."""

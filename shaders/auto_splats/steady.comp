@@ -1,0 +1,56 @@
+// Normals of noisy points: planes through all participants within a ball that is wider than the neighborhood, nearer
+// ones with more weight (moving least squares, Levin 2003), in place of planes through the neighborhood.
+//
+// Sums are of whole numbers: they do not depend on the order of participants in their cells.
+#include "common/item.glsl"
+#include "auto_splats/ball.glsl"
+#include "auto_splats/eigen.glsl"
+#include "auto_splats/splat.glsl"
+
+layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of those that are searched
+layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { float extents[]; };
+layout(std430, binding = STORAGE_NEXT) readonly buffer Next { float next[]; };  // below 0: lines.comp finds the plane
+uniform uint first;
+uniform float widening;  // radii of the neighborhood that the ball reaches
+
+const float STEPS = 131072.0;  // of whole numbers to 1: sums of 16 000 points fit
+const float COLLINEAR = 1e-4;  // of the largest eigenvalue, below which the second makes no plane
+
+float scale;  // one over the ball's radius
+int weights;
+ivec3 sum, squares, products;
+
+void take(vec3 offset, uint row) {
+    vec3 away = offset * scale;
+    float weight = 1.0 - dot(away, away);
+    if (weight <= 0.0) return;
+    vec3 weighted = STEPS * weight * away;
+    weights += int(STEPS * weight);
+    sum += ivec3(weighted);
+    squares += ivec3(weighted * away);
+    products += ivec3(weighted.yzx * away.zxy);
+}
+
+void main() {
+    uint i = item();
+    if (i >= item_count) return;
+    uint n = first + i;
+    uvec4 slot = texelFetch(slots, int(texelFetch(listed, int(n)).r));
+    uint row = slot.w >> 1;
+    float radius = widening * extents[row];
+    if (next[n] < 0.0 || !(radius * unit > 0.0)) return;
+    scale = 1.0 / (radius * unit);
+    weights = 0;
+    sum = squares = products = ivec3(0);
+    center = to_view(texelFetch(positions, int(row)).xyz);
+    take_from(cells_of(radius), uintBitsToFloat(slot.xyz), 0);
+    vec3 total = vec3(sum) / STEPS, mean = total * STEPS / float(max(weights, 1));
+    mat3 vectors;
+    vec3 values = eigen(vec3(squares) / STEPS - total * mean, vec3(products) / STEPS - total.yzx * mean.zxy, vectors);
+    if (values.y <= COLLINEAR * values.z) return;
+    vec3 normal = vectors[0];
+    if (dot(normal, seen_from(row)) < 0.0) normal = -normal;
+    splats[3u * row] = packSnorm2x16(folded(normal));
+    splats[3u * row + 2u] = pack_axes(normal, vectors[2], ELLIPTICAL ? max(values.y, 0.0) / values.z : 1.0);
+    looks[2u * row + 1u] = pack_normal(normal);
+}
