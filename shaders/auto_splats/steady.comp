@@ -22,10 +22,9 @@ ivec3 sum, squares, products;
 
 void take(vec3 offset, uint row) {
     vec3 away = offset * scale;
-    float weight = 1.0 - dot(away, away);
-    if (weight <= 0.0) return;
-    vec3 weighted = STEPS * weight * away;
-    weights += int(STEPS * weight);
+    float weight = STEPS * max(1.0 - dot(away, away), 0.0);
+    vec3 weighted = weight * away;
+    weights += int(weight);
     sum += ivec3(weighted);
     squares += ivec3(weighted * away);
     products += ivec3(weighted.yzx * away.zxy);

@@ -33,7 +33,7 @@ _NO_NOISE = Noise(0.0, 0.0)
 _USUAL_COUNT = 10  # points of a neighborhood, for which the next numbers hold
 # How many more radii of neighborhoods planes take in for a spacing of noise more, and how many at most: they
 # give about the least errors of normals on models whose surface is known.
-_WIDENING, _WIDEST = 3.2, 2.0
+_WIDENING, _WIDEST = 3.0, 1.95
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
 
 
