@@ -31,9 +31,9 @@ _HIDDEN_COPIES = (
 _FEW = 200  # points
 _NO_NOISE = Noise(0.0, 0.0)
 _USUAL_COUNT = 10  # points of a neighborhood, for which the next numbers hold
-# How many more radii of neighborhoods planes take in for a spacing of noise more, and how many at most: they
-# give about the least errors of normals on models whose surface is known.
-_WIDENING, _WIDEST = 3.0, 1.95
+# By how many radii of neighborhoods the ball of a plane grows for each spacing of noise, and its most radii.
+# These values give about the least errors of normals on models whose surface is known.
+_WIDENING, _WIDEST = 2.6, 1.95
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
 
 
@@ -54,7 +54,8 @@ class Params:
     )
     adaptive: bool = param(
         True,
-        "Fit each normal to as few of the k neighbours as the noise allows",
+        "Fit each normal to as few of the k neighbours as the noise allows, and to more points if the points "
+        "are very noisy",
         group=_NEIGHBORS,
         sweep=(True, False),
     )
@@ -171,10 +172,7 @@ class AutoSplats(Backend):
         """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
         params: Params = frame.params
         found = surface.cached(Neighborhoods)
-        # Estimated in the background; until then, planes are those of points without noise.
-        noise = (
-            pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None) if params.adaptive else _NO_NOISE
-        )
+        noise = _noise_of(pose, frame)
         search = search_of(params, pose, noise or _NO_NOISE)
         anew = bool(frame.changed - {"parameters", "values"})
         border = border_of(pose.cloud, frame.view, params.k)
@@ -189,6 +187,10 @@ class AutoSplats(Backend):
         if not found.is_whole:
             draw_depths(_points(pose, found, params), surface, instancing=instancing, radius_scale=scale)
             found.find_late(pose, surface, search)
+        if search.widening > 1:
+            surface.stats.chosen["adaptive"] = (
+                f"balls of {search.widening:.2g} radii, because points are noisy"
+            )
         layer = layer_of(pose, frame, surface, blends=params.passes == "two")
         draw_splats(
             _points(pose, found, params),
@@ -201,6 +203,13 @@ class AutoSplats(Backend):
         )
         give_value(found, surface, params.radius_scale)
         return surface.stats.share < 1 or not layer.known or noise is None
+
+
+def _noise_of(pose: GpuPose, frame: FrameView) -> Noise | None:
+    """The noise that planes adapt to; None as long as it is not known. The background estimates it."""
+    if not frame.params.adaptive:
+        return _NO_NOISE
+    return pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None)
 
 
 def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:
@@ -232,9 +241,9 @@ def search_of(params: Params, pose: GpuPose, noise: Noise) -> Search:
 
 
 def _widening(noise: Noise, k: int) -> float:
-    """How many radii of a neighborhood of k points the points reach that determine its plane.
+    """The radius of the ball whose points determine a plane, in radii of a neighborhood of k points.
 
-    More neighbors than usual determine the plane too, so that a ball needs less to add.
+    A neighborhood of more than the usual number of points is wider already, so its ball grows less.
     """
     if noise.deviation <= DETAIL * noise.spacing:
         return 1.0

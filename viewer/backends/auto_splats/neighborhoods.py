@@ -64,8 +64,8 @@ class Search:
     second point must lie, in usual ones; others are outliers. drops: whether these have no splat. by_scanner:
     whether normals point to the side that a range view saw, not to the eye. adaptive: whether planes go
     through as few of the nearest as noise allows. elliptical: whether splats are longer where neighbors are
-    farther apart; else only those of lines of points are no discs. widening: radii of a neighborhood within
-    which points determine its plane, nearer ones with more weight; up to 1: those of the neighborhood do.
+    farther apart; else only those of lines of points are no discs. widening: radius of the ball
+    whose points determine a plane, in radii of the neighborhood; up to 1: the neighborhood determines it.
     """
 
     k: int = 10
@@ -398,7 +398,7 @@ class Neighborhoods:
                 listed.run(program)
 
     def _steady_normals(self, pose: GpuPose, search: Search, first: int) -> None:
-        """Fit the planes of those listed from `first` on to more points than their neighborhoods have."""
+        """Fit planes to wider balls than neighborhoods, for those listed from `first` on."""
         defines = {"LANES": 1, "ELLIPTICAL": str(search.elliptical).lower()}
         with self._gpu.timers.measure("steady"):
             program = self._searching("auto_splats/steady.comp", pose, search, defines)
