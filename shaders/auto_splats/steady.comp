@@ -15,6 +15,7 @@ uniform float widening;  // radii of the neighborhood that the ball reaches
 
 const float STEPS = 131072.0;  // of whole numbers to 1: sums of 16 000 points fit
 const float COLLINEAR = 1e-4;  // of the largest eigenvalue, below which the second makes no plane
+const float GROWTH = 0.15;  // of a splat's radius, for a ball of twice the neighborhood's radius
 
 float scale;  // one over the ball's radius
 int weights;
@@ -50,6 +51,9 @@ void main() {
     vec3 normal = vectors[0];
     if (dot(normal, seen_from(row)) < 0.0) normal = -normal;
     splats[3u * row] = packSnorm2x16(folded(normal));
+    // Noise moves splats off each other, so that they would leave gaps where they are seen from the side.
+    float grown = (1.0 + GROWTH * (widening - 1.0)) * uintBitsToFloat(splats[3u * row + 1u]);
+    splats[3u * row + 1u] = floatBitsToUint(grown);  // 0 stays: of outliers
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], ELLIPTICAL ? max(values.y, 0.0) / values.z : 1.0);
     looks[2u * row + 1u] = pack_normal(normal);
 }
