@@ -130,7 +130,7 @@ def test_new_files_and_folders_are_none_that_exist(tmp_path: Path) -> None:
 MAKERS = {"folders.py", "unfinished.py", "files.py"}  # where files and folders are made
 GIVEN = {"whole_file", "temporary_file", "_writing"}  # what gives a file that is there to be written
 WRITERS = {  # what is called with such a file
-    "scan/formats", "analysis/landmarks/files", "output/export.py",
+    "scan/formats", "scan/octree/file.py", "analysis/landmarks/files", "output/export.py",
 }  # fmt: skip
 # They write into /proc, open the standard streams, and make damaged files in a folder of their own.
 ELSEWHERE = {"drawing/timing.py", "commands/_line.py", "testing/readers.py"}

@@ -18,7 +18,7 @@ from viewer.scan.pose import Pose
 
 POSE = Pose(0, 0.0, "sphere", sphere(30_000))
 # As motion shows it, so that the second of two pictures is no preview.
-PARAMS = find_backend("surfels").params({"passes": "one"})
+PARAMS = find_backend("surfels").params({"passes": "one", "surface": "nearest"})
 REQUEST = Request(POSE, Camera.orbit(POSE.cloud.bounds()), "surfels", PARAMS)
 SIZE = (60, 40)
 LATER = 60.0  # seconds

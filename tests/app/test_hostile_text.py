@@ -19,7 +19,15 @@ FORMATS = {"format", "format_max", "float_format"}  # parameters that ImGui read
 LABELS = {"label", "str_id", "name", "label_id", "title_id", "preview_value", "overlay"}  # that end at "##"
 GUARDS = {"format": {"number_format"}, "label": {"labelled", "unhidden", "id"}}
 # Texts that stand in the program.
-DECLARED = {"menu.title", "entry.title", "entry.name", "parameter.name", "parameter.group", "options.rest"}
+DECLARED = {
+    "menu.title",
+    "entry.title",
+    "entry.name",
+    "parameter.name",
+    "parameter.group",
+    "options.rest",
+    "section.title",
+}
 HOSTILE = "%s%s%s%s%s%s%n##hidden###other"
 
 

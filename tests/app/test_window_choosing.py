@@ -34,6 +34,7 @@ POSE = Pose(0, 0.0, "sphere", sphere(30_000))
 CAMERA = Camera.orbit(POSE.cloud.bounds())
 SIZE = (90, 60)
 LATER = 60.0  # seconds
+ONE_PASS = Configuration("surfels", {"passes": "one", "surface": "nearest"})
 
 
 def law(ms: float, error: float) -> Law:
@@ -42,7 +43,7 @@ def law(ms: float, error: float) -> Law:
 
 
 MODEL = {
-    "points": law(5, 2.0), "points point_size=0": law(10, 1.5), "surfels passes=one": law(20, 1.0),
+    "points": law(5, 2.0), "points point_size=0": law(10, 1.5), ONE_PASS.key: law(20, 1.0),
     "surfels": law(40, 0.5),
 }  # fmt: skip
 
@@ -110,7 +111,7 @@ def test_nothing_is_looked_at_without_a_goal(shown: Shown) -> None:
 
 
 def test_the_best_way_within_the_bound_is_chosen_and_no_step_of_the_history(shown: Shown) -> None:
-    for bound, key in ((45.0, "surfels"), (25.0, "surfels passes=one"), (6.0, "points"), (1.0, "points")):
+    for bound, key in ((45.0, "surfels"), (25.0, ONE_PASS.key), (6.0, "points"), (1.0, "points")):
         shown.session.change("Change bound", goal=Goal("time", bound))
         way = shown.settle()
         assert way is not None
@@ -127,7 +128,7 @@ def test_undo_of_what_was_done_before_a_choice_keeps_the_choice(shown: Shown) ->
     shown.session.change("Choose automatically", goal=Goal("time", 25.0))
     shown.session.change("Change light", look=Look(light="flat"))
     way = shown.settle()
-    assert way == Configuration("surfels", {"passes": "one"})
+    assert way == ONE_PASS
     shown.session.history.undo()
     assert shown.session.document.configuration is None
     shown.draw()
@@ -137,7 +138,7 @@ def test_undo_of_what_was_done_before_a_choice_keeps_the_choice(shown: Shown) ->
 
 def test_an_error_is_bounded_in_pixels_and_in_the_unit_of_the_scan(shown: Shown) -> None:
     shown.session.change("Name unit", unit="mm", goal=Goal("error", 1.2, "px"))
-    assert shown.settle() == Configuration("surfels", {"passes": "one"})
+    assert shown.settle() == ONE_PASS
     comparison = shown.choosing.comparison
     assert comparison is not None
     for unit, factor in (("mm", 1.0), ("cm", 0.1)):

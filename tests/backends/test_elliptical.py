@@ -111,7 +111,8 @@ def test_far_from_the_axis_and_cut_off_early(surfels: Draw, way: str, projection
     axes = np.column_stack([tangents * 0.4, rng.uniform(0.05, 0.5, count)])
     cloud = PointCloud.from_arrays(positions, normals=normals, axes=axes)
     camera = Camera((0, 0, 0), (0, 0, -1), fov_y=110, projection=projection, height=6.0, near=0.05)
-    surface = surfels(cloud, camera, size, instancing=way, mask_falloff=4.0, mask_cutoff=0.3)
+    masks = {"mask_falloff": 4.0, "mask_cutoff": 0.3}
+    surface = surfels(cloud, camera, size, instancing=way, surface="nearest", **masks)
     assert_exact(surface, cloud, 3000, cutoff=-np.log(0.3) / 4)
 
 

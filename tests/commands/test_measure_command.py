@@ -231,7 +231,7 @@ def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
     words = ("measure", "seq", "--landmarks", "landmarks.csv", "--measures", "measures.json", "--unit", "mm")
     done = run(*words, "-o", "out.csv", "--plot", "plot.svg", "--pose", "0")
     assert done.code == 0, done.err
-    assert "'raum' is not plotted in plot.svg: its axes are in mm, °, mm², not mm³" in done.err
+    assert "'raum' is not plotted in plot.svg: the axes of the plot are in mm, °, mm², not mm³" in done.err
     assert run(*words, "-o", "o.csv", "--plot", "plot.csv", "--pose", "0").err.count("plot.csv") == 0
     assert "raum [mm³]" in table(Path("plot.csv"))[0]
 

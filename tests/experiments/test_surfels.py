@@ -72,7 +72,7 @@ def test_each_scan_meets_every_feed_in_two_passes() -> None:
             params = asdict(contender.params)
             others = asdict(backend("surfels").params()) | {
                 "instancing": params["instancing"], "passes": "two", "enlarge": 2.0, "cull_back": True,
-                "radius": "uniform",
+                "radius": "uniform", "surface": "nearest",
             }  # fmt: skip
             assert params == others
 

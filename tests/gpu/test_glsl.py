@@ -47,7 +47,6 @@ from viewer.picture.surface import Surface
 from viewer.resources import resource_path
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
-from viewer.splatting import culling
 from viewer.splatting.amplify import FEEDS
 from viewer.splatting.packed import VARIANTS, draw_splats
 from viewer.task import Task
@@ -241,8 +240,7 @@ def draw_chunks(renderer: Renderer) -> None:
             patched.setattr(chunks, "_SCATTERED", 2.0)
             patched.setattr(chunks, "_LOOSE", 2.0)
             patched.setattr(chunks, "in_file_order", ordered)
-            for module in (chunks, culling):
-                patched.setattr(module, "in_background", at_once)
+            patched.setattr(chunks, "in_background", at_once)
             pose, surface = Pose(0, 0.0, "test", cloud), Surface(renderer.gpu, (40, 30))
             camera = Camera.orbit(pose.bounds, **CAMERA)
             for shown in (False, False, True):

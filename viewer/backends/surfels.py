@@ -36,13 +36,8 @@ from . import Backend, FrameView, Limit, Suited, share_param, with_levels
 
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
-    "splats drawn over each other are partly transparent; their radii, the number of copies and, at "
-    "equal depths, rounding decide how much shows through"
-)
-
-_WIDE_MEAN = (
-    "the depth is a mean of splats whose centres lie far outside the picture, so that rounding turns them by "
-    "more than the nearest one"
+    "pixels show a mean of splats that lie over each other; their radii, the number of copies and "
+    "rounding decide how much each of them counts"
 )
 
 _VARIANTS = ("tiles", *FEEDS)
@@ -145,7 +140,7 @@ class Surfels(Backend):
     limits = {
         "zoomed in to a millionth of the scan's width": (
             Limit(0.0, _SEEN_THROUGH, _SORTED),
-            Limit(0.0, _WIDE_MEAN),
+            Limit(0.0, _SEEN_THROUGH),
         ),
         "zoomed in to 1/1000 of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
         "zoomed in to a millionth of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),

@@ -23,7 +23,7 @@ class Configuration:
 
     @property
     def key(self) -> str:
-        """Name in models, which hold at every scale and level of detail: 'surfels passes=one'."""
+        """Name in models, which hold at every scale and level of detail: 'surfels passes=two'."""
         values = [f"{name}={value}" for name, value in sorted(self.values.items()) if name != _SHARE]
         return " ".join([self.backend, *values])
 

@@ -8,9 +8,9 @@ from __future__ import annotations
 from enum import IntEnum, auto, unique
 
 
-@unique
 class Texture(IntEnum):
-    """Texture units, of which a driver has 96 or more: each thing has its own. A stage reads up to 16."""
+    """Texture units, of which a driver has 96 or more: all but those at the end have their own. A stage
+    reads up to 16."""
 
     # Images, below 15, the least unit that moderngl makes textures at.
     PICTURE = 0  # shaded
@@ -83,12 +83,6 @@ class Texture(IntEnum):
     USUAL = auto()
     COUNTS = auto()
     FOUND = auto()  # what a neighborhood tells
-    # Nodes of an octree, beside a pose.
-    NODE_MASKS = auto()  # which children there are
-    FIRST_CHILDREN = auto()
-    NODE_CELLS = auto()
-    NODE_OFFSETS = auto()  # of the surface in their cells
-    NODE_COLORS = auto()
     # Samples of range views.
     RANGE_DEPTHS = auto()
     RANGE_LOOKS = auto()
@@ -117,6 +111,12 @@ class Texture(IntEnum):
     SHAPE_ROWS = auto()  # of shapes larger than a word
     MATERIALS = auto()  # of points
     SCRATCH = auto()  # where buffers become textures
+    # Nodes of an octree, beside a pose; no program reads these and hidden points.
+    NODE_MASKS = HOMES  # which children there are
+    FIRST_CHILDREN = OCCUPIED
+    NODE_CELLS = VISIBLE
+    NODE_OFFSETS = COPIES  # of the surface in their cells
+    NODE_COLORS = LIMITS
 
 
 class Storage(IntEnum):

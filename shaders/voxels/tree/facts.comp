@@ -21,7 +21,7 @@ uint ordered(float value) {
 
 void main() {
     uint i = item(), me = gl_LocalInvocationID.x;
-    if (me < 3u) group_lowest[me] = 0xFFFFFFFFu, group_highest[me] = 0u;
+    if (me < 3u) group_lowest[me] = NOTHING, group_highest[me] = 0u;
     if (me == 0u) group_longest = 0u;
     memoryBarrierShared();
     barrier();

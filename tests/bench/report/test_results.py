@@ -90,8 +90,8 @@ def test_what_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:
     [
         ("{", "is not a row of data"),
         ("[1, 2]", "not a JSON object"),
-        ('{"backend": "points"}', "it lacks a usable scene, scene_hash"),
-        (json.dumps({**a_row(), "errors": 3}), "it lacks a usable errors"),
+        ('{"backend": "points"}', "the row lacks a usable scene, scene_hash"),
+        (json.dumps({**a_row(), "errors": 3}), "the row lacks a usable errors"),
     ],
 )
 def test_a_broken_line_is_named(tmp_path: Path, line: str, what: str) -> None:

@@ -358,7 +358,7 @@ def _draw_files(choices: FrameChoices, height: float) -> None:
     clipper.begin(len(choices.rows))
     while clipper.step():
         for at in range(clipper.display_start, clipper.display_end):
-            imgui.push_id(choices.rows[at].name)
+            imgui.push_id(widgets.unhidden(choices.rows[at].name))
             _draw_file(choices, at, columns)
             imgui.pop_id()
     imgui.end_table()

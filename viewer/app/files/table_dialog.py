@@ -325,7 +325,7 @@ def _draw_rows(
         return
     column_width = _COLUMN * imgui.get_font_size()
     for column in range(width):
-        imgui.table_setup_column(str(column), imgui.TableColumnFlags_.width_fixed, column_width)
+        imgui.table_setup_column(f"##{column}", imgui.TableColumnFlags_.width_fixed, column_width)
     imgui.table_setup_scroll_freeze(0, 2 if names else 1)
     imgui.table_next_row()
     roles = choices.roles

@@ -24,7 +24,6 @@ _KINDS = {"positions": "f4", "normals": "f4", "radii": "f4", "colors": "u1", "oc
 _SPARE = 8  # a share of this much more room, so that the next view's octants fit
 _POOLED = 2  # arrays that wait for the next views
 _FACTS = 32  # bytes before the sample
-_ALL_BITS = 0xFFFFFFFF
 
 
 class CutArrays:
@@ -220,7 +219,7 @@ def _find_facts(pose: CutPose, inside: tuple[NDArray, NDArray] | None = None) ->
     step = stride(count)
     sampled = 0 if inside else -(-count // step)
     buffer = gpu.cached(_facts_buffer)
-    buffer.write(np.array([*[_ALL_BITS] * 3, *[0] * 5], np.uint32))
+    buffer.write(np.array([*[NOTHING] * 3, *[0] * 5], np.uint32))
     program = gpu.compute("voxels/tree/facts.comp", {"INSIDE": int(inside is not None)})
     with gpu.timers.measure("facts"):
         pose.array("positions").bind(Texture.POSITIONS)
