@@ -29,6 +29,7 @@ from test_pyramid import FILTERS, chain, picture
 from test_range_samples import held, probe, seen_by, stepped_view
 
 from viewer.backends import Backend, backend, backends
+from viewer.backends.voxels import cuts
 from viewer.bench import baselines
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame, supersample
@@ -257,6 +258,29 @@ def draw_chunks(renderer: Renderer) -> None:
                 assert surface.stats.counted
 
 
+def draw_noisy(renderer: Renderer) -> None:
+    """Pictures of a noisy surface: of the local surface, by tiles and by a feed, and of steadied planes."""
+    cloud, rng = sphere(1500), np.random.default_rng(1)
+    noisy = replace(cloud, positions=cloud.positions + rng.normal(0, 2, (len(cloud), 3)).astype(np.float32))
+    surface = Surface(renderer.gpu, (40, 30))
+    for name, values in (("surfels", {}), ("surfels", {"instancing": "gs"}), ("auto_splats", {})):
+        pose = Pose(0, 0.0, "noisy", noisy)
+        request = Request(pose, Camera.orbit(pose.bounds, **CAMERA), name, backend(name).params(values))
+        render_frame(renderer, request, surface)
+    assert "local" in surface.stats.chosen["surface"]
+
+
+def draw_nodes(renderer: Renderer) -> None:
+    """Octants that shaders find, as graphics cards do, with all that they may have."""
+    _, rich, *_ = clouds()
+    surface = Surface(renderer.gpu, (40, 30))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(cuts, "ON_SOFTWARE", True)
+        pose = Pose(0, 0.0, "test", rich)
+        request = Request(pose, Camera.orbit(pose.bounds, **CAMERA), "voxels", backend("voxels").params())
+        render_frame(renderer, request, surface)
+
+
 def use_primitives(gpu: Gpu) -> None:
     """What backends may use of each primitive, whether one does or not."""
     gpu.activate()
@@ -294,6 +318,8 @@ def programs(request: pytest.FixtureRequest) -> list[list[Source]]:
     draw_samples(renderer)
     draw_packed(renderer, whole)
     draw_chunks(renderer)
+    draw_noisy(renderer)
+    draw_nodes(renderer)
     use_primitives(renderer.gpu)
     renderer.release()
     built = moderngl.Program | moderngl.ComputeShader
