@@ -180,7 +180,7 @@ def _scalar_types_that_files_do_not_know_keep_their_values(path: Path) -> None:
 
 def _points_without_finite_coordinates_are_refused(path: Path) -> None:
     formats.write(path, PointCloud(np.full((4, 3), np.nan, np.float32), np.zeros(3)))
-    assert "none of its 4 points has finite coordinates" in _refused(path)
+    assert "none of the 4 points has finite coordinates" in _refused(path)
 
 
 def _infinite_points_are_dropped_and_counted(path: Path) -> None:
