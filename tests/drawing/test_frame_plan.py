@@ -43,6 +43,7 @@ def test_a_window_frame_is_planned_and_resolved_once(viewport: Viewport, name: s
         viewport.draw(document.request(POSE))
         time.sleep(0.001)
     turned = replace(document, camera=CAMERA.orbited(10, 0)).request(POSE)
+    viewport.rest()  # however slow the machine is, no preview
     moves = Moves(*DECIDING)
     with moves.counted():
         assert viewport.draw(turned)
