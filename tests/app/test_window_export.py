@@ -207,9 +207,11 @@ def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path)
 
 
 @pytest.mark.slow
-def test_frames_become_a_film_and_values_have_stayed(app: RunningApp, folder: Path) -> None:
+def test_frames_become_a_film(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
     dialog.choose("what", "###frames")
+    dialog.enter("width", 96)
+    dialog.enter("height", 64)
     dialog.enter("first", 2)
     dialog.enter("last", 5)
     dialog.choose("format", "###mp4")

@@ -20,7 +20,7 @@ def test_a_rate_and_names_tell_the_times(screen: Screen, tmp_path: Path) -> None
     for stamp in ("5.000", "5.500", "6.000"):
         formats.write(scan / f"{stamp}.npz", PointCloud.from_arrays(points))
     with running_app(screen, tmp_path, scan) as app:
-        app.see(scan_rate=25)
+        app.see(scan_rate=2)
         app.act(PANEL, ("item_input_value", "##rate", 50.0))
         app.see(scan_rate=50)
         app.act(PANEL, ("item_check", "Times from file names"))
