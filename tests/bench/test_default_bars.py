@@ -25,10 +25,10 @@ MESHES = ("bunny", "armadillo", "horse", "igea")
 QUICK = ("bunny", "bunny-bare")
 SCENES = [f"{name}{suffix}" for name in MESHES for suffix in ("", "-bare", "-ramp", "-ramp-bare")]
 # Normals are judged where they are estimated.
-CLOSED, WRONG_LAYERS, NORMALS, DEPTH = 99.69, 1.0, 3.0, 0.25
+CLOSED, WRONG_LAYERS, NORMALS, DEPTH = 99.7, 1.0, 3.0, 0.25
 # The figures of scenes that miss a bar. The bunny is open below: what is seen inside has few points.
 MISSED = {
-    "closed_percent": {},
+    "closed_percent": {"armadillo-ramp": 99.698},
     "wrong_layer_percent": {
         "bunny": 2.1, "bunny-bare": 2.5, "bunny-ramp": 3.6, "bunny-ramp-bare": 4.2, "armadillo-bare": 1.09,
         "armadillo-ramp": 1.7, "armadillo-ramp-bare": 2.3, "horse-ramp-bare": 1.006,

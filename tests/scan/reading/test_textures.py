@@ -198,7 +198,7 @@ def test_a_damaged_picture_adds_no_points(tmp_path: Path) -> None:
 MATERIALS = {
     "3dMD": "newmtl skin\r\n\tKa 0.2 0.2 0.2\r\n\tKd 0.8 0.8 0.8\r\n\tmap_Kd .\\The Skin.png\r\n",
     "Vectra": "newmtl skin\nKd 0.000 0.000 0.000\nmap_Kd   the skin.PNG  \n",
-    "Blender": "# Blender\nnewmtl skin\nmap_Kd -s 1.0 1.0 1.0 -bm 0.5 /home/of/others/The Skin.png\n",
+    "Blender": "# Blender\nnewmtl skin\nmap_Kd -s 1.0 1.0 1.0 -bm 0.5 /elsewhere/The Skin.png\n",
     "quotes": 'newmtl skin\nmap_Kd "The Skin.png"\n',
     "another material first": "newmtl a\nKd 1 0 0\nmap_Kd no.png\nnewmtl SKIN\nmap_Kd C:\\x\\The Skin.png\n",
     "offset": "newmtl skin\nmap_Kd -o 3 -2 0 -clamp off The Skin.png\n",
