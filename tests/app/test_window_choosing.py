@@ -75,8 +75,12 @@ class Shown:
         )
 
     def draw(self) -> None:
+        """Draw until the picture is complete, as the window does while workers prepare the pose."""
         self.viewport.rest()
         self.viewport.draw(self.session.document.request(POSE))
+        while not self.viewport.is_complete:
+            time.sleep(0.001)
+            self.viewport.draw(self.session.document.request(POSE))
 
     def advance(self, at_rest: bool = True) -> bool:
         self.is_at_rest = at_rest
