@@ -43,6 +43,7 @@ def target(packages: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) 
 
 
 @pytest.mark.parametrize("kind", PAGES)
+@pytest.mark.slow
 def test_its_own_test_passes(kind: str, packages: dict[str, Path], target: Path) -> None:
     done = run_pytest("-q", "tests", cwd=packages[kind], paths=[target, ROOT])
     assert done.returncode == 0, done.stdout + done.stderr
@@ -51,6 +52,7 @@ def test_its_own_test_passes(kind: str, packages: dict[str, Path], target: Path)
     assert int(passed[1]) >= {"backend": 19, "reader": 1, "measure": 6, "tool": 6}[kind]
 
 
+@pytest.mark.slow
 def test_doctor_lists_the_packages(target: Path) -> None:
     rows = " ".join(run_with(target, "-m", "viewer", "doctor").stdout.split())
     for kind, package in PAGES.items():
@@ -58,6 +60,7 @@ def test_doctor_lists_the_packages(target: Path) -> None:
         assert f"{kind} {name} {package} 1.0, module {package.replace('-', '_')}" in rows
 
 
+@pytest.mark.slow
 def test_the_backend_draws(target: Path, tmp_path: Path) -> None:
     picture = tmp_path / "dots.png"
     words = ("render", "demo", "--backend", "dots", "--set", "diameter=5", "--size", "160x120")
@@ -67,6 +70,7 @@ def test_the_backend_draws(target: Path, tmp_path: Path) -> None:
         assert len(image.convert("RGB").getcolors(160 * 120)) > 100, "a shaded subject"
 
 
+@pytest.mark.slow
 def test_the_reader_opens_a_file(target: Path, tmp_path: Path) -> None:
     path = tmp_path / "solid.stl"
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
@@ -79,6 +83,7 @@ def test_the_reader_opens_a_file(target: Path, tmp_path: Path) -> None:
     assert converted.returncode == 0, converted.stderr
 
 
+@pytest.mark.slow
 def test_the_measure_is_measured_from_the_command_line(target: Path, tmp_path: Path) -> None:
     points = np.stack(np.meshgrid(np.arange(20.0), np.arange(20.0), [0.0]), axis=-1).reshape(-1, 3)
     np.save(tmp_path / "scan.npy", points)
@@ -133,6 +138,7 @@ def dots(
 
 @pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize("diameter", [*rarely(1.0, 6.5), 3.0])
+@pytest.mark.slow
 def test_the_demo_is_drawn_as_the_page_says(draw: Callable[..., Surface], diameter: float) -> None:
     cloud = viewer.open_scan("demo").pose(0).cloud
     camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=SIZE[0] / SIZE[1])

@@ -153,6 +153,7 @@ def test_json_round_trip(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "camera.json").read_text())["near"] is None
 
 
+@pytest.mark.slow
 def test_no_camera_file_is_an_internal_error(tmp_path: Path) -> None:
     usable = Camera(eye=(1, 2, 3), height=2.0, near=0.1, far=9.0).to_json()
     path = tmp_path / "camera.json"

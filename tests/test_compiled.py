@@ -74,6 +74,7 @@ def test_what_has_to_be_compiled_is_announced_and_what_is_kept_is_not(tmp_path: 
     assert announced(folder, None, NOWHERE) == ["Preparing", "Preparing", "Reading"]
 
 
+@pytest.mark.slow
 def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     assert run(folder, cache) == (42, 0)
@@ -105,6 +106,7 @@ def test_damaged_files_are_made_anew(tmp_path: Path) -> None:
         assert run(folder, cache) == (42, 1)
 
 
+@pytest.mark.slow
 def test_a_full_disk_only_costs_time(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))"
@@ -112,6 +114,7 @@ def test_a_full_disk_only_costs_time(tmp_path: Path) -> None:
     assert run(folder, cache) == (42, 0)  # nothing half-written was kept
 
 
+@pytest.mark.slow
 def test_folders_that_cannot_be_written_only_cost_time(tmp_path: Path) -> None:
     folder, _ = written(tmp_path)
     assert run(folder, None, NOWHERE) == (42, 0)

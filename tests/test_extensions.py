@@ -86,6 +86,7 @@ def command(target: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return run_with(target, "-m", "viewer", *words)
 
 
+@pytest.mark.slow
 def test_doctor_shows_where_each_comes_from_and_what_cannot_be_used(target: Path) -> None:
     done = command(target, "doctor")
     assert done.returncode == 0, done.stderr
@@ -114,6 +115,7 @@ def test_doctor_shows_where_each_comes_from_and_what_cannot_be_used(target: Path
     assert command(target, "doctor", "--quiet").stderr == ""
 
 
+@pytest.mark.slow
 def test_everything_that_works_goes_on(target: Path, tmp_path: Path) -> None:
     (tmp_path / "scan.acme").write_text("anything")
     info = command(target, "info", str(tmp_path / "scan.acme"), "--json")
@@ -151,6 +153,7 @@ def test_everything_that_works_goes_on(target: Path, tmp_path: Path) -> None:
         ("'''Nothing at all.'''", "", "wrong_backend has no docstring"),
     ],
 )
+@pytest.mark.slow
 def test_a_backend_with_faulty_declarations_is_left_out(
     old: str, new: str, message: str, tmp_path: Path
 ) -> None:

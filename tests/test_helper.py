@@ -69,6 +69,7 @@ def test_the_process_stays_for_the_next_call(helper: Helper) -> None:
     assert one == other != os.getpid()
 
 
+@pytest.mark.slow
 def test_cancelling_ends_the_work_at_once_and_the_next_call_works(helper: Helper) -> None:
     task = Task("Waiting")
     future = in_background(task, lambda: helper.call(task, wait_for_ever))
@@ -86,6 +87,7 @@ def test_progress_is_no_answer_whatever_number_it_is(helper: Helper) -> None:
     assert task.progress == 1
 
 
+@pytest.mark.slow
 def test_a_cancel_while_the_process_starts_is_not_lost(
     helper: Helper, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -86,6 +86,7 @@ def declared() -> set[str]:
     return {re.split(r"[><=; ]", line)[0] for group in groups for line in group}
 
 
+@pytest.mark.slow
 def test_packages_are_those_that_are_imported_and_declared() -> None:
     experiments = sorted((ROOT / "tools" / "experiments").rglob("*.py"))
     measured = {

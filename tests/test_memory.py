@@ -57,6 +57,7 @@ def test_playing_a_long_sequence_stays_within_the_budget(tmp_path: Path) -> None
     (tmp_path / "long.npy").unlink()
 
 
+@pytest.mark.slow
 def test_a_large_cloud_takes_a_small_multiple_of_its_size(tmp_path: Path) -> None:
     """2 million points of 15 bytes: all of a process's peak, the driver's memory included."""
     count = 2_000_000

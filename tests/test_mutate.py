@@ -69,6 +69,7 @@ FILE = "viewer/srgb.py"
         ),
     ],
 )
+@pytest.mark.slow
 def test_what_fails_because_of_a_mutant_kills_it(
     test: str, kills: bool, mutate: ModuleType, tmp_path: Path
 ) -> None:

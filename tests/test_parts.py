@@ -43,6 +43,7 @@ def run_by(done: subprocess.CompletedProcess[str]) -> list[str]:
     return [line.split()[0] for line in done.stdout.splitlines() if " PASSED" in line]
 
 
+@pytest.mark.slow
 def test_ten_commits_run_every_test_once_and_one_always_the_same(folder: Path) -> None:
     parts = [run_by(pytest_in(folder, "--tenth", f"{digit:08x}{'ab' * 16}")) for digit in range(10)]
     assert all(5 <= len(part) <= 25 for part in parts), "of 126"
@@ -51,6 +52,7 @@ def test_ten_commits_run_every_test_once_and_one_always_the_same(folder: Path) -
     assert run_by(pytest_in(folder, "--tenth", f"{3:08x}{'ab' * 16}")) == parts[3]
 
 
+@pytest.mark.slow
 def test_the_end_of_the_time_leaves_tests_and_a_failure_counts(folder: Path) -> None:
     (folder / "test_a.py").write_text(FILE.format(count=1, waits=0, is_right=False))
     (folder / "test_b.py").write_text(FILE.format(count=2, waits=10_000, is_right=False))

@@ -8,6 +8,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[1]
 # An element that loads what it names, unlike a link that a reader clicks.
 LOADED = re.compile(
@@ -22,6 +24,7 @@ def test_a_reference_that_loads_from_the_network_is_found() -> None:
     assert LOADED.findall('<a href="https://a.org"><img src="pictures/a.png">') == []
 
 
+@pytest.mark.slow
 def test_the_site_builds_and_loads_nothing_from_the_network(tmp_path: Path) -> None:
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
     environment = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}

@@ -197,6 +197,7 @@ def test_names_of_temporary_files_are_made_by_chance(folder: Path) -> None:
 
 
 @posix
+@pytest.mark.slow
 def test_what_is_left_of_unpacking_goes_at_the_next_start(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -34,6 +34,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_the_wheel_carries_all_shaders_and_assets(wheel: Path) -> None:
     shipped = {
         f"viewer/{path.relative_to(ROOT).as_posix()}"
@@ -50,6 +51,7 @@ def test_the_wheel_is_small(wheel: Path) -> None:
     assert wheel.stat().st_size < 20e6
 
 
+@pytest.mark.slow
 def test_the_installed_command_renders_the_demo_from_elsewhere(wheel: Path, tmp_path: Path) -> None:
     target, elsewhere = tmp_path / "installed", tmp_path / "elsewhere"
     elsewhere.mkdir()

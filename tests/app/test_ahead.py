@@ -157,6 +157,7 @@ def test_jumps_and_other_ways_of_drawing_are_told(renderer: Noting, start: Calla
 
 
 @pytest.mark.parametrize("backend", ["surfels", pytest.param("voxels", marks=pytest.mark.slow)])
+@pytest.mark.slow
 def test_a_second_lap_needs_no_work(renderer: Noting, start: Callable, backend: str) -> None:
     playback, ahead = start(backend)
     playback.toggle(0.0)

@@ -235,6 +235,7 @@ def test_the_mouse_orbits_pans_zooms_and_f_fits(app: RunningApp) -> None:
     assert fitted.rotation() == pytest.approx(turned.rotation(), abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_line_under_the_timeline_says_what_is_seen(app: RunningApp) -> None:
     app.screen.do("key", "f", "mousemove", *(v - 1 for v in SIZE))
     app.settle()

@@ -207,6 +207,7 @@ def open_and_find(app: RunningApp, session: Path, scan: Path, document: object) 
     assert "Traceback" not in app.log()
 
 
+@pytest.mark.slow
 def test_a_session_whose_scan_is_missing_asks_for_it(screen: Screen, tmp_path: Path, scan: Path) -> None:
     (tmp_path / "else").mkdir()
     file = tmp_path / "else" / "mine.scan4d.json"

@@ -184,6 +184,7 @@ def test_the_chosen_frames_are_played_and_offered_for_export(app: RunningApp, fo
     assert app.settle().document["span"] is None
 
 
+@pytest.mark.slow
 def test_a_turntable_becomes_pictures_that_replay(app: RunningApp, folder: Path) -> None:
     dialog = Dialog(app)
     dialog.choose("what", "###turntable")

@@ -58,6 +58,7 @@ def test_the_first_view_and_f_hold_all_frames(app: RunningApp) -> None:
         assert holds_all(keys(app, *names))
 
 
+@pytest.mark.slow
 def test_the_view_goes_with_the_subject(app: RunningApp) -> None:
     keys(app, "ctrl+Home", "ctrl+1")
     before = Camera.from_json(keys(app, "shift+f").camera)

@@ -71,6 +71,7 @@ def test_f_says_where_parts_of_the_scan_are_outside(app: RunningApp) -> None:
     app.told("Zoom out to see the rest of the scan")
 
 
+@pytest.mark.slow
 def test_home_brings_the_opening_view_back(app: RunningApp) -> None:
     opening = keys(app)
     assert np.linalg.norm(np.subtract(opening.eye, (1, 2, 3))) == pytest.approx(0, abs=1e-5), (

@@ -76,6 +76,7 @@ def begin_with(app: RunningApp, name: str) -> None:
     app.see(clicking="landmarks")
 
 
+@pytest.mark.slow
 def test_21_landmarks_take_21_clicks_and_are_followed(screen: Screen, tmp_path: Path, scan: Path) -> None:
     names = [landmark.name for landmark in templates()["face-21"].landmarks]
     assert len(names) == 21

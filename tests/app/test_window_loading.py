@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from scenes import sphere
 from virtual_screen import RunningApp, Screen, running_app
 
@@ -33,6 +34,7 @@ def brightness(app: RunningApp) -> float:
     return float(shown.mean())
 
 
+@pytest.mark.slow
 def test_no_picture_passes_for_another_scan_or_frame(screen: Screen, tmp_path: Path) -> None:
     scan = tmp_path / "ball.npz"
     formats.write(scan, sphere(2000))

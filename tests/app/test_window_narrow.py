@@ -55,6 +55,7 @@ def cut_in_any_state(app: RunningApp) -> dict[str, object]:
         ),
     ],
 )
+@pytest.mark.slow
 def test_no_text_is_cut_and_the_timeline_has_room(
     tmp_path_factory: pytest.TempPathFactory, size: tuple[int, int], scale: float
 ) -> None:

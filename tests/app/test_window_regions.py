@@ -59,6 +59,7 @@ def pixels_of(picture: NDArray[np.uint8], color: int) -> float:
     return float((np.abs(picture.astype(int) - wanted).max(axis=2) < 12).sum())
 
 
+@pytest.mark.slow
 def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:

@@ -76,6 +76,7 @@ def test_a_file_for_the_session_is_named_like_the_scan(scan: str, name: str, tmp
     assert named_like(str(tmp_path / "set.1"), tmp_path, ".x") == tmp_path / "set.1.x"
 
 
+@pytest.mark.slow
 def test_the_dialog_opens_a_session_of_the_open_scan_and_closes_and_ctrl_s_saves_to_its_file(
     screen: Screen, tmp_path: Path, scan: Path
 ) -> None:

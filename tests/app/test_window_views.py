@@ -123,6 +123,7 @@ def test_keys_typed_in_haste_are_what_was_typed(app: RunningApp) -> None:
     assert after.pictures == before.pictures, "not the next renderer"
 
 
+@pytest.mark.slow
 def test_the_turntable_turns_until_a_key_or_the_mouse_stops_it(app: RunningApp) -> None:
     chord(app, "ctrl", "1")
     cameras = [camera_of(app)]

@@ -58,6 +58,7 @@ def faults(errors: Errors) -> float:
         for each in CONDITIONS
     ],
 )
+@pytest.mark.slow
 def test_automatic_radii_and_passes_are_never_worse(renderer: Renderer, condition: ScanCondition) -> None:
     errors = drawn(renderer, condition)
     auto = errors({})

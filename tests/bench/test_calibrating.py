@@ -66,6 +66,7 @@ def test_larger_pixels_are_off_by_how_far_their_middles_are(renderer: Renderer) 
     )  # each pixel's middle is half a pixel off on each axis
 
 
+@pytest.mark.slow
 def test_ways_are_measured_and_chosen(renderer: Renderer) -> None:
     bench = Bench(renderer, BenchSettings(size=SIZE, views=3, repeat=1, frames=0))
     rows = list(measure_ways(bench, ["sphere", "no-such-scene"]))

@@ -69,6 +69,7 @@ def errors(renderer: Renderer, data_dir: Path) -> Measured:
 
 
 @judged("closed_percent", SCENES)
+@pytest.mark.slow
 def test_surfaces_are_closed(scene: str, errors: Measured) -> None:
     assert errors(scene)["closed_percent"] >= CLOSED
 

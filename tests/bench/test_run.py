@@ -86,6 +86,7 @@ def test_a_row_says_all_that_is_needed_to_repeat_it(
         json.dumps(row)
 
 
+@pytest.mark.slow
 def test_the_time_on_the_gpu_is_that_of_the_passes(rows: list[Row]) -> None:
     for row in rows:
         low, high = (sum(spread[end] for spread in row["passes"].values()) for end in ("p5", "p95"))
@@ -119,6 +120,7 @@ def test_the_true_mesh_is_the_ceiling_and_gl_points_the_floor(rows: list[Row]) -
         assert errors["gl-points"]["psnr"] < errors[name]["psnr"] + 0.1 < errors["mesh"]["psnr"]
 
 
+@pytest.mark.slow
 def test_a_sequence_flickers_from_pose_to_pose(renderer: Renderer, data_dir: Path) -> None:
     group = Group("horse-gallop", only("mesh", "gl-points"))
     rows = Bench(renderer, replace(SETTINGS, data=data_dir)).measure(group)
@@ -127,6 +129,7 @@ def test_a_sequence_flickers_from_pose_to_pose(renderer: Renderer, data_dir: Pat
     assert errors["gl-points"]["flicker_pose_color"] > 0.01
 
 
+@pytest.mark.slow
 def test_stopping_keeps_the_views_that_all_have_seen(renderer: Renderer) -> None:
     bench, ticks = Bench(renderer, SETTINGS), iter(range(len(FEW.contenders) + 2))
 
@@ -154,6 +157,7 @@ def test_ctrl_c_ends_rows_that_are_found_one_by_one(renderer: Renderer) -> None:
     assert not list(bench.until_stopped(rows())), "nor does anything else begin"
 
 
+@pytest.mark.slow
 def test_a_backend_that_cannot_draw_a_scene_is_left_out_and_said(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -117,6 +117,7 @@ def test_flipped_normals_are_counted(torus: Moment) -> None:
     assert turned["normal_mean"] < 5
 
 
+@pytest.mark.slow
 def test_a_condition_is_measured_for_each_backend(renderer: Renderer) -> None:
     amount = Amount(points=COUNT, views=1, picks=5, size=SIZE)
     static = replace(condition("static, noise 0.1"), frames=2)

@@ -34,6 +34,7 @@ def bitmap(table: ShapeTable, size: int, i: int, j: int) -> NDArray[np.bool_]:
 @pytest.mark.parametrize(
     "steps", [PAPER, Steps(9, 1, 9, 2), Steps(33, 4, 21, 3)], ids=["paper", "coarse", "finer"]
 )
+@pytest.mark.slow
 def test_entries_are_what_a_look_at_each_pixel_gives(steps: Steps) -> None:
     table, rng = shape_table(steps), np.random.default_rng(1)
     ends = (-steps.steepest, 0, steps.steepest)

@@ -258,6 +258,7 @@ sys.exit(main())
         "cmap",
     ],
 )
+@pytest.mark.slow
 def test_an_interrupt_while_libraries_are_imported_is_quiet(name: str, scans: Path, tmp_path: Path) -> None:
     argv = [
         "render",

@@ -145,6 +145,7 @@ def test_convert_refuses_estimates_that_a_format_does_not_hold(
     assert not names(tmp_path)
 
 
+@pytest.mark.slow
 def test_convert_keeps_what_an_eye_sees(run: Run, scans: Path, tmp_path: Path) -> None:
     """Of all poses, with all that the points have."""
     eye = (0.5, 0.25, 9.0)

@@ -71,6 +71,7 @@ def full_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 @pytest.mark.usefixtures("mesa")
+@pytest.mark.slow
 def test_a_full_disk_under_the_shader_cache_is_no_harm(full_disk: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     caches = {

@@ -145,6 +145,7 @@ def test_chosen_frames_are_a_curve_of_their_own_and_too_few_are_told(run: Run) -
     assert set(table("numbers.csv")[0].values()) == {"way", "mm", ""}
 
 
+@pytest.mark.slow
 def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
     times, peaks, heights = np.arange(121) / FPS, (0.8, 2.0, 3.2), (4.0, 5.0, 6.0)
     bumps = [h * np.exp(-0.5 * ((times - at) / 0.15) ** 2) for at, h in zip(peaks, heights, strict=True)]
@@ -178,6 +179,7 @@ def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
     assert table("repeats.csv") == []
 
 
+@pytest.mark.slow
 def test_plots_are_those_of_the_window(run: Run) -> None:
     done = run(*WORDS, "--plot", "plot.csv")
     assert done.code == 0, done.err

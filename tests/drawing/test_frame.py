@@ -331,6 +331,7 @@ def test_a_backend_of_range_views_is_refused_for_points(renderer: Renderer) -> N
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))
 
 
+@pytest.mark.slow
 def test_what_nobody_waits_for_is_prepared_in_another_process_and_can_be_cancelled(
     renderer: Renderer, deriving: Backend
 ) -> None:

@@ -31,9 +31,11 @@ DECIDING = ("app/", "drawing/", "backends/")  # what decides about a frame; it d
 
 @pytest.fixture
 def viewport(renderer: Renderer) -> Iterator[Viewport]:
-    viewport = Viewport(renderer, (0, 0, *SIZE))
+    own = Renderer(renderer.gpu)  # without work that other tests left
+    viewport = Viewport(own, (0, 0, *SIZE))
     yield viewport
     viewport.release()
+    own.release()
 
 
 @pytest.mark.parametrize("name", ["points", "surfels", "auto_splats"])

@@ -56,6 +56,7 @@ def test_the_work_of_the_cpu_is_measured_beside_that_of_the_driver() -> None:
     assert row["new programs"] > 0
 
 
+@pytest.mark.slow
 def test_a_first_picture_is_drawn_in_a_process_of_its_own() -> None:
     (row,) = rows_without("hardware", "--sizes", "2000", "--table", "cold", "--rows", "cold points")
     assert row["nothing stored, ms"] > 0
@@ -72,6 +73,7 @@ def test_a_table_has_what_was_measured_and_nothing_where_that_failed() -> None:
 
 
 @pytest.mark.parametrize("name", ["series", "turning"])
+@pytest.mark.slow
 def test_moving_pictures_are_measured_without_libraries_of_the_window(name: str) -> None:
     few = ("--poses", "3") if name == "series" else ("--pictures", "3", "--backends", "points")
     assert rows_without(name, "--counts", "2000", *few)

@@ -173,6 +173,7 @@ def view() -> JudgedView:
     return view
 
 
+@pytest.mark.slow
 def test_all_methods_judge_a_sphere(
     renderer: Renderer, view: JudgedView, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,6 +36,7 @@ def tracks_of(known: KnownScan, errors: np.ndarray, sigma: float) -> dict[str, T
     }
 
 
+@pytest.mark.slow
 def test_landmarks_are_set_once_at_the_truth(known: KnownScan) -> None:
     landmarks = keyed_landmarks(known)
     assert [landmark.name for landmark in landmarks] == list(known.names)

@@ -68,6 +68,7 @@ def test_trees_are_counted_as_in_the_paper(bench: Bench, rows: list[Row]) -> Non
         assert row["loss"] == pytest.approx(np.mean(losses), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_every_work_has_its_times_beside_the_sort(rows: list[Row]) -> None:
     for row in rows:
         assert (row["scene"], row["n"], row["poses"]) == (HORSE.scene, HORSE.points, SETTINGS.views)

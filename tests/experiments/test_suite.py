@@ -121,6 +121,7 @@ def test_wrong_words_are_one_message(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "its own scenes" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_two_checkouts_are_compared_by_turns(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["points", "--counts", "1000", "--size", "64x48", "--rounds", "1"]
     assert main([*words, "--against", str(ROOT), "--turns", "1"]) == 0

@@ -46,6 +46,7 @@ def test_a_right_calibration_has_no_drift(ball: Mesh) -> None:
         assert refined.views == tuple(views)
 
 
+@pytest.mark.slow
 def test_a_degree_is_found_and_corrected(ball: Mesh) -> None:
     views, true = scanned(ball, SIZE, RIGHT, OFF), scanned(ball, SIZE, RIGHT, RIGHT)
     assert degrees_between(*views, true) == pytest.approx(1.0, abs=1e-3)
@@ -62,12 +63,14 @@ def test_a_degree_is_found_and_corrected(ball: Mesh) -> None:
     assert left.shift < 0.02 * drift.shift
 
 
+@pytest.mark.slow
 def test_the_view_that_is_off_is_the_one_that_moves(ball: Mesh) -> None:
     views = scanned(ball, (160, 120), OFF, RIGHT, RIGHT, RIGHT)
     moved = [np.abs(motion.matrix - np.eye(4)).max() for motion in refine(views).motions]
     assert moved[0] > 5 * max(moved[1:])
 
 
+@pytest.mark.slow
 def test_refined_views_are_merged_as_if_they_had_been_right(ball: Mesh) -> None:
     views = scanned(ball, SIZE, RIGHT, OFF)
     plain, refined = merge_views(views), merge_views(views, refined=True)

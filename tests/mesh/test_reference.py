@@ -135,6 +135,7 @@ def sees(mesh: Mesh, row: int, eye: np.ndarray) -> bool:
 
 
 @pytest.mark.parametrize("turn", [20, *rarely(110, 200, 290)])
+@pytest.mark.slow
 def test_faces_that_hold_a_vertex_do_not_hide_it(data_dir: Path, turn: float) -> None:
     """Where rays are tangents, a first hit in float32 is on the vertex's own faces."""
     mesh = read_mesh(data_dir / "models" / "stanford_bunny_35947.ply")

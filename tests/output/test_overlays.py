@@ -110,6 +110,7 @@ def test_the_shape_of_a_mark_tells_what_was_tracked() -> None:
         assert bright == [True, diagonal]
 
 
+@pytest.mark.slow
 def test_a_ring_tells_how_sure_a_tracked_one_is() -> None:
     image = picture(DrawnLandmark((0.0, 0.0, 0.0), "", False, sure=2.0))
     row, column = at(0, 0)

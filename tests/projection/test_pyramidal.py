@@ -209,6 +209,7 @@ def bytes_of(shown: Surface | RangeView) -> NDArray[np.uint8]:
 
 
 @every_primitive
+@pytest.mark.slow
 def test_holes_stay_open_without_the_levels_that_close_them(draw: Draw, primitive: str) -> None:
     flat = heights(np.full(OPEN.shape, -500), OPEN)
     fine = seen_from_above(draw, flat, primitive=primitive, level_3=False, level_4=False)

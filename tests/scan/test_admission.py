@@ -104,6 +104,7 @@ def ply_with_lists(path: Path) -> None:
         ),
     ],
 )
+@pytest.mark.slow
 def test_reading_takes_ten_times_the_file_and_200_megabytes_at_most(
     make: Callable[[Path], None], suffix: str, tmp_path: Path
 ) -> None:

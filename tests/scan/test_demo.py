@@ -88,6 +88,7 @@ def test_dual_numbers_refuse_what_they_cannot_derive() -> None:
 
 
 @pytest.mark.parametrize("index", [MOUTH_OPEN, *rarely(REST, EYES_SHUT, SMILE)])
+@pytest.mark.slow
 def test_points_lie_on_the_exact_surface(demo: DemoSource, index: int) -> None:
     points = demo.load(index).world().T
     skin = rest_points().skin
@@ -97,6 +98,7 @@ def test_points_lie_on_the_exact_surface(demo: DemoSource, index: int) -> None:
 
 
 @pytest.mark.parametrize("index", [EYES_SHUT, *rarely(REST, MOUTH_OPEN, SMILE)])
+@pytest.mark.slow
 def test_nearly_all_points_are_on_the_outside(demo: DemoSource, index: int) -> None:
     """Some of an eyeball's points are always behind the lids."""
     value = surface_value(demo.load(index).world(), seconds(demo, index))
@@ -149,6 +151,7 @@ def test_motion_can_be_undone(demo: DemoSource, index: int) -> None:
 
 
 @pytest.mark.parametrize("index", [SMILE, *rarely(REST, MOUTH_OPEN, EYES_SHUT)])
+@pytest.mark.slow
 def test_points_cover_the_surface(demo: DemoSource, index: int) -> None:
     """Random places of the surface are within the radius of a point that faces the same way."""
     cloud, time = demo.load(index), seconds(demo, index)
@@ -162,6 +165,7 @@ def test_points_cover_the_surface(demo: DemoSource, index: int) -> None:
     assert np.mean(facing > 0) > 0.995
 
 
+@pytest.mark.slow
 def test_points_are_evenly_spread() -> None:
     """Random points would have neighbours nearer than a third of the spacing at one place in ten."""
     rest = rest_points()
@@ -205,6 +209,7 @@ def test_poses_are_deterministic_and_independent(demo: DemoSource) -> None:
         np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
 
 
+@pytest.mark.slow
 def test_a_point_stays_the_same_point(demo: DemoSource) -> None:
     """Colours belong to points, and between two poses no point travels far."""
     poses = [demo.load(index) for index in range(len(demo))]

@@ -566,6 +566,7 @@ def resident_bytes() -> int:
 
 
 @pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="needs /proc to see resident memory")
+@pytest.mark.slow
 def test_playing_far_more_than_the_cache_holds_keeps_memory_bounded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -93,6 +93,7 @@ def test_faces_stored_once_beside_the_frames(tmp_path: Path) -> None:
     assert one_topology(tmp_path) is False
 
 
+@pytest.mark.slow
 def test_the_demo_has_one_topology() -> None:
     assert one_topology("demo", 40) is True
 

@@ -173,6 +173,7 @@ def test_feeds_give_the_same_bits(draw: Draw, enlarge: float) -> None:
 
 
 @pytest.mark.backend("surfels")
+@pytest.mark.slow
 def test_the_order_of_points_does_not_matter(draw: Draw) -> None:
     cloud = noisy_sphere(0.3)
     order = np.random.default_rng(2).permutation(len(cloud))

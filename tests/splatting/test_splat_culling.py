@@ -200,6 +200,7 @@ def test_pictures_are_the_same_to_the_bit(
     assert bool(away) == ("cull_back" in params)
 
 
+@pytest.mark.slow
 def test_what_is_hidden_or_turned_away_is_not_drawn(renderer: Renderer) -> None:
     cloud = shells("bands", count=MANY)
     pose, surface = Pose(0, 0.0, "shells", cloud), Surface(renderer.gpu, (600, 400))
@@ -215,6 +216,7 @@ def test_what_is_hidden_or_turned_away_is_not_drawn(renderer: Renderer) -> None:
     assert_same(renderer, turned, surface)
 
 
+@pytest.mark.slow
 def test_others_are_shown_as_soon_as_what_hid_them_is_gone(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -133,6 +133,7 @@ def test_the_same_picture_twice(draw: Draw) -> None:
         np.testing.assert_array_equal(values, second[channel], channel)
 
 
+@pytest.mark.slow
 def test_they_do_not_flicker(draw: Draw) -> None:
     look = Look(light="head", color_by="plain")
     cameras = [camera(azimuth=10 + 2 * step) for step in range(3)]

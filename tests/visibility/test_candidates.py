@@ -105,6 +105,7 @@ def test_propagation_is_that_of_all_sectors_at_once(find: Find, distance: float,
 
 
 @pytest.mark.parametrize("weight", [2.0, 20.0])
+@pytest.mark.slow
 def test_until_nothing_changes_each_sector_has_the_best_of_all_points(find: Find, weight: float) -> None:
     """Where none shares its sector with one that reaches farther there: such a point is no candidate."""
     points = points_in_ball(400)

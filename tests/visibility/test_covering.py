@@ -130,6 +130,7 @@ def scene() -> Floats:
 
 
 @pytest.mark.parametrize("name", SCENES)
+@pytest.mark.slow
 def test_it_does_what_its_plain_twin_does(renderer: Renderer, name: str) -> None:
     """Where gaps are half a turn to a 64th, and where rounding decides, it may differ."""
     (eye, mapping), points = SCENES[name], scene()

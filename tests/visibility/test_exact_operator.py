@@ -167,6 +167,7 @@ def test_what_cannot_be_is_refused() -> None:
         katz_radius(np.zeros((0, 3)), (0, 0, 3))
 
 
+@pytest.mark.slow
 def test_katz_finds_a_radius_that_tells_front_from_back() -> None:
     """Of a sphere with dents, which small radii lose."""
     points = spread()

@@ -304,6 +304,7 @@ def test_real_scans_lie_on_their_truth(name: str, data_dir: Path) -> None:
         assert np.quantile(off, 0.9) < subject.tolerance
 
 
+@pytest.mark.slow
 def test_the_demo_lies_on_its_mesh_while_it_speaks() -> None:
     from viewer.scan.demo.motion import PERIOD
 

@@ -86,6 +86,7 @@ def test_points_of_thin_parts_lie_on_the_truth_and_none_inside() -> None:
     assert on_any.all()
 
 
+@pytest.mark.slow
 def test_merged_scans_have_a_normal_for_each_point(data_dir: Path) -> None:
     merged, scans = (
         catalog.subject(name, data_dir).moment(0).pose for name in ("bunny-scans-merged", "bunny-scans")

@@ -148,6 +148,7 @@ def test_polygons_become_fans() -> None:
 
 @pytest.mark.parametrize("mixed", [False, True])
 @pytest.mark.parametrize("encoding", ["binary_big_endian", *rarely("binary_little_endian")])
+@pytest.mark.slow
 def test_faces_of_many_pieces(encoding: str, mixed: bool, tmp_path: Path) -> None:
     rng = np.random.default_rng(3)
     sizes = rng.integers(3, 6, 200_000) if mixed else np.full(200_000, 3)

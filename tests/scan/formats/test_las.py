@@ -52,6 +52,7 @@ def test_room_for_colours_alone_is_no_colour(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("suffix", [".las", ".laz"])
 @pytest.mark.parametrize(("dimension", "frames"), [("frame", 3), ("confidence", 1)])
+@pytest.mark.slow
 def test_an_extra_dimension_may_tell_the_frames(
     suffix: str, dimension: str, frames: int, tmp_path: Path
 ) -> None:

@@ -93,6 +93,7 @@ def test_poses_read_in_any_order_are_the_same(scan: Path) -> None:
                 assert np.array_equal(getattr(cloud, name), getattr(clouds[index], name)), (index, name)
 
 
+@pytest.mark.slow
 def test_threads_read_at_once(scan: Path) -> None:
     frames = formats.frames(scan)
     order = [index * 7 % COUNT for index in range(2 * COUNT)]

@@ -143,6 +143,7 @@ def test_tables_longer_than_what_is_parsed_at_once(tmp_path: Path) -> None:
         read(tmp_path / "scan.ply")
 
 
+@pytest.mark.slow
 def test_a_row_of_very_many_columns_is_refused(tmp_path: Path) -> None:
     """Guessing the names of half a million columns would take hours if it looked at all for each."""
     with pytest.raises(InputError, match="has 500,000 columns, more than the 4,096"):

@@ -68,6 +68,7 @@ def test_each_leaf_has_its_own_attributes() -> None:
 
 @pytest.mark.parametrize("attributes", [True, False])
 @pytest.mark.parametrize("stop", [Stop(), *rarely(Stop(delta=0.0), Stop(rule="depth", depth=5))])
+@pytest.mark.slow
 def test_discs_close_a_surface_however_small_its_leaves_are(stop: Stop, attributes: bool) -> None:
     octree = build(PointCloud.from_arrays(**on_sphere(6000)), stop, attributes=attributes)
     leaves = leaf_points(octree)

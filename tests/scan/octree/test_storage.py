@@ -411,6 +411,7 @@ def test_what_packs_too_well_is_stored_as_it_is() -> None:
     counts=st.lists(st.integers(0, 200), min_size=7, max_size=7),
     flags=st.integers(0, 7),
 )
+@pytest.mark.slow
 def test_signed_nonsense_is_a_tree_or_an_error(masks: list[bytes], counts: list[int], flags: int) -> None:
     """Levels of any bytes and counts under checksums that are right."""
     header, _ = read_header(to_bytes(bare(TREES["delta"])))
