@@ -19,8 +19,8 @@ from ...scan.sources import FileSequence
 from ...scan.timeline import Timeline
 from .. import widgets
 from ..commands import Command
-from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
+from .reading_dialog import ReadingDialog
 
 TITLE = "Choose frames"
 CHOOSE_FRAMES = f"{TITLE}..."  # the command, and the buttons that do the same
@@ -33,7 +33,6 @@ TIMES = {
     RATE: "another rate",
     FILE: "from a file",
 }
-_SIZE = ImVec2(52.0, 34.0)  # in heights of the font
 _NARROW = 40.0  # width of the table, likewise, below which it has no column of takes
 _FILE, _TAKE, _TIME, _WHY, _ORDER = "File", "Take", "Time", "Left aside", "Order"  # titles of columns
 
@@ -170,6 +169,11 @@ class FrameChoices:
         else:
             self.problem = "Choose at least one file"
 
+    @property
+    def can_open(self) -> bool:
+        """Whether Scan4D can read the folder with these choices."""
+        return not self.problem
+
     def reset(self) -> None:
         """Leave all decisions to Scan4D."""
         self._texts = {}
@@ -223,11 +227,11 @@ def files_of_scan(timeline: Timeline) -> tuple[Path, list[str]] | None:
 
 
 @dataclass(eq=False)
-class FramesDialog(WindowPart):
+class FramesDialog(ReadingDialog):
     """The dialog. choices: about the folder that it shows, None while it is closed."""
 
     name = "frames_dialog"
-    layer = 82
+    title = TITLE
     shows = "The dialog of folders"
     OFFERS = {"ask_for_frames": "ask"}
     CONDITIONS = {"sequence of files": lambda dialog: dialog.files is not None}
@@ -250,62 +254,30 @@ class FramesDialog(WindowPart):
     def ask(self) -> None:
         """Open the dialog on the files of the open scan."""
         if self.files is not None:
-            self.choices = FrameChoices(*self.files, self.playback.timeline.decided.corrections.texts)
+            self.show(FrameChoices(*self.files, self.playback.timeline.decided.corrections.texts))
 
-    def dialog(self, view: ViewArea) -> None:
-        """Declare it while it is open."""
-        em, display = imgui.get_font_size(), imgui.get_io().display_size
-        size = ImVec2(min(_SIZE.x * em, 0.94 * display.x), min(_SIZE.y * em, 0.9 * display.y))
-        with widgets.modal(TITLE, self.choices is not None, size) as is_drawn:
-            if is_drawn and self.choices is not None:
-                _draw_choices(self.choices)
-                self._draw_foot(self.choices)
-                if self.choices is None:
-                    imgui.close_current_popup()
+    def draw_choices(self, choices: FrameChoices, foot: float) -> None:
+        """Declare the take, the times, and the files."""
+        imgui.text_wrapped(printable(str(choices.folder)))
+        if choices.takes:
+            _draw_take(choices)
+        _draw_times(choices)
+        _draw_files(choices, -foot)
 
-    def _draw_foot(self, choices: FrameChoices) -> None:
-        """Declare the problem and the buttons."""
-        if choices.problem:
-            imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(choices.problem)}")
-        else:
-            widgets.faint(choices.summary)
-        imgui.begin_disabled(bool(choices.problem))
-        if imgui.is_window_appearing():
-            imgui.set_keyboard_focus_here()
-        opens = imgui.button("Open")
-        imgui.end_disabled()
-        opens = (widgets.is_taken() and not choices.problem) or opens
-        imgui.same_line()
-        if imgui.button("Reset"):
-            choices.reset()
-        widgets.tooltip("Leave all choices to Scan4D")
-        imgui.same_line()
-        leaves = imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape)
-        if opens:
-            self.choices = None
-            self.correct_reading(choices.corrections)
-        elif leaves:
-            self.choices = None
+    def open_scan(self, choices: FrameChoices) -> None:
+        """Open the scan with the frames and the times that the user chose."""
+        self.correct_reading(choices.corrections)
 
     COMMANDS = (Command("read_folder", CHOOSE_FRAMES, ask, when="sequence of files"),)
 
 
-def _draw_choices(choices: FrameChoices) -> None:
-    """Declare the take, the times, and the files."""
-    imgui.text_wrapped(printable(str(choices.folder)))
-    if choices.takes:
-        widgets.dialog_label(
-            "Take", "The folder holds several scans, and each scan has its own frame numbers"
-        )
-        titles = {"": "chosen files", **{name: printable(title) for name, title in choices.takes.items()}}
-        take = widgets.combo("take", choices.take, list(choices.takes), titles)
-        if take != choices.take:
-            choices.state_take(take)
-    _draw_times(choices)
-    room = imgui.get_content_region_avail().x
-    text = f"     {choices.problem}" if choices.problem else choices.summary
-    foot = imgui.calc_text_size(printable(text), wrap_width=room).y + 2 * imgui.get_style().item_spacing.y
-    _draw_files(choices, -(foot + imgui.get_frame_height()))
+def _draw_take(choices: FrameChoices) -> None:
+    """Declare the take."""
+    widgets.dialog_label("Take", "The folder holds several scans, and each scan has its own frame numbers")
+    titles = {"": "chosen files", **{name: printable(title) for name, title in choices.takes.items()}}
+    take = widgets.combo("take", choices.take, list(choices.takes), titles)
+    if take != choices.take:
+        choices.state_take(take)
 
 
 def _draw_times(choices: FrameChoices) -> None:

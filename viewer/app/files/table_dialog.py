@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 
 from imgui_bundle import ImVec2, imgui
-from imgui_bundle import icons_fontawesome_6 as icons
 
 from ...errors import InputError
 from ...files import printable
@@ -20,8 +19,8 @@ from ...scan.reading.tables import UNREAD, TablePreview, preview, split_names
 from ...task import Task, in_background
 from .. import widgets
 from ..commands import Command
-from ..part import ViewArea, WindowPart
 from ..playing.playback import Playback
+from .reading_dialog import ReadingDialog
 
 TITLE = "Read table"
 READ_TABLE = f"{TITLE}..."  # the command, and the buttons that do the same
@@ -49,7 +48,6 @@ ROLE_TITLES = {
 }
 AXES = ("x", "y", "z")
 _MOST_SKIPPED = 1 << 16  # lines
-_SIZE = ImVec2(52.0, 34.0)  # in heights of the font
 _MOST_COLUMNS = 60  # that the dialog shows
 _COLUMN = 8.0  # width, in heights of the font
 _LINES_ABOVE = 4  # that are shown at once
@@ -183,12 +181,12 @@ def _listed(words: Sequence[str]) -> str:
 
 
 @dataclass(eq=False)
-class TableDialog(WindowPart):
+class TableDialog(ReadingDialog):
     """The dialog. choices: about the table that it shows, None while it is closed."""
 
     name = "table_dialog"
     doing = "Reading a table"
-    layer = 82
+    title = TITLE
     shows = "The dialog of tables"
     OFFERS = {"ask_for_table": "ask"}
     CONDITIONS = {"text table": lambda dialog: dialog.table is not None}
@@ -198,7 +196,6 @@ class TableDialog(WindowPart):
     def __post_init__(self) -> None:
         self.choices: TableChoices | None = None
         self._scan: str | None = None  # to open; None: the open one
-        self._takes_keyboard = False
 
     @property
     def table(self) -> Path | None:
@@ -215,7 +212,8 @@ class TableDialog(WindowPart):
         path = self.table if scan is None else Path(scan)
         if path is not None:
             held = self.playback.timeline.decided.corrections.texts if scan is None else {}
-            self.choices, self._scan, self._takes_keyboard = TableChoices(path, held), scan, True
+            self._scan = scan
+            self.show(TableChoices(path, held))
 
     @property
     def waits(self) -> bool:
@@ -226,55 +224,21 @@ class TableDialog(WindowPart):
         """Take in what was read."""
         return self.choices is not None and self.choices.advance()
 
-    def _open(self) -> None:
-        choices, self.choices = self.choices, None
-        if choices is not None:
-            self.correct_reading(choices.corrections, self._scan)
+    def draw_choices(self, choices: TableChoices, foot: float) -> None:
+        """Declare the choices about all lines, and the rows with a role for each column."""
+        imgui.text_wrapped(printable(choices.path.name))
+        if choices.shown is not None:
+            _draw_table(choices, choices.shown, foot)
 
-    def dialog(self, view: ViewArea) -> None:
-        """Declare it while it is open."""
-        em, display = imgui.get_font_size(), imgui.get_io().display_size
-        size = ImVec2(min(_SIZE.x * em, 0.94 * display.x), min(_SIZE.y * em, 0.9 * display.y))
-        with widgets.modal(TITLE, self.choices is not None, size) as is_drawn:
-            if is_drawn and self.choices is not None:
-                _draw_choices(self.choices)
-                self._draw_foot(self.choices)
-                if self.choices is None:
-                    imgui.close_current_popup()
-
-    def _draw_foot(self, choices: TableChoices) -> None:
-        """Declare the problem and the buttons."""
-        if choices.problem:
-            imgui.text_wrapped(f"{icons.ICON_FA_TRIANGLE_EXCLAMATION}  {printable(choices.problem)}")
-        else:
-            widgets.faint(printable(choices.summary))
-        imgui.begin_disabled(not choices.can_open)
-        if self._takes_keyboard and choices.can_open:
-            imgui.set_keyboard_focus_here()
-            self._takes_keyboard = False
-        opens = imgui.button("Open")
-        imgui.end_disabled()
-        opens = (widgets.is_taken() and choices.can_open) or opens
-        imgui.same_line()
-        if imgui.button("Reset"):
-            choices.reset()
-        widgets.tooltip("Leave all choices to Scan4D")
-        imgui.same_line()
-        leaves = imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape)
-        if opens:
-            self._open()
-        elif leaves:
-            self.choices = None
+    def open_scan(self, choices: TableChoices) -> None:
+        """Open the table with the choices."""
+        self.correct_reading(choices.corrections, self._scan)
 
     COMMANDS = (Command("read_table", READ_TABLE, ask, when="text table"),)
 
 
-def _draw_choices(choices: TableChoices) -> None:
-    """Declare the choices about all lines, and the rows with a role for each column."""
-    imgui.text_wrapped(printable(choices.path.name))
-    shown = choices.shown
-    if shown is None:
-        return
+def _draw_table(choices: TableChoices, shown: TablePreview, foot: float) -> None:
+    """Declare the choices and the rows of a table. foot: height of what stands below, pixels."""
     _draw_word(choices, "separator", "Separator", SEPARATORS, shown.separator)
     _draw_word(choices, "decimal", "Decimal mark", DECIMALS, shown.decimal)
     _draw_word(choices, "encoding", "Encoding", ENCODINGS, shown.encoding)
@@ -284,10 +248,7 @@ def _draw_choices(choices: TableChoices) -> None:
         choices.state("skip", str(min(max(lines, 0), _MOST_SKIPPED)))
     names = choices.names
     _draw_above(shown.lines[: shown.skip - bool(names)])
-    room, style = imgui.get_content_region_avail().x, imgui.get_style()
-    text = f"     {choices.problem}" if choices.problem else choices.summary
-    foot = imgui.calc_text_size(printable(text), wrap_width=room).y + 2 * style.item_spacing.y
-    _draw_rows(choices, names, shown.cells, -(foot + imgui.get_frame_height()))
+    _draw_rows(choices, names, shown.cells, -foot)
 
 
 def _draw_word(choices: TableChoices, key: str, title: str, words: Mapping[str, str], found: str) -> None:
