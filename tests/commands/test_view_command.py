@@ -90,7 +90,7 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     opened = [options.pop("opened") for _, options in calls]
     assert [timeline.name for timeline in opened] == ["ball.npz", "demo"], "opened once, and handed over"
     assert (opened[0].unit, opened[0].times[0]) == ("mm", 0.0)
-    nothing = {"replay": None, "session": None, "refused": None, "corrections": {}}
+    nothing = {"replay": None, "session": None, "refused": None, "corrections": {}, "average": None}
     assert calls == [
         ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, **nothing}),
         (["demo"], {"unit": None, "fps": None, "up": None, "device": None, **nothing}),

@@ -44,6 +44,7 @@ FULL = Document(
     params={"points": backend("points").params({"point_size": 5}), "voxels": backend("voxels").params()},
     goal=Goal("time", 1 / 3), configuration=Configuration("surfels", {"passes": "one"}),
     unit="mm", shown_unit="cm", front=-30.0, span=(2, 7), fps=30.0, times_by_names=True,
+    average=8, measure_averaged=True,
     reading={"columns": "x y z", "skip": "2"},
     bookmarks=(Bookmark("the left \u00e9ye", CAMERA), Bookmark("", CAMERA)),
     parts={"landmarks": Landmarks().with_distance(*ENDS).with_distance(*ENDS[::-1])},

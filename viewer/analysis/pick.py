@@ -145,6 +145,7 @@ def pick(
         found = _through(surface, pixel, ids, points, id_)
     if found is None:
         pixel = np.array([across + 0.5, down + 0.5])
+        depth = _measured_depth(surface, cloud, at, depth)
     numbers = surface.found_at(row)
     row = surface.point_of(row)
     scalars = {name: values[at].item() for name, values in cloud.scalars.items()}
@@ -162,6 +163,15 @@ def pick(
         scalars=scalars | numbers,
         spacing=spacing_at(cloud, at) if spacing else None,
     )
+
+
+def _measured_depth(surface: Surface, cloud: PointCloud, at: int, depth: float) -> float:
+    """The depth of a point of a cloud as measures use it, if the picture shows averages that they do not use;
+    else the depth that the picture shows."""
+    pose = surface.scanned.pose
+    if pose.measured is pose:
+        return depth
+    return float(surface.view.depths(cloud.world(np.array([at])) - surface.view.origin)[0])
 
 
 def _is_between(

@@ -32,10 +32,11 @@ class SurfacePoint:
     """A position on the surface that was picked in a frame, such as an end of a distance.
 
     frame: the pose's index. time: the pose's, seconds. position: float64, scan units. id: of the point that
-    is seen there, or of the nearest one, None where none is. spacing: distance between the points around it,
-    scan units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz of how
-    the place that was meant may lie off the position, squared scan units; None: unknown. neighbors: points
-    around it that it follows, and where they were when it was set. at_outline: as of a `Picked`.
+    is seen there, or of the nearest one, None where none is. spacing: distance between the points around
+    it, scan units, None where there are none. level: as of a `Picked`. covariance: xx, xy, xz, yy, yz, zz
+    of how the place that was meant may lie off the position, squared scan units; None: unknown. neighbors:
+    points around it that it follows, and where they were when it was set. at_outline: as of a `Picked`.
+    averaged: frames that the points around are means of at most, 0: they are as scanned.
     """
 
     frame: int
@@ -47,6 +48,7 @@ class SurfacePoint:
     covariance: tuple[float, float, float, float, float, float] | None = None
     neighbors: tuple[Neighbor, ...] = ()
     at_outline: bool = False
+    averaged: int = 0
 
     @classmethod
     def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> SurfacePoint:
@@ -85,6 +87,7 @@ class SurfacePoint:
             covariance=None if covariance is None else _six(covariance),
             neighbors=neighbors,
             at_outline=picked.at_outline,
+            averaged=0 if pose.average is None else pose.average.frames,
         )
         return _moved(point, place.inverse)
 

@@ -17,7 +17,8 @@ class Start(NamedTuple):
     """Choices that a window begins with, beside its scans.
 
     unit, fps, up: that the command line states for all scans; None: it states none. corrections: of how
-    Scan4D reads the scans that it names, as `--read` takes them. device: has no effect on
+    Scan4D reads the scans that it names, as `--read` takes them. average: frames that points are means of in
+    all scans, 0: none; None: it states none. device: has no effect on
     a window, which says so. replay: a recording to show first. session: to open the first scan with. refused:
     what was wrong with what the user named, to be reported.
     """
@@ -30,6 +31,7 @@ class Start(NamedTuple):
     session: SavedSession | None = None
     refused: InputError | None = None
     corrections: Mapping[str, str] | None = None
+    average: int | None = None
 
 
 def run(
@@ -88,7 +90,7 @@ def run(
             raise
         try:
             with uncollected():  # tools are imported
-                stated = StatedOptions(start.unit, start.fps, start.up, start.corrections)
+                stated = StatedOptions(start.unit, start.fps, start.up, start.corrections, start.average)
                 app = App(window, found, begun, stored, stated)
             try:
                 for note in notes:

@@ -29,7 +29,7 @@ log = logging.getLogger(__name__)
 
 
 class StatedOptions(NamedTuple):
-    """The unit, rate and up axis that the command line states for all scans; None: it states none.
+    """The unit, rate, up axis and average that the command line states for all scans; None: it states none.
 
     corrections: of how Scan4D reads the scans that the command line names, as `--read` takes them.
     """
@@ -38,6 +38,7 @@ class StatedOptions(NamedTuple):
     fps: float | None = None
     up: str | None = None
     corrections: Mapping[str, str] | None = None
+    average: int | None = None
 
 
 class App:

@@ -19,9 +19,9 @@ class Click:
 
     picked: what is seen there, with its spacing; None where nothing is. Its `place` is where the surface is
     at the pixel, its `point` the point of the scan that is seen there, None where a hole is filled. pose:
-    that the picture shows. through_gap: whether the very pixel shows something farther, through a gap.
-    motion: of the pose, see `ToolContext.lay`; positions of `picked` are in the moved scan. pixel: of the
-    picture, the one that shows the surface that is meant, (column, row).
+    that the picture shows, as measures use it. through_gap: whether the very pixel shows something farther,
+    through a gap. motion: of the pose, see `ToolContext.lay`; positions of `picked` are in the moved scan.
+    pixel: of the picture, the one that shows the surface that is meant, (column, row).
     """
 
     picked: Picked | None
@@ -49,7 +49,7 @@ class Clicks:
         meant = before_gap(surface, *at)
         picked = pick(surface, *at, shown=meant, spacing=in_full)
         is_farther = meant != at and surface.texel(*at).depth < np.inf
-        return Click(picked, request.pose, is_farther, request.layers.world_from_pose, meant)
+        return Click(picked, request.pose.measured, is_farther, request.layers.world_from_pose, meant)
 
     def near(self, position: Vector, step: tuple[int, int]) -> Click | None:
         """The click that one beside a position would be, so many pixels to the right and up, in full; None

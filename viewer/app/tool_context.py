@@ -114,8 +114,9 @@ class ToolContext:
 
     @property
     def pose(self) -> Pose | None:
-        """The pose that is shown; None before the first."""
-        return self.playback.pose
+        """The pose that is shown, as measures use it; None before the first."""
+        pose = self.playback.pose
+        return None if pose is None else pose.measured
 
     @property
     def index(self) -> int:

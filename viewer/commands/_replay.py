@@ -26,6 +26,7 @@ from ..errors import InputError
 from ..output.export import OUTPUT_SUFFIXES, check_output
 from ..output.film import FILM_SUFFIX, FilmTimes
 from ..output.legend import Legend, marks_of
+from ..scan.averaging import Averaging
 from ..scan.inputs import scan_inputs
 from ..scan.open import is_demo, open_scan
 from ..scan.timeline import Timeline
@@ -40,7 +41,7 @@ from ._scans import stated_corrections
 # Arguments that a recording replaces.
 _OF_RECORDING = (
     "pose", "time", "poses", "all", "size", "backend", "set", "look", "camera", "orbit", "turntable",
-    "budget", "error", "up",
+    "budget", "error", "up", "average",
 )  # fmt: skip
 
 
@@ -132,6 +133,7 @@ def _scan_as_read(entry: Entry) -> tuple[object, ...]:
 
 def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     """The picture of an entry, anonymous where it or the arguments are. Raises InputError."""
+    timeline.average(Averaging(entry.average))
     pose, start = timeline.drawn(entry.pose), float(timeline.times[0])
     entry = replace(entry, look=replace(entry.look, quality=args.quality or entry.look.quality))
     if entry.anonymous:

@@ -6,7 +6,7 @@ import csv
 import math
 import os
 import re
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace, _ArgumentGroup
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -19,6 +19,7 @@ from ..csv_text import save_rows, text_of_cell
 from ..errors import InputError
 from ..files import absolute, printable
 from ..scan import formats
+from ..scan.averaging import MOST_FRAMES
 from ..scan.open import entries, open_scan
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
@@ -38,6 +39,22 @@ def add_pose_arguments(parser: ArgumentParser) -> None:
     group.add_argument("--time", type=float, metavar="S", help="the frame nearest to a time in seconds")
     group.add_argument("--poses", metavar="A:B[:STEP]", help="frames from A up to, but not including, B")
     group.add_argument("--all", action="store_true", help="all frames")
+
+
+def add_average_argument(parser: ArgumentParser | _ArgumentGroup) -> None:
+    """The argument that averages frames."""
+    parser.add_argument(
+        "--average", type=_average, metavar="N",
+        help="reduce noise: points that stand still become the mean of the last N frames, 2 to "
+        f"{MOST_FRAMES}; default 0: off",
+    )  # fmt: skip
+
+
+def _average(text: str) -> int:
+    frames = int(text) if text.isdecimal() else -1
+    if frames != 0 and not 2 <= frames <= MOST_FRAMES:
+        raise ArgumentTypeError(f"'{text}' is neither 0 nor a number of frames from 2 to {MOST_FRAMES}")
+    return frames
 
 
 def open_timeline(args: Namespace, scan: str) -> Timeline:

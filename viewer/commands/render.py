@@ -30,6 +30,7 @@ from ..look import SAMPLES, Look, drawable
 from ..output.export import DESCRIBED_SUFFIXES, OUTPUT_SUFFIXES, UNMARKED_SUFFIXES, check_output, pictures
 from ..output.legend import MARKS, Legend, marks_of
 from ..params import parse
+from ..scan.averaging import Averaging
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.timeline import Timeline
@@ -45,6 +46,7 @@ from ._drawing import Plan, Shot
 from ._outputs import add_output_argument, claim
 from ._scans import (
     SCAN_HELP,
+    add_average_argument,
     add_pose_arguments,
     chosen_poses,
     first_readable,
@@ -114,6 +116,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="N",
         help="N pictures of one turn around the scan; a sequence plays during the turn",
     )
+    add_average_argument(picture)
     measuring = parser.add_argument_group("statistics")
     measuring.add_argument(
         "--stats",
@@ -158,6 +161,7 @@ def _planned(args: Namespace) -> Iterator[Plan]:
     camera = Camera.load(args.camera) if args.camera else None
     scan, size = args.scan or DEMO, args.size or _SIZE
     with open_timeline(args, scan) as timeline:
+        timeline.average(Averaging(args.average or 0))
         indices = chosen_poses(args, timeline) or [0]
         shots = drawing.shots(timeline, indices, args)
         check_output(args.out, OUTPUT_SUFFIXES, several=len(shots) > 1)

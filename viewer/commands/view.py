@@ -22,6 +22,7 @@ from ..files import output_folder, printable
 from ..look import Look
 from ..output.export import contact_sheet, thumbnail, write_png
 from ..output.film import FilmTimes, film
+from ..scan.averaging import Averaging
 from ..scan.inputs import scan_inputs
 from ..scan.listing import is_there, named_scans
 from ..scan.open import DEMO
@@ -32,6 +33,7 @@ from ._console import progress, tell, warn
 from ._outputs import add_force_argument, claim
 from ._scans import (
     SCAN_HELP,
+    add_average_argument,
     first_readable,
     framing,
     open_timeline,
@@ -54,6 +56,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="DIR",
         help="if no window can open, write pictures of the scan into this folder",
     )
+    add_average_argument(parser)
     add_force_argument(parser)
 
 
@@ -143,6 +146,7 @@ def _open_window(args: Namespace, named: _Named, first: Timeline, refused: Input
         named.session,
         refused,
         stated_corrections(args),
+        args.average,
     )
     return app.run(named.scans, start, opened=first)
 
@@ -176,6 +180,7 @@ def _files(folder: Path, prefix: str, timeline: Timeline) -> list[Path]:
 def _play(args: Namespace, timeline: Timeline, prefix: str) -> None:
     """Draw all poses of a scan into the folder, and say what is there."""
     name = _stem(args.fallback, prefix, timeline)
+    timeline.average(Averaging(args.average or 0))
     indices = list(range(len(timeline)))
     upright = stated_upright(args, timeline, indices)
     on_sheet = set(indices[:: -(-len(indices) // _SHEET_PICTURES)])

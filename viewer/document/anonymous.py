@@ -44,14 +44,18 @@ def anonymous_request(request: Request, start: float) -> Request:
 @lru_cache(maxsize=1)  # several pictures of one pose share what is uploaded of it
 def anonymous_pose(pose: Pose, start: float) -> Pose:
     """The pose with its middle at zero, seconds counted from `start`, and without names."""
-    middle = middle_of(pose) if pose.count else pose.origin
+    return _moved(pose, middle_of(pose) if pose.count else pose.origin, start)
+
+
+def _moved(pose: Pose, middle: NDArray[np.float64], start: float) -> Pose:
     views = tuple(_anonymous_view(view, middle, number) for number, view in enumerate(pose.views))
     if isinstance(pose.points, PointCloud):
         points: PointCloud | RangePoints = pose.points.moved(-middle)
     else:
         points = pose.points.moved(views, -middle)
     time = round(pose.time - start, _DECIMALS)  # no rest of a large number tells that it was one
-    return Pose(pose.index, time, frame_in_words(pose.index), points)
+    average = pose.average and replace(pose.average, raw=_moved(pose.raw, middle, start))
+    return Pose(pose.index, time, frame_in_words(pose.index), points, average)
 
 
 def middle_of(pose: Pose) -> NDArray[np.float64]:

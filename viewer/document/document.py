@@ -19,12 +19,14 @@ from ..drawing.request import Request, backend_for, colorable
 from ..errors import InputError, shortened
 from ..geometry import UP, Vector, up_vector
 from ..look import Look
+from ..scan.averaging import Averaging
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Life, Pose
 from ..scan.units import usable_unit
 from .part import Part
 from .schema import (
     DAMAGED,
+    AverageFrames,
     BackendName,
     CorrectedTexts,
     FrameRate,
@@ -126,11 +128,12 @@ class Document:
     shown_unit: of displayed lengths, None for the scan's own. front: degrees that the front of the scan
     is turned about what is up. span: the first and the last frame that playing keeps to, None for all. fps:
     frames a second as the user says, None as the scan does. times_by_names: whether the names of the frames
-    tell when they are. reading: corrections of how Scan4D reads the scan, key -> text, as `--read` takes
-    them. bookmarks: cameras to go back to. parts: name -> what a tool keeps (see `Part`); of a
-    tool that is not there, what its file said. unread: fields that are not known here or could not be read ->
-    what the file said, which is written again; so is what was made anew of params and parts, under names such
-    as "parts.measurements".
+    tell when they are. average: frames that points are means of at most, 0: frames are drawn as scanned.
+    measure_averaged: whether measures use the averaged points too. reading: corrections of how Scan4D reads
+    the scan, key -> text, as `--read` takes them. bookmarks: cameras to go back to. parts: name -> what a
+    tool keeps (see `Part`); of a tool that is not there, what its file said. unread: fields that are not
+    known here or could not be read -> what the file said, which is written again; so is what was made anew
+    of params and parts, under names such as "parts.measurements".
 
     Each change is a new value, which shares with the old one what it does not change; the mappings are never
     changed in place.
@@ -149,6 +152,8 @@ class Document:
     span: Span | None = None
     fps: FrameRate | None = None
     times_by_names: bool = False
+    average: AverageFrames = 0
+    measure_averaged: bool = False
     reading: CorrectedTexts = field(default_factory=dict)
     bookmarks: tuple[Bookmark, ...] = ()
     parts: Annotated[Mapping[str, Any], ReadBy(_read_parts)] = field(default_factory=dict)
@@ -176,6 +181,11 @@ class Document:
                 if name == "look":
                     values[name] = usable(Look(), value)
         return cls(**values, unread=left)
+
+    @property
+    def averaging(self) -> Averaging:
+        """How the timeline averages frames."""
+        return Averaging(self.average, self.measure_averaged)
 
     @property
     def made(self) -> tuple[object, ...]:

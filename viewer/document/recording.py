@@ -63,6 +63,7 @@ from .anonymous import anonymous_unit
 from .landmarks import Note
 from .schema import (
     DAMAGED,
+    AverageFrames,
     BackendName,
     CorrectedTexts,
     Count,
@@ -110,7 +111,8 @@ class Entry:
     scan, where the marks show them. labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
     the scan says which it is. reading: corrections of how Scan4D reads the scan, as documents have them.
-    record: how Scan4D read it (see `Reading.to_json`), for information only. at: seconds since the recording
+    record: how Scan4D read it (see `Reading.to_json`), for information only. average: frames that points are
+    means of at most; 0: each frame is drawn as scanned. at: seconds since the recording
     began; entries that differ in it alone are equal.
     """
 
@@ -139,6 +141,7 @@ class Entry:
     automatic: Automatic | None = None
     reading: CorrectedTexts = field(default_factory=dict)
     record: Values = field(default_factory=dict)
+    average: AverageFrames = 0
     at: Stamp = field(default=0.0, compare=False)
 
     @classmethod
@@ -169,6 +172,7 @@ class Entry:
             place=matrix_of(layers.world_from_pose),
             scale=1.0 if choice is None else choice.configuration.scale,
             automatic=None if choice is None else choice.report,
+            average=0 if request.pose.average is None else request.pose.average.frames,
         )  # fmt: skip
 
     def with_reading(self, timeline: Timeline) -> Entry:

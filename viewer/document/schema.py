@@ -34,6 +34,7 @@ from ..errors import InputError, explained, shortened, unknown_name
 from ..files import parsed_json, read_text
 from ..output.export import read_description
 from ..params import describe, parse, renamed
+from ..scan.averaging import MOST_FRAMES
 from ..scan.reading.corrections import Corrections
 from ..scan.times import FPS_LIMITS
 from ..scan.units import checked_unit
@@ -107,6 +108,9 @@ ScanName = Annotated[str, Kind("the name of a scan", _is_name)]
 Count = Annotated[int, Kind("a whole number", lambda value: 0 <= value < 2**31)]
 PoseNumber = Annotated[int, Kind("the index of a frame", lambda value: 0 <= value < 2**31)]
 Time = Annotated[float, Kind("a time in seconds", lambda value: abs(value) <= _LATEST)]
+AverageFrames = Annotated[
+    int, Kind("0, or a number of frames from 2 to 64", lambda value: value == 0 or 2 <= value <= MOST_FRAMES)
+]
 FrameRate = Annotated[float, Kind("frames a second", lambda value: FPS_LIMITS[0] <= value <= FPS_LIMITS[1])]
 Stamp = Annotated[float, Kind("a time from 0 to 86400 s", _is_stamp)]
 Values = Annotated[Any, Kind("an object with named values", is_object)]

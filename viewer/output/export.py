@@ -230,6 +230,8 @@ def _write_exr(surface: Surface, path: Path, description: str | None = None) -> 
     }
     if "octant" in arrays:
         channels["octant"] = arrays["octant"]
+    if "averaged" in arrays:
+        channels["averaged"] = arrays["averaged"].astype(np.uint32)
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     if description is not None:
         header[_DESCRIPTION] = description

@@ -112,13 +112,25 @@ class PointRows:
         return int(self.points(np.array([row]))[0])
 
     def cloud_with(self, row: int, least: int) -> tuple[PointCloud, int]:
-        """A cloud with the point of a row and at least so many of the nearest ones, and its row there."""
-        return self.scanned.stored, self.point(row)
+        """A cloud with the measured point of a row and at least so many of the nearest ones, and its row
+        there."""
+        return self.measured, self.point(row)
+
+    @property
+    def measured(self) -> PointCloud:
+        """The points of the scan as measures use them, see `Pose.measured`."""
+        pose = self.scanned.pose
+        return self.scanned.stored if pose.measured is pose else pose.measured.cloud
+
+    def frames(self, rows: NDArray) -> NDArray[np.uint8] | None:
+        """How many frames the points are means of that rows (n,) stand for, (n,); None: none is a mean."""
+        average = self.scanned.pose.average
+        return None if average is None else average.counts[self.points(rows)]
 
     def file_points(self, rows: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Indices in the file (n,) and positions (n, 3), relative to the view's origin, of the points that
-        rows stand for."""
-        points, scan = self.points(rows), self.scanned.stored
+        rows stand for, as measures use them."""
+        points, scan = self.points(rows), self.measured
         ids = points if scan.ids is None else scan.ids[points]
         return ids.astype(np.intp), scan.world(points) - view.origin
 
@@ -220,15 +232,21 @@ class SampleRows(PointRows):
         return self._samples.row_of(row)
 
     def cloud_with(self, row: int, least: int) -> tuple[PointCloud, int]:
-        offset = self._samples.of_samples("positions", np.array([row]))[0]
-        cloud = self._samples.around(offset + self._samples.overview.origin, least)
+        samples = self.pose.pose.measured.range_points
+        offset = samples.of_samples("positions", np.array([row]))[0]
+        cloud = samples.around(offset + samples.overview.origin, least)
         found = cloud.row_of(row)
         assert found is not None
         return cloud, found
 
     def file_points(self, rows: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        away = self._samples.overview.origin - view.origin
-        return rows, self._samples.of_samples("positions", rows) + away
+        samples = self.pose.pose.measured.range_points
+        away = samples.overview.origin - view.origin
+        return rows, samples.of_samples("positions", rows) + away
+
+    def frames(self, rows: NDArray) -> NDArray[np.uint8] | None:
+        average = self.pose.pose.average
+        return None if average is None else average.counts[rows]
 
 
 def _scalar(cloud: PointCloud, name: str, zero: float) -> NDArray[np.float32]:

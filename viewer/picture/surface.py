@@ -150,6 +150,14 @@ class Surface(RenderTarget):
             return np.where(self._covered, self._read_texels("value", np.float32)[..., 0], unknown)
         return self._fetch(lambda rows: as_float32(self._values_of(source, rows)), unknown)
 
+    @property
+    def averaged(self) -> NDArray[np.uint8] | None:
+        """(H, W) uint8, how many frames the point is the mean of that each pixel shows; 0 where there is no
+        point. None where no frames are averaged."""
+        if self.scanned.pose.average is None:
+            return None
+        return self._fetch(self.kind.frames, np.uint8(0))  # type: ignore[arg-type]
+
     def image(self, look: Look | None = None) -> NDArray[np.uint8]:
         """The shaded picture, (H, W, 4) uint8 sRGB and alpha; look: another than was drawn with."""
         if look is not None and look != self.look:
@@ -161,8 +169,9 @@ class Surface(RenderTarget):
         return words.view(np.uint8).reshape(*self.shown[::-1], 4)
 
     def arrays(self) -> dict[str, NDArray]:
-        """All channels by name, as `.npz` files hold them; "octant" where octants are drawn."""
-        names = ("color", "normal", "depth", "coverage", "value", "id", "level", "octant")
+        """All channels by name, as `.npz` files hold them; "octant" where octants are drawn, "averaged" where
+        frames are averaged."""
+        names = ("color", "normal", "depth", "coverage", "value", "id", "level", "octant", "averaged")
         channels = {name: channel for name in names if (channel := getattr(self, name)) is not None}
         return {name: self.enlarged(channel) for name, channel in channels.items()}
 

@@ -68,6 +68,10 @@ class PoseCache:
             self._poses.move_to_end(index)
         return pose
 
+    def peek(self, index: int) -> Pose | None:
+        """The pose if it is here; it counts as used no later than before."""
+        return self._poses.get(index)
+
     def put(self, pose: Pose, is_needed: Callable[[int], bool] = lambda _: False) -> bool:
         """Hold this pose and evict others for it, but none that `is_needed`; False where it does not fit."""
         self._drop(pose.index)
@@ -113,7 +117,8 @@ class PoseCache:
 
     def _count(self, index: int) -> None:
         pose, before = self._poses[index], self._sizes[index]
-        (self._unmerged.discard if pose.is_merged else self._unmerged.add)(index)  # before what it grew by
+        is_merged = pose.is_merged and pose.raw.is_merged
+        (self._unmerged.discard if is_merged else self._unmerged.add)(index)  # before what it grew by
         self._sizes[index] = pose.nbytes
         self._counted += self._sizes[index] - before
 

@@ -173,6 +173,11 @@ class PointCloud:
         """Bytes held by all arrays."""
         return sum(values.nbytes for values in self._named_arrays().values())
 
+    def bytes_beside(self, other: PointCloud) -> int:
+        """Bytes held by the arrays that another cloud does not hold too."""
+        held = {id(values) for values in other._named_arrays().values()}
+        return sum(values.nbytes for values in self._named_arrays().values() if id(values) not in held)
+
     def world(self, rows: Any = slice(None)) -> NDArray[np.float64]:
         """Absolute positions, (N, 3) float64, as precise as the file has them. rows: of these alone."""
         offsets = self.positions[rows].astype(np.float64)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,7 @@ from .spacing import ENOUGH, roughness, typical_spacing
 from .upright import Upright, guess_up
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
+Matched = Literal["rows", "pixels", "surface", "nothing"]  # by what points of two frames are the same
 
 _TELEPHOTO = 0.5  # degrees from bottom to top, below which rays may be as good as parallel
 
@@ -28,11 +31,41 @@ class Life:
 
 
 @dataclass(frozen=True, eq=False)
+class Average:
+    """How a pose was averaged over frames, see `averaging`.
+
+    raw: the pose as scanned. frames: how many frames count at most. counts: (N,) uint8, how many frames each
+    point is the mean of, by row of the cloud, or by sample of the range views (0: it sees no point).
+    matched: by what the frames were matched; "nothing": their points have nothing in common. is_measured:
+    whether measures use the averaged points.
+    """
+
+    raw: Pose
+    frames: int
+    counts: NDArray[np.uint8]
+    matched: Matched
+    is_measured: bool = False
+
+    @cached_property
+    def share(self) -> float:
+        """The share of the points that stand still and are averaged, 0 to 1."""
+        points = np.count_nonzero(self.counts)
+        return np.count_nonzero(self.counts > 1) / points if points else 0.0
+
+    @cached_property
+    def usual(self) -> int:
+        """The median number of frames of the points that stand still; 1 where none does."""
+        still = self.counts[self.counts > 1]
+        return int(np.median(still)) if len(still) else 1
+
+
+@dataclass(frozen=True, eq=False)
 class Pose:
     """One moment of a scan, on the CPU.
 
     index: its number on the timeline. time: seconds. label: the file or frame it came from. points: its
-    points, or those of the range views where it was scanned as such. life: see `Life`.
+    points, or those of the range views where it was scanned as such. average: how they were averaged over
+    frames, None where they are as scanned. life: see `Life`.
 
     Merging the points of range views takes time and memory. It happens when something first reads `cloud`;
     the `overview` needs no merging.
@@ -42,6 +75,7 @@ class Pose:
     time: float
     label: str
     points: PointCloud | RangePoints
+    average: Average | None = None
     life: Life = field(default_factory=Life, init=False, repr=False)
 
     @classmethod
@@ -49,6 +83,16 @@ class Pose:
         """The pose of what a frame holds. Raises InputError where range views see nothing."""
         points = scanned if isinstance(scanned, PointCloud) else RangePoints.of(scanned)
         return cls(index, time, label, points)
+
+    @property
+    def raw(self) -> Pose:
+        """The pose as scanned."""
+        return self if self.average is None else self.average.raw
+
+    @property
+    def measured(self) -> Pose:
+        """The pose that measures use: as scanned, unless the user measures on averaged points."""
+        return self if self.average is None or self.average.is_measured else self.average.raw
 
     @property
     def cloud(self) -> PointCloud:
@@ -135,8 +179,17 @@ class Pose:
 
     @property
     def nbytes(self) -> int:
-        """Bytes held by its arrays: more once points are merged."""
-        return self.points.nbytes
+        """Bytes held by its arrays, with those of the pose as scanned: more once points are merged."""
+        if self.average is None:
+            return self.points.nbytes
+        raw = self.average.raw
+        is_shared = isinstance(self.points, PointCloud) and isinstance(raw.points, PointCloud)
+        own = self.points.bytes_beside(raw.points) if is_shared else self.points.nbytes  # type: ignore[union-attr, arg-type]
+        return own + self.average.counts.nbytes + raw.nbytes
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All that another process needs, which is not the pose as scanned."""
+        return {**self.__dict__, "average": None}
 
     def with_cloud(self, cloud: PointCloud) -> Pose:
         """Put a cloud that has more attributes of the same points in place of `cloud`."""
@@ -145,6 +198,7 @@ class Pose:
 
     def at(self, time: float) -> Pose:
         """Move it to another time, seconds; what is on the GPU of it stays."""
-        moved = replace(self, time=time)
+        average = self.average and replace(self.average, raw=self.average.raw.at(time))
+        moved = replace(self, time=time, average=average)
         object.__setattr__(moved, "life", self.life)
         return moved

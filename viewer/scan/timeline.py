@@ -10,8 +10,8 @@ import traceback
 import weakref
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import EmptyFrame, InputError, shortened
 from ..task import Cancelled, Task
+from .averaging import Averaging, averaged
 from .cache import PoseCache, default_budget
 from .faces import Faces
 from .points import UNKNOWN_UNIT, PointCloud
@@ -108,6 +109,8 @@ class Timeline:
         self._worker: threading.Thread | None = None
         self._reading: Task | None = None  # what the worker does
         self._reported = 0  # messages about decisions
+        self._averaging = Averaging()
+        self._averages = threading.Lock()  # held by whoever averages a pose
         self._closed = False
 
     def __len__(self) -> int:
@@ -135,6 +138,31 @@ class Timeline:
             self._cache.exchange(self._timed)
             if self._in_use is not None:
                 self._in_use = self._cache.get(self._in_use.index) or self._timed(self._in_use)
+
+    @property
+    def averaging(self) -> Averaging:
+        """How `drawn` and `ready` average frames."""
+        return self._averaging
+
+    def average(self, averaging: Averaging) -> None:
+        """Average frames this way from now on. The worker makes averages of what it was asked for last."""
+        with self._state:
+            if averaging == self._averaging:
+                return
+            before, self._averaging = self._averaging, averaging
+
+            def changed(pose: Pose) -> Pose:
+                if pose.average is None or averaging.frames != before.frames:
+                    return pose.raw
+                return replace(pose, average=replace(pose.average, is_measured=averaging.is_measured))
+
+            self._cache.exchange(changed)
+            if self._in_use is not None:
+                self._in_use = self._cache.get(self._in_use.index) or changed(self._in_use)
+            if self._wanted is not None:
+                self._requests.append(self._wanted)
+                self._ahead = None if self._ahead is None else self._upcoming()
+            self._state.notify_all()
 
     def _timed(self, pose: Pose) -> Pose:
         """The pose at the time that its frame has now."""
@@ -204,29 +232,34 @@ class Timeline:
         return runs
 
     def pose(self, index: int) -> Pose:
-        """One pose, read now unless it is in memory; threads that ask for it at once read it once.
+        """One pose as scanned, read now unless it is in memory; threads that ask for it at once read it once.
 
         Raises InputError where there is no such pose, or its frame is broken; a broken frame is not read
         again.
         """
-        index = self._checked_index(index)
+        return self._pose(self._checked_index(index))
+
+    def _pose(self, index: int, ahead: bool = False) -> Pose:
+        """The work of `pose`. ahead: whether it evicts none that is needed sooner."""
         with self._state:
             self._check_open()
             if index in self._broken:
                 raise copy.copy(self._broken[index])
             if (held := self._held(index)) is not None:
-                return held
+                return held.raw
             begun = self._loading.get(index)
             future = begun or self._begin(index)
         if begun is None:
-            self._load(index, future)
+            self._load(index, future, ahead)
         return future.result()
 
     def drawn(self, index: int) -> Pose:
-        """The pose that a picture shows: as `pose` gives it, or one without points where the frame of a
-        sequence is empty. Raises InputError as `pose` does for other frames."""
+        """The pose that a picture shows: as `pose` gives it, averaged if the timeline averages. Where the
+        frame of a sequence is empty, one without points. Raises InputError as `pose` does for other frames.
+        """
         try:
-            return self.pose(index)
+            pose = self.pose(index)
+            return self._average(pose) if self._averaging.is_on else pose
         except EmptyFrame:
             if len(self) == 1:
                 raise
@@ -242,7 +275,7 @@ class Timeline:
                 raise copy.copy(self._broken[index])
             held, begun = self._held(index), self._loading.get(index)
         if held is not None or begun is not None:
-            return held or begun.result()  # type: ignore[union-attr]
+            return held.raw if held is not None else begun.result()  # type: ignore[union-attr]
         try:
             return self._read(index)
         except InputError as error:
@@ -250,9 +283,11 @@ class Timeline:
                 raise self._note_broken(index, error) from None
 
     def ready(self, index: int) -> Pose | None:
-        """The pose if it is in memory, else None at once."""
+        """The pose that a picture shows if it is in memory, averaged if the timeline averages; else None at
+        once."""
         with self._state:
-            return self._held(index)
+            held = self._held(index)
+            return held if held is not None and self._is_averaged(held) else None
 
     def request(self, index: int) -> None:
         """Ask the worker for a pose, before all that was asked of it earlier."""
@@ -344,12 +379,15 @@ class Timeline:
                 if task is None or self._closed:
                     return
                 index, ahead = task
-                future = self._begin(index)
+                held = self._held(index)
+                future = self._begin(index) if held is None else None
                 reading = self._reading = Task(f"Reading {self.source.label(index)}")
             with reading.current():
-                self._load(index, future, ahead)
+                pose = held.raw if held is not None else self._load(index, future, ahead)
+                if pose is not None and self._averaging.is_on:
+                    self._average_ahead(pose, ahead)
             self._reading = None
-            del future  # it holds the pose
+            del future, held, pose  # they hold the pose
 
     def _next_task(self) -> tuple[int, bool] | None:
         """The frame that the worker reads next, and whether ahead or as requested; None: nothing."""
@@ -380,20 +418,36 @@ class Timeline:
         return self._sizes.get(index, self._typical_size) if held is None else held
 
     def _is_missing(self, index: int) -> bool:
-        in_use = self._in_use is not None and self._in_use.index == index
-        return not (in_use or any(index in held for held in (self._cache, self._loading, self._broken)))
+        if index in self._loading or index in self._broken:
+            return False
+        is_in_use = self._in_use is not None and self._in_use.index == index
+        held = self._in_use if is_in_use else self._cache.peek(index)
+        return held is None or not self._is_averaged(held)
+
+    def _is_averaged(self, pose: Pose) -> bool:
+        """Whether a pose is averaged as the timeline averages."""
+        average, wanted = pose.average, self._averaging
+        if average is None:
+            return not wanted.is_on
+        return (average.frames, average.is_measured) == (wanted.frames, wanted.is_measured)
 
     def _distance(self, index: int) -> int:
-        """How many steps playing takes from the playhead to a pose."""
-        return (index - self._playhead) * self._direction % len(self)
+        """How many steps playing takes from the playhead to a pose, or to the first that averages it."""
+        before = max(self._averaging.frames - 1, 0)
+        if 0 <= self._playhead - index <= before:
+            return 0
+        first = index if self._direction > 0 else min(index + before, len(self) - 1)
+        return (first - self._playhead) * self._direction % len(self)
 
     def _begin(self, index: int) -> Future[Pose]:
         """Have others wait for this future from here on, until `_load` is done."""
         future = self._loading[index] = Future()
         return future
 
-    def _load(self, index: int, future: Future[Pose], ahead: bool = False) -> None:
-        """Read a pose outside the lock and note what came of it; the future gets the pose or the error."""
+    def _load(self, index: int, future: Future[Pose] | None, ahead: bool = False) -> Pose | None:
+        """Read a pose outside the lock and note what came of it; the future gets the pose or the error.
+        Returns the pose, None where there was an error."""
+        assert future is not None
         try:
             pose = self._shared(self._read(index))
             _find_what_pictures_need(pose)
@@ -406,7 +460,7 @@ class Timeline:
                 if isinstance(error, InputError):
                     error = self._note_broken(index, error)
             future.set_exception(error)
-            return
+            return None
         with self._state:
             del self._loading[index]
             pose = self._timed(pose)  # where times have changed meanwhile
@@ -423,6 +477,48 @@ class Timeline:
                 if index == self._wanted:
                     self._in_use = pose
         future.set_result(pose)
+        return pose
+
+    def _average_ahead(self, pose: Pose, ahead: bool) -> None:
+        """Average a pose on the worker's thread. A frame that cannot be averaged counts as broken."""
+        try:
+            self._average(pose, partial(self._pose, ahead=True), ahead)
+        except (Cancelled, TimelineClosed):
+            return
+        except Exception as error:  # whatever a scan brings, playing goes on
+            what = f"cannot be averaged ({type(error).__name__}: {error})"
+            with self._state:
+                self._note_broken(pose.index, InputError(what, pose.label))
+
+    def _average(self, pose: Pose, read: Callable[[int], Pose] | None = None, ahead: bool = False) -> Pose:
+        """Average a pose as scanned over the frames before it, and hold it. read: reads these."""
+        with self._averages:
+            with self._state:
+                averaging, held = self._averaging, self._held(pose.index)
+            if held is not None and held.average is not None and self._is_averaged(held):
+                return held
+            earlier = self._earlier(pose.index, averaging.frames, read or self.pose)
+            made = averaged(pose, earlier, averaging)
+            _find_what_pictures_need(made)
+            self.finish(made)
+            with self._state:
+                made = self._timed(made)
+                if averaging == self._averaging and not self._closed:
+                    self._sizes[made.index] = self._typical_size = made.nbytes
+                    distance = self._distance(made.index) if ahead else 0
+                    self._cache.put(made, is_needed=lambda other: self._distance(other) < distance)
+                    if made.index == self._wanted:
+                        self._in_use = made
+            return made
+
+    def _earlier(self, index: int, frames: int, read: Callable[[int], Pose]) -> Iterator[Pose]:
+        """The poses before one that an average may take in, the latest first, without broken ones."""
+        for number in range(index - 1, max(index - frames, -1), -1):
+            try:
+                pose = read(number)
+            except InputError:
+                continue
+            yield pose
 
     def _shared(self, pose: Pose) -> Pose:
         """The pose with the arrays of the one read before where they are the same."""

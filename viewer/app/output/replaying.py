@@ -149,6 +149,10 @@ class Replayer(WindowPart):
         if not self._is_read_as(replaying, entry):
             return True
         timeline = self.playback.timeline
+        if timeline.averaging.frames != entry.average:
+            if self.session.document.average != entry.average:
+                self.session.change("Replay", merge="replay", average=entry.average)
+            return True
         if entry.pose in timeline.empty:
             self._show(entry, timeline.drawn(entry.pose))
             replaying.next, replaying.since = replaying.next + 1, None

@@ -22,6 +22,7 @@ from ..files.rereading import Rereading
 from ..files.scans import Scans, title
 from ..keys import Keys
 from ..part import Section, WindowPart
+from ..playing.averaging import CHOICES, FrameAveraging
 from ..playing.pacing import Pacing
 from ..playing.playback import Playback
 from ..scene.framing import Framing
@@ -45,6 +46,7 @@ class ScanSection(WindowPart):
     session: Session
     playback: Playback
     pacing: Pacing
+    averaging: FrameAveraging
     framing: Framing
     steering: Steering
     keys: Keys
@@ -67,6 +69,7 @@ class ScanSection(WindowPart):
             self._draw_facts(self.playback.pose)
             self._draw_unit(self.playback.pose)
             self._draw_rate()
+            self._draw_average()
             self._draw_up()
 
     def _draw_scans(self) -> None:
@@ -166,6 +169,32 @@ class ScanSection(WindowPart):
             widgets.tooltip("Read the time of each frame from its file name")
             if changed:
                 pacing.use_names(wanted)
+
+    def _draw_average(self) -> None:
+        """Declare how many frames count for the average of a point, and how much of the frame is averaged."""
+        if len(self.playback.timeline) == 1:
+            return
+        averaging, document = self.averaging, self.session.document
+        widgets.label(
+            "Average frames",
+            "Reduces noise: each point that stands still becomes the mean of its last frames. Points that "
+            "move stay as scanned. Measures use the points as scanned, unless you choose otherwise.",
+        )
+        frames = sorted({*CHOICES, document.average})
+        titles = {str(count): f"last {count}" if count else "off" for count in frames}
+        chosen = widgets.combo("average", str(document.average), list(titles), titles)
+        if int(chosen) != document.average:
+            averaging.choose(int(chosen))
+        if not document.average:
+            return
+        widgets.faint(averaging.words)
+        changed, wanted = imgui.checkbox("Measure on averaged points", document.measure_averaged)
+        widgets.tooltip(
+            "Clicks place landmarks and distances on the averaged points, and the labels of such distances "
+            "say so. Tracking and areas use the points as scanned."
+        )
+        if changed:
+            averaging.measure(wanted)
 
     def _draw_up(self) -> None:
         pose, now = self.playback.pose, self.session.document.look.up
