@@ -10,6 +10,9 @@ from typing import Any, NamedTuple
 from .metrics import defined_mean
 
 ESTIMATED = "estimate"  # the contender whose normals are those of the points, not of a picture
+STATIC = "static, noise 0.1"
+STATIC_AVERAGE = f"{STATIC}, average of 8"
+_STATIC = (STATIC, STATIC_AVERAGE)
 _NOISY = ("noise 0.1", "noise 0.3", "noise 0.6", "noise 0.3, with normals")
 _EVEN = ("even", "even, with normals", "blue noise", "random")
 _THINNED = ("thinned 1:10", "thinned 1:10, with normals")
@@ -62,11 +65,9 @@ GOALS = (
     SurfaceGoal("off_percent", "picks off without a warning", "%", 0.5, (*_EVEN, *_THINNED, *_NOISY)),
     SurfaceGoal("refused_percent", "picks refused", "%", 5.0, _EVEN),
     SurfaceGoal("flipped_percent", "flipped normals", "%", 0.2, ("even", "random", "thinned 1:10")),
-    SurfaceGoal(
-        "wander_depth", "static: depth, standard deviation", "spacings", 0.04, ("static, noise 0.1",)
-    ),
-    SurfaceGoal("wander_normal", "static: normals wander", "°", 1.2, ("static, noise 0.1",)),
-    SurfaceGoal("wander_shading", "static: change of shading", "levels", 1.5, ("static, noise 0.1",)),
+    SurfaceGoal("wander_depth", "static: depth, standard deviation", "spacings", 0.04, _STATIC),
+    SurfaceGoal("wander_normal", "static: normals wander", "°", 1.2, _STATIC),
+    SurfaceGoal("wander_shading", "static: change of shading", "levels", 1.5, _STATIC),
 )
 
 

@@ -24,11 +24,12 @@ from ..drawing.request import Request
 from ..look import Look
 from ..mesh.reference import Reference, first_hits, trace
 from ..picture.surface import Surface
+from ..scan.averaging import Averaging, averaged
 from ..scan.estimate import cloud_normals
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from . import metrics
-from .goals import ESTIMATED
+from .goals import ESTIMATED, STATIC, STATIC_AVERAGE
 from .metrics import Errors
 from .scenes import samples
 from .scenes.defects import Change, density_ramp, fewer, noisy, without_normals
@@ -67,8 +68,9 @@ QUICK = Amount(points=10_000, views=1, picks=30, size=(360, 240))
 class ScanCondition:
     """A kind of scan. sampling: the points of a moment's surface. changes: what then happens to the points.
     scene: the scene that the condition belongs to; empty: each of the models. noise: standard deviation in
-    spacings, along the normals. frames: how many scans with different noise. front: whether pictures show the
-    front alone."""
+    spacings, along the normals. frames: how many pictures of scans with different noise. average: scans that
+    the points of each picture are means of, other ones for each picture; 0: none. front: whether pictures
+    show the front alone."""
 
     name: str
     sampling: Sampling
@@ -76,6 +78,7 @@ class ScanCondition:
     scene: str = ""
     noise: float = 0.0
     frames: int = 1
+    average: int = 0
     front: bool = False
 
     def scan(self, moment: Moment, count: int, seed: Sequence[int]) -> tuple[PointCloud, PointCloud]:
@@ -125,7 +128,8 @@ CONDITIONS = (
     ScanCondition("thinned 1:10, with normals", _blue, (fewer(0.1),)),
     *(ScanCondition(f"noise {noise}", _blue, _BARE, noise=noise) for noise in NOISES),
     ScanCondition("noise 0.3, with normals", _blue, noise=0.3),
-    ScanCondition("static, noise 0.1", _blue, _BARE, noise=0.1, frames=_FRAMES),
+    ScanCondition(STATIC, _blue, _BARE, noise=0.1, frames=_FRAMES),
+    ScanCondition(STATIC_AVERAGE, _blue, _BARE, noise=0.1, frames=_FRAMES, average=8),
     ScanCondition("stretched grid", _grid, _BARE, scene="torus"),
     ScanCondition("stretched grid, with normals", _grid, scene="torus"),
     ScanCondition("two sheets", _own, _BARE, scene="sheets"),
@@ -157,9 +161,8 @@ def measure_condition(
     """The errors of each backend, means over the views, and of `ESTIMATED` where the scan is bare. names: of
     backends, drawn with their default parameters. Raises InputError for a scene without such views."""
     moment = subject.moment(0)
-    scans = [condition.scan(moment, amount.points, (seed, frame)) for frame in range(condition.frames)]
-    poses = [Pose(0, 0.0, condition.name, cloud) for cloud, _ in scans]
-    true = scans[0][1]
+    poses = [_pose(condition, moment, amount.points, seed, frame) for frame in range(condition.frames)]
+    true = condition.scan(moment, amount.points, (seed, 0))[1]
     cameras = _cameras(moment, subject.up, condition, amount, seed)
     truths = [PictureTruth.of(moment, camera, amount.size, poses[0].cloud) for camera in cameras]
     if poses[0].cloud.normals is None:
@@ -170,6 +173,16 @@ def measure_condition(
             for error, value in _errors(renderer, name, poses, truth, amount, (seed, number)).items():
                 by_view.setdefault(error, []).append(value)
         yield name, {error: metrics.defined_mean(values) for error, values in by_view.items()}
+
+
+def _pose(condition: ScanCondition, moment: Moment, count: int, seed: int, frame: int) -> Pose:
+    """The pose of a picture: a scan of the moment, or the average of scans that no other picture has."""
+    scans = max(condition.average, 1)
+    frames = range(frame * scans, (frame + 1) * scans)
+    poses = [Pose(n, 0.0, condition.name, condition.scan(moment, count, (seed, n))[0]) for n in frames]
+    if not condition.average:
+        return poses[0]
+    return averaged(poses[-1], reversed(poses[:-1]), Averaging(condition.average))
 
 
 def _cameras(moment: Moment, up: str, condition: ScanCondition, amount: Amount, seed: int) -> list[Camera]:
