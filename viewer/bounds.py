@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 _ASTRAY = 8.0  # times as far out as usual: frames that reach farther are mistakes
+_IS_HIGH = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)  # of each corner
 
 
 @dataclass(frozen=True)
@@ -36,20 +38,19 @@ class Bounds:
         is_near = off + sizes <= _ASTRAY * (np.median(off) + np.median(sizes))
         return cls.around([shown, *(one for one, near in zip(known, is_near, strict=True) if near)])
 
-    @property
+    @cached_property
     def center(self) -> NDArray[np.float64]:
         """(3,) float64."""
         return (self.low + self.high) / 2
 
-    @property
+    @cached_property
     def radius(self) -> float:
         """Half of the diagonal."""
         return float(np.linalg.norm(self.high - self.low) / 2)
 
     def corners(self) -> NDArray[np.float64]:
         """(8, 3) float64."""
-        pick = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)], bool)
-        return np.where(pick, self.high, self.low)
+        return np.where(_IS_HIGH, self.high, self.low)
 
     def grown(self, margin: float) -> Bounds:
         """Larger by a margin on every side."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -93,12 +94,12 @@ class View:
             base=base,
         )
 
-    @property
+    @cached_property
     def center(self) -> NDArray[np.float64]:
         """Pixel coordinates, (2,), of the line of sight."""
         return np.array(self.size) / 2 + self.shift
 
-    @property
+    @cached_property
     def key(self) -> tuple[object, ...]:
         """Equal for views that show the same."""
         shape = (self.size, self.shift, self.base, self.perspective)

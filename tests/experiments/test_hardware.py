@@ -10,6 +10,7 @@ import sys
 import numpy as np
 import pytest
 from experiments.speed.hardware import CASES, TABLES, Drawn, counted_reads, shape, view
+from experiments.speed.idle_driver import Driver
 from experiments.speed.sketches import Sketch
 from experiments.suite import ROOT
 
@@ -51,9 +52,26 @@ def test_frames_are_measured_without_libraries_of_the_window() -> None:
 def test_the_work_of_the_cpu_is_measured_beside_that_of_the_driver() -> None:
     few = "--sizes", "2000", "--pictures", "3", "--table", "cpu", "--rows", "points"
     (row,) = rows_without("hardware", *few)
-    assert 0 < row["least, ms"] <= row["outside the driver, ms"]
-    assert row["calls of the driver"] > 10
+    assert row["new view, CPU, ms"] > 0
+    assert row["same view, CPU, ms"] > 0
+    assert row["new view, calls"] > 10
     assert row["new programs"] > 0
+
+
+def test_a_driver_that_does_nothing_leaves_the_picture() -> None:
+    drawn = Drawn(CASES["points"], Pose(0, 0.0, "", shape(2000)), (64, 48))
+    driver = Driver(drawn.surface.gpu.staging)
+    with driver.watched():
+        drawn.submit(0)
+    first, calls = drawn.surface.image(), driver.calls.copy()
+    assert calls["run"] + calls["run_indirect"] >= 3
+    assert calls["write"] > 0
+    with driver.idle():
+        drawn.submit(5)
+    np.testing.assert_array_equal(drawn.surface.image(), first)
+    assert driver.calls == calls
+    drawn.submit(5)
+    assert (drawn.surface.image() != first).any()
 
 
 @pytest.mark.slow

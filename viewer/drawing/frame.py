@@ -75,7 +75,9 @@ def draw_plan(
     ready = planned if isinstance(planned, Ready) else planned.stand_in
     pose, request = ready.pose, ready.request
     backend, params = request.backend, request.params
-    view = replace(_view_of(ready, surface.size), shift=shift)
+    view = _view_of(ready, surface.size)
+    if shift != view.shift:
+        view = replace(view, shift=shift)
     pose.center(view.origin)
     asked = getattr(params, "share", None) or 1.0
     goes_on = _before(ready, before) if moving and asked == 1 else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import struct
 from dataclasses import dataclass, fields
 from functools import cache
 from itertools import chain
@@ -15,6 +16,7 @@ from .bindings import UniformBlock
 Vec4 = tuple[float, float, float, float]
 Mat4 = tuple[Vec4, Vec4, Vec4, Vec4]  # columns
 _INT, _UINT, _FLOAT = ctypes.c_int32, ctypes.c_uint32, ctypes.c_float
+_LETTERS = {_INT: "i", _UINT: "I", _FLOAT: "f"}  # of `struct`
 # Annotation of a field -> its GLSL type, what a word of it is, how many, what its offset is a multiple of.
 _KINDS: dict[Any, tuple[str, Any, int, int]] = {
     bool: ("bool", _UINT, 1, 1),
@@ -48,11 +50,12 @@ class Member:
 
 @dataclass(frozen=True)
 class Block:
-    """A dataclass as a std140 block (OpenGL 4.3, 7.6.2.2). words: what it is in memory."""
+    """A dataclass as a std140 block (OpenGL 4.3, 7.6.2.2). words, layout: what it is in memory."""
 
     declaration: type[Values]
     members: tuple[Member, ...]
     words: type[ctypes.Structure]
+    layout: struct.Struct
 
     @property
     def name(self) -> str:
@@ -69,7 +72,8 @@ class Block:
         """The values as the GPU reads them; floats beyond its range are infinite there."""
         numbers: list[float] = []
         for member in self.members:
-            numbers += (0,) * member.gap
+            if member.gap:
+                numbers += (0,) * member.gap
             value = getattr(values, member.name)
             if member.kind == "mat4":
                 numbers += chain.from_iterable(value)
@@ -77,7 +81,10 @@ class Block:
                 numbers += value
             else:
                 numbers.append(value)
-        return bytes(self.words(*numbers))
+        try:
+            return self.layout.pack(*numbers)
+        except OverflowError:  # a float beyond float32, which ctypes makes infinite, in ten times the time
+            return bytes(self.words(*numbers))
 
 
 @cache
@@ -102,9 +109,11 @@ def block_of(declaration: type[Values]) -> Block:
         words += [_UINT] * gap + [word] * count
     if not members:
         raise TypeError(f"{declaration.__qualname__} has no number")
-    words += [_UINT] * (-len(words) % 4)
+    letters = "".join(_LETTERS[word] for word in words)
+    words += [_UINT] * (free := -len(words) % 4)
     named = [(f"word_{number}", word) for number, word in enumerate(words)]
-    return Block(declaration, tuple(members), type("Words", (ctypes.Structure,), {"_fields_": named}))
+    kind = type("Words", (ctypes.Structure,), {"_fields_": named})
+    return Block(declaration, tuple(members), kind, struct.Struct(f"={letters}{4 * free}x"))
 
 
 class BlockBuffer:
@@ -113,10 +122,14 @@ class BlockBuffer:
     def __init__(self, ctx: moderngl.Context, declaration: type[Values], binding: UniformBlock) -> None:
         self._block, self._binding = block_of(declaration), binding
         self._held = b""
+        self._values: Values | None = None
         self._buffer = ctx.buffer(reserve=ctypes.sizeof(self._block.words))
 
     def write(self, values: Values) -> None:
         """Make these the values; nothing is sent where they have not changed."""
+        if values is self._values:
+            return
+        self._values = values
         packed = self._block.pack(values)
         if packed != self._held:
             self._buffer.write(packed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import sys
 from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
@@ -63,12 +64,41 @@ class Attempts:
         return "; ".join(f"{how}: {outcome}" for how, outcome in self.log)
 
 
+class _Uniforms:
+    """The uniforms of a program by name. Only values that change go to the driver."""
+
+    def __init__(self, program: Program, sources: list[Source]) -> None:
+        members = {name: program[name] for name in program}
+        self._members = {name: each for name, each in members.items() if isinstance(each, moderngl.Uniform)}
+        self._packers = {name: struct.Struct(each.fmt).pack for name, each in self._members.items()}
+        self._held = dict.fromkeys(self._members, b"")
+        self._sources = sources
+
+    def set(self, name: str, value: Uniform) -> None:
+        """Set one of them; see `Gpu.set`."""
+        pack = self._packers.get(name)
+        if pack is None:
+            self._check(name)
+            return
+        packed = pack(*value) if isinstance(value, tuple) else pack(value)
+        if packed != self._held[name]:
+            self._members[name].write(packed)
+            self._held[name] = packed
+
+    def _check(self, name: str) -> None:
+        """Raise ShaderError for a name that no source declares. The compiler drops those without a use."""
+        if not any(name in source.uniforms for source in self._sources):
+            names = ", ".join(source.name for source in self._sources)
+            raise ShaderError(f"no uniform is called '{name}'", f"shaders/{names}")
+
+
 @dataclass(frozen=True)
 class Built:
     """Texts and values that a program is run with, its `extra`. values: of its `<params>`; None without."""
 
     sources: list[Source]
     values: BlockBuffer | None
+    uniforms: _Uniforms
 
 
 class Gpu:
@@ -173,7 +203,7 @@ class Gpu:
         except moderngl.Error as error:
             raise shader_error(sources, error) from error
         values = None if declared is None else BlockBuffer(self.ctx, declared, UniformBlock.PARAMS)
-        program.extra = Built(sources, values)
+        program.extra = Built(sources, values, _Uniforms(program, sources))
         return program
 
     @property
@@ -263,19 +293,16 @@ class Gpu:
         Those that the compiler found unused are passed over. Raises ShaderError for a name that the program's
         source does not declare.
         """
+        uniforms = program.extra.uniforms
         for name, value in values.items():
-            if name in program:
-                program[name] = value
-            elif not any(name in source.uniforms for source in program.extra.sources):
-                names = ", ".join(source.name for source in program.extra.sources)
-                raise ShaderError(f"no uniform is called '{name}'", f"shaders/{names}")
+            uniforms.set(name, value)
 
     def dispatch(self, program: moderngl.ComputeShader, count: int) -> None:
         """Run one invocation for each of `count` items: `item()` in shaders, which is less than `item_count`
         but for the last group's."""
         groups = -(-count // GROUP)
         if groups:
-            self.set(program, item_count=count)
+            program.extra.uniforms.set("item_count", count)
             rows = -(-groups // GROUP_LIMIT)
             _bind_values(program)
             program.run(-(-groups // rows), rows)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 
 import moderngl
 
 from . import gl
 
+_UNTIMED = nullcontext()
 Stamp = Callable[[], float]  # gives a time in ms, and waits for it
 
 
@@ -61,12 +62,12 @@ class Timers:
         finally:
             self.enabled = enabled
 
-    @contextmanager
-    def measure(self, name: str, *, only_alone: bool = False) -> Iterator[None]:
+    def measure(self, name: str, *, only_alone: bool = False) -> AbstractContextManager[None]:
         """Time what runs inside. only_alone: within another pass it counts for that one."""
-        if not self.enabled or (only_alone and self._running):
-            yield
-            return
+        return _UNTIMED if not self.enabled or (only_alone and self._running) else self._measure(name)
+
+    @contextmanager
+    def _measure(self, name: str) -> Iterator[None]:
         start = self._stamp()
         if self._running:
             self._running[-1].parts.append((self._running[-1].begun, start))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import TypeVar
 
 import moderngl
@@ -173,6 +174,7 @@ class PictureBuffers:
         return gl.BufferTexture(buffer, texel_format)
 
 
+@cache
 def picture_word(color: str) -> int:
     """A colour of a look as a pixel of a picture."""
     return int.from_bytes(bytes(rgba(color)), "little")

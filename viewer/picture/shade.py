@@ -24,6 +24,7 @@ from ..look import (
     rgba,
     value_source,
 )
+from ..rigid import Rigid
 from ..scan.ranges import robust_range
 from .surface import Surface
 
@@ -216,11 +217,19 @@ def _shading(surface: Surface, look: Look, by_log: bool) -> _Shading:
     low, high = surface.color_range or (0.0, 1.0)
     zero = surface.value_zero
     ends = (math.log2(low), math.log2(high)) if by_log else (_finite(low - zero), _finite(high - zero))
+    return _shading_of(look, ends, surface.height_axis, surface.layers.world_from_pose)
+
+
+@lru_cache(64)
+def _shading_of(
+    look: Look, ends: tuple[float, float], height_axis: tuple[float, float, float], motion: Rigid
+) -> _Shading:
+    """Values of a look, which most pictures share. ends: `value_range`."""
     return _Shading(
         plain=_fractions(look.plain),
         background=_fractions(look.background),
-        height_axis=(*surface.height_axis, 0.0),
-        to_world=_columns(surface.layers.world_from_pose.rotation),
+        height_axis=(*height_axis, 0.0),
+        to_world=_columns(motion.rotation),
         light=(*light_direction(look), 0.0),
         phong=(look.ambient, look.diffuse, look.specular, look.shininess),
         value_range=ends,

@@ -128,14 +128,14 @@ class ChunkBoxes:
         if self.rows is not None:
             self.rows.bind(Texture.CHUNK_ROWS)
 
-    def points_of(self, chunks: NDArray[np.intp]) -> int:
-        """How many points some chunks have, (C,) ascending."""
-        has_last = bool(len(chunks)) and chunks[-1] == self.chunks - 1
-        return len(chunks) * self.size - has_last * (self.chunks * self.size - self.count)
+    def points_of(self, are_meant: NDArray[np.bool_]) -> int:
+        """How many points some chunks have, (C,) of all."""
+        lacking = self.chunks * self.size - self.count  # in the last one
+        return int(np.count_nonzero(are_meant)) * self.size - lacking * bool(are_meant[-1:].any())
 
-    def seen(self, surface: RenderTarget) -> NDArray[np.uint32]:
+    def seen(self, surface: RenderTarget) -> NDArray[np.uint8]:
         """Read what the last step told of each, bits, (C,); waits for the GPU."""
-        return self._gpu.read(surface.cached(SeenChunks).of(self), np.uint32)
+        return self._gpu.read(surface.cached(SeenChunks).of(self), np.uint32).astype(np.uint8)
 
     @property
     def nbytes(self) -> int:
@@ -315,7 +315,7 @@ class _Reordered:
         return self._done == self._count
 
 
-def counts_of(seen: NDArray[np.uint32]) -> dict[str, int]:
+def counts_of(seen: NDArray[np.uint8]) -> dict[str, int]:
     """How many chunks were shown, hidden by what is before them, or out of view, and how many face away where
     any does. seen: bits of each, (C,)."""
     shown, in_view, away = (int(np.count_nonzero(seen & bit)) for bit in (NOW, IN_VIEW, FACES_AWAY))

@@ -107,34 +107,34 @@ def draw_unhidden(
             surface.restart()
             is_dear = draw(chunks.take(points, surface, seen, NOW)) and _leaves_out(seen, NOW)
     elif not is_dear:
-        seen = seen | (seen & np.uint32(LAST)) << np.uint32(1)
+        seen = seen | (seen & np.uint8(LAST)) << np.uint8(1)
     if is_dear:
         surface.restart()
         draw(chunks.take(points, surface, seen, IN_VIEW))
-        seen = seen | _may_show(seen) * np.uint32(NOW)
+        seen = seen | _may_show(seen) * np.uint8(NOW)
     before.go_on(is_late, is_dear, seen)
     surface.stats.counted["chunks"] = lambda: counts_of(seen)
     if reason := _reason(boxes, seen):
         surface.stats.skipped["points"] = reason
 
 
-def _may_show(seen: NDArray[np.uint32]) -> NDArray[np.bool_]:
+def _may_show(seen: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """Tell which chunks are in view and do not face away, (C,)."""
     return (seen & (IN_VIEW | FACES_AWAY)) == IN_VIEW
 
 
-def _leaves_out(seen: NDArray[np.uint32], bit: int) -> bool:
+def _leaves_out(seen: NDArray[np.uint8], bit: int) -> bool:
     """Whether chunks without that bit may be hidden, for all that is known of others."""
     return bool((_may_show(seen) & ((seen & bit) == 0)).any())
 
 
-def _reason(boxes: ChunkBoxes, seen: NDArray[np.uint32]) -> str:
+def _reason(boxes: ChunkBoxes, seen: NDArray[np.uint8]) -> str:
     """How many points were left out and why; empty where none were."""
     outside = (seen & IN_VIEW) == 0
     away = (seen & FACES_AWAY) != 0
     hidden = ~outside & ~away & ((seen & NOW) == 0)
     causes = {"out of view": outside, "facing away": away, "hidden": hidden}
-    counts = {cause: boxes.points_of(np.flatnonzero(chunks)) for cause, chunks in causes.items()}
+    counts = {cause: boxes.points_of(chunks) for cause, chunks in causes.items()}
     reason = [f"{cause} {count:,}" for cause, count in counts.items() if count]
     if not reason:
         return ""
@@ -215,15 +215,15 @@ class SplatChunks:
         self._reaches.bind(Texture.REACHES)
         self.boxes.test(surface, step, margins, SPLATS=1)
 
-    def take(self, points: Points, surface: Surface, seen: NDArray[np.uint32], bit: int) -> Points:
+    def take(self, points: Points, surface: Surface, seen: NDArray[np.uint8], bit: int) -> Points:
         """Take the points in chunks with a bit of what is `seen`; all where that is nearly all, unless their
         order is another one."""
         gpu, boxes = self._gpu, self.boxes
-        found = np.flatnonzero(seen & bit)
-        count = boxes.points_of(found)
+        is_taken = (seen & bit) != 0
+        count = boxes.points_of(is_taken)
         if boxes.rows is None and count > _NEARLY_ALL * boxes.count:
             return points
-        self._listed.write(found.astype(np.uint32))
+        self._listed.write(np.flatnonzero(is_taken).astype(np.uint32))
         rows = gpu.cached(_Rows).reserve(count)
         program = gpu.compute("chunks/rows.comp", {"CHUNK": boxes.size, **self._defines(points)})
         with gpu.timers.measure("rows"):
@@ -342,7 +342,7 @@ class _Pictures:
         wanted = self._wider * max(farthest, _LEAST_MOVE) if farthest > 0 else 0.0
         return min(_SPARE + math.ceil(wanted), _MOST_SPARE) if wanted < _MOST_SPARE else _MOST_SPARE
 
-    def go_on(self, is_late: bool, is_dear: bool, seen: NDArray[np.uint32]) -> None:
+    def go_on(self, is_late: bool, is_dear: bool, seen: NDArray[np.uint8]) -> None:
         """Go on after a picture. is_late: whether it was drawn twice; is_dear: whether anew with all, after
         chunks had been left out; seen: bits of chunks, (C,)."""
         if self.pause:

@@ -15,7 +15,8 @@ sketch, GL_POINTS and CUDA draw the same points with nothing beside: a plain com
 context, points of OpenGL, a kernel by CuPy. Rows whose name begins with "new" bring other points with
 each picture, which are on the CPU already. "cold" is the time to the first picture in a process of its
 own, once without and once with what the process before stored. "cpu" is what the CPU does for a picture
-outside the driver, at any number of points, and how many programs the first picture compiles. "frame" is
+outside the driver, at any number of points, and how many programs the first picture compiles: the driver does
+nothing meanwhile, so that its threads disturb nothing. "frame" is
 the time of a frame on the GPU, with what is in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
@@ -48,7 +49,7 @@ import numpy as np
 
 from experiments.pictures import renderer
 from experiments.script import Script
-from experiments.speed.driver_clock import DriverClock, driver_clock
+from experiments.speed.idle_driver import Driver
 from experiments.speed.sketches import CudaScatter, GlPoints, Sketch, elapsed_ms, has_cuda
 from experiments.tables import Column, Row, Table, at, code
 from viewer.backends import backend as find_backend
@@ -183,7 +184,11 @@ class Drawn:
 
     def submit(self, step: int) -> None:
         """Draw a view, without waiting."""
-        while render_frame(renderer(), self.request(step), self.surface, moving=self.case.moving):
+        self.draw(self.request(step))
+
+    def draw(self, request: Request) -> None:
+        """Draw a picture, without waiting."""
+        while render_frame(renderer(), request, self.surface, moving=self.case.moving):
             pass
 
     def read(self) -> object:
@@ -270,8 +275,9 @@ def orbit(options: Namespace) -> Iterator[Row]:
 
 
 def cpu(options: Namespace) -> Iterator[Row]:
-    """The CPU's own work for a picture, without what the driver takes, and the programs of the first one."""
+    """The CPU's own work for a picture, with a driver that does nothing; the programs of the first one."""
     limit, gpu = Limit(options), renderer().gpu
+    _threads_at_rest()
     _choose(options)
     for points in _sizes(options):
         for name, case in CASES.items():
@@ -284,25 +290,36 @@ def cpu(options: Namespace) -> Iterator[Row]:
             drawn.submit(0)
             programs = gpu.programs - before
             _settle(drawn, limit)
-            with driver_clock() as clock:
-                found = [_outside(drawn, clock, step) for step in range(options.pictures)]
+            new = _own_work(drawn, [drawn.request(step) for step in range(_STEPS)], options.pictures)
+            same = _own_work(drawn, [drawn.request(0)] * _STEPS, options.pictures)
             drawn.release()
             yield {
                 "row": name,
                 "points": points,
-                "outside the driver, ms": 1e3 * float(np.median([seconds for seconds, _ in found])),
-                "least, ms": 1e3 * min(seconds for seconds, _ in found),
-                "calls of the driver": float(np.median([calls for _, calls in found])),
+                **{f"new view, {what}": value for what, value in new.items()},
+                **{f"same view, {what}": value for what, value in same.items()},
                 "new programs": programs,
             }
         shape.cache_clear()
 
 
-def _outside(drawn: Drawn, clock: DriverClock, step: int) -> tuple[float, int]:
-    """Seconds of a picture outside the driver, and the calls of the driver."""
-    seconds, calls, start = clock.seconds, clock.calls, time.perf_counter()
-    drawn.submit(step)
-    return time.perf_counter() - start - (clock.seconds - seconds), clock.calls - calls
+def _own_work(drawn: Drawn, requests: list[Request], rounds: int) -> dict[str, float]:
+    """Milliseconds of the processor that a picture takes with a driver that does nothing, the least of some
+    rounds; and how often it calls the driver. Medians of these pictures, each after the one before."""
+    driver = Driver(renderer().gpu.staging)
+    calls, least = [], np.full(len(requests), np.inf)
+    with driver.watched():
+        for request in requests:
+            before = driver.calls.total()
+            drawn.draw(request)
+            calls.append(driver.calls.total() - before)
+    with driver.idle():
+        for _ in range(rounds):
+            for number, request in enumerate(requests):
+                start = time.thread_time()
+                drawn.draw(request)
+                least[number] = min(least[number], time.thread_time() - start)
+    return {"CPU, ms": 1e3 * float(np.median(least)), "calls": float(np.median(calls))}
 
 
 def new_pose(options: Namespace) -> Iterator[Row]:
