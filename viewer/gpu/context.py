@@ -68,8 +68,10 @@ class _Uniforms:
     """The uniforms of a program by name. Only values that change go to the driver."""
 
     def __init__(self, program: Program, sources: list[Source]) -> None:
-        members = {name: program[name] for name in program}
-        self._members = {name: each for name, each in members.items() if isinstance(each, moderngl.Uniform)}
+        members = ((name, program[name]) for name in program)
+        self._members: dict[str, Any] = {
+            name: each for name, each in members if isinstance(each, moderngl.Uniform)
+        }
         self._packers = {name: struct.Struct(each.fmt).pack for name, each in self._members.items()}
         self._held = dict.fromkeys(self._members, b"")
         self._sources = sources

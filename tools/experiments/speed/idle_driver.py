@@ -83,7 +83,8 @@ class Driver:
         with _changed(later, self._staging, known):
             yield
         for (target, offset), data in written.items():
-            target.write(data, *([offset] if offset else []))
+            if hasattr(target.mglo, "write"):  # not where it was deleted since
+                target.write(data, *([offset] if offset else []))
 
 
 def _nothing(*args: Any, **kwargs: Any) -> None:
