@@ -210,6 +210,7 @@ def shown(app: App) -> dict[str, Any]:
         "range_note": app.ranging.words(),
         "thumbnails": len(app.thumbnails),
         "scan_rate": app.pacing.rate,
+        "average": app.averaging.words,
         "is_step_open": app.session.history._merging is not None,
         "knows_files": app.changes._known is not None,
         "undoes": app.session.history.undoes,

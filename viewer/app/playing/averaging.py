@@ -63,4 +63,4 @@ class FrameAveraging(WindowPart):
             return "Frames have no points in common: no average"
         if average.usual == 1:
             return "No point stands still: no average"
-        return f"{average.share:.0%} of the points stand still: mean of {average.usual} frames"
+        return f"{100 * average.share:.0f} % of the points stand still: mean of {average.usual} frames"
