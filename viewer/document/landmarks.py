@@ -55,6 +55,10 @@ class Landmarks(Part, name="landmarks"):
         """The landmarks of a measure, in its order."""
         return [one for name in measure.landmarks if (one := self.named(name))]
 
+    def is_averaged(self, measure: Measure) -> bool:
+        """Whether the user placed a landmark of a measure on averaged points."""
+        return any(key.averaged for landmark in self.owned_by(measure) for key in landmark.keys)
+
     def with_distance(
         self, first: Iterable[SurfacePoint], second: Iterable[SurfacePoint], name: str = ""
     ) -> Landmarks:

@@ -15,10 +15,11 @@ from viewer.app.followed import Followed
 from viewer.app.scene.canvas import ScreenView
 from viewer.app.session import Session
 from viewer.app.tool_context import ToolContext
-from viewer.app.tools.measuring import Tool
+from viewer.app.tools.measuring import DistanceRow, Tool
 from viewer.app.tools.measuring.panel import snap_words
 from viewer.camera import Camera
 from viewer.document.landmarks import Landmarks
+from viewer.scan.units import Scale
 
 PLACE = ScreenView(Camera(eye=(0, 0, 4)), ImVec2(100, 50), ImVec2(300, 200))
 
@@ -38,6 +39,16 @@ def end(id: int | None) -> SurfacePoint:
 )
 def test_it_says_where_the_ends_are(ids: tuple[int | None, int | None], words: str) -> None:
     assert snap_words((end(ids[0]), end(ids[1]))) == words
+
+
+def test_a_distance_on_averaged_points_says_so() -> None:
+    first, second = replace(end(3), averaged=8), replace(end(4), position=(1, 0, 0))
+    for ends, is_averaged in (((first, second), True), ((end(3), second), False)):
+        made = Landmarks().with_distance([ends[0]], [ends[1]])
+        (measure,) = made.distances
+        assert made.is_averaged(measure) == is_averaged
+        words = DistanceRow(measure, 1.0, 0.1, "placed", ends).words(Scale("mm", 1.0))
+        assert words.endswith("mm (95 %), averaged") == is_averaged
 
 
 def test_two_ends_make_a_distance_of_the_document() -> None:

@@ -51,13 +51,8 @@ class DistanceRow(NamedTuple):
         """The label and the distance, or why it is not known."""
         words = measured_in_words(scale.factor * self.value, scale.factor * self.sigma, scale.unit)
         shown = self.state if math.isnan(self.value) else words
-        return f"{self.measure.label}: {shown}{averaged_words(self.ends)}"
-
-
-def averaged_words(ends: Iterable[SurfacePoint]) -> str:
-    """Words that say that positions were measured on averaged points; empty where none was."""
-    frames = max((end.averaged for end in ends), default=0)
-    return f" (on averages of {frames} frames)" if frames else ""
+        averaged = ", averaged" if any(end.averaged for end in self.ends) else ""
+        return f"{self.measure.label}: {shown}{averaged}"
 
 
 class Tool:

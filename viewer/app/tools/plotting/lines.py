@@ -112,7 +112,7 @@ class MeasureLines:
             )  # fmt: skip
             if measure.name in to_label:
                 to_label.discard(measure.name)
-                path = replace(path, name=measure.label, value=self._value_in_words(measure, frame))
+                path = replace(path, name=measure.label, value=self._value_in_words(made, measure, frame))
             drawn.append(path)
         return tuple(drawn)
 
@@ -140,12 +140,13 @@ class MeasureLines:
             if measure.name in to_label and np.isfinite(pixels).all():
                 to_label.discard(measure.name)
                 if view.shows(pixels):
-                    text = f"{measure.label}: {self._value_in_words(measure, pose.index)}"
+                    text = f"{measure.label}: {self._value_in_words(made, measure, pose.index)}"
                     labels.append(Label([text], pixels, line.color, faint=opacities.max() < 1))
         canvas.labels(labels)
 
-    def _value_in_words(self, measure: Measure, frame: int) -> str:
-        return value_in_words(self._context.followed.series[measure.name], frame, self._context.scale)
+    def _value_in_words(self, made: Landmarks, measure: Measure, frame: int) -> str:
+        words = value_in_words(self._context.followed.series[measure.name], frame, self._context.scale)
+        return f"{words}, averaged" if made.is_averaged(measure) else words
 
 
 def names_to_label(lines: Iterable[ShownLine], pointed: str | None = None) -> set[str]:
