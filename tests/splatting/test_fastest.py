@@ -9,15 +9,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scenes import sphere
 
-from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import Scan4DError
-from viewer.gpu.context import headless
+from viewer.gpu.context import Gpu, headless
 from viewer.picture.surface import Surface
 from viewer.scan.pose import Pose
 from viewer.splatting import fastest as module
@@ -82,7 +82,7 @@ def test_a_folder_that_cannot_be_written_is_passed_over(renderer: Renderer, tmp_
 
 
 @pytest.mark.parametrize("name", ["surfels", "voxels"])
-def test_splats_on_hardware_go_the_way_that_was_measured(
+def test_splats_on_hardware_use_the_variant_that_a_process_measured_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     monkeypatch.setattr(module, "cache_folder", lambda: tmp_path)
@@ -90,22 +90,32 @@ def test_splats_on_hardware_go_the_way_that_was_measured(
     monkeypatch.setattr(module, "_TRIAL_SIZE", (160, 120))
     cloud = sphere(2000)
     request = Request(Pose(0, 0.0, "test", cloud), Camera.orbit(cloud.bounds()), name)
-    pictures, chosen = [], set()
-    for _ in range(2):
+    file = tmp_path / "fastest.json"
+
+    def draw(pictures: int) -> tuple[Gpu, list[str], list[NDArray]]:
+        """Some pictures on a new context: it, what they chose, and their rows."""
         gpu = headless()
         gpu.software = False
-        renderer = Renderer(gpu)
-        surface = Surface(gpu, (80, 60))
-        gpu.timers.enabled = True
-        render_frame(renderer, request, surface)
-        assert {name for name, _ in surface.stats.passes}
-        passes = [name for name, _ in surface.stats.passes if name != "clear"]
-        assert len(passes) < 30, "passes of the trial are not the picture's"
-        chosen.add(surface.stats.chosen["instancing"])
-        pictures.append(surface.row)
-        renderer.release()
-    assert len(chosen) == 1
-    assert chosen <= {"tiles", *FEEDS}
-    np.testing.assert_array_equal(*pictures)
-    params = backend(name).params({"instancing": chosen.pop()})
-    assert params.instancing in next(iter(json.loads((tmp_path / "fastest.json").read_text()).values()))
+        renderer, surface, chosen, rows = Renderer(gpu), Surface(gpu, (80, 60)), list[str](), list[NDArray]()
+        for _ in range(pictures):
+            render_frame(renderer, request, surface)
+            chosen.append(surface.stats.chosen["instancing"])
+            rows.append(surface.row)
+        return gpu, chosen, rows
+
+    gpu, chosen, rows = draw(1)
+    assert chosen == ["tiles"]
+    assert not gpu.cached(module._Choices).trials, "the first picture begins none"
+    gpu, chosen, (first, second, third) = draw(3)
+    (trial,) = gpu.cached(module._Choices).trials.values()
+    trial.result()
+    (found,) = json.loads(file.read_text()).values()
+    assert found in {"tiles", *FEEDS}
+    assert chosen == ["tiles"] * 3, "what it finds changes no picture of this process"
+    np.testing.assert_array_equal(first, rows[0])
+    np.testing.assert_array_equal(second, first)
+    np.testing.assert_array_equal(third, first)
+    file.write_text(file.read_text().replace(f'"{found}"', '"pull"'))
+    gpu, chosen, _ = draw(2)
+    assert chosen == ["pull"] * 2
+    assert not gpu.cached(module._Choices).trials, "it was measured"

@@ -360,16 +360,16 @@ def _draw_two(points: Points, surface: Surface, params: Params, instancing: str,
 
 def _instancing(params: Params, surface: Surface) -> str:
     """How points become splats; in one pass and in two this need not be the same."""
-    like = Params(passes="two" if params.passes in _TWO else "one")
+    like = "two" if params.passes in _TWO else "one"
+    variants = partial(_variants, like)
+    return instancing_for(surface, params.instancing, "tiles", f"surfels, passes {like}", _VARIANTS, variants)
 
-    def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
-        points = Points.of(pose, surface, 1.0, use_radii=True)
-        splats = _splats(like, 0.0)
-        return {name: partial(_splat, points, surface, like, name, splats) for name in _VARIANTS}
 
-    return instancing_for(
-        surface, params.instancing, "tiles", f"surfels, passes {like.passes}", _VARIANTS, variants
-    )
+def _variants(passes: str, pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    """Pictures of a pose by each variant."""
+    params, points = Params(passes=passes), Points.of(pose, surface, 1.0, use_radii=True)
+    splats = _splats(params, 0.0)
+    return {name: partial(_splat, points, surface, params, name, splats) for name in _VARIANTS}
 
 
 def _has_radii(cloud: PointCloud, of: Callable[[NDArray], bool] = np.any) -> bool:

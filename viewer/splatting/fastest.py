@@ -1,7 +1,8 @@
 """Which of several variants is the fastest on this device: measured once, then remembered for this user.
 
-As long as the file that remembers it stays, a frame has the same bits each time. Variants may round
-differently (docs/developing/decisions/007-instancing.md).
+A process of its own measures, so that no picture waits for it. What it finds counts from the next start on:
+variants may round differently, and a frame has the same bits each time
+(docs/developing/decisions/007-instancing.md).
 """
 
 from __future__ import annotations
@@ -9,7 +10,9 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,11 +21,13 @@ from ..camera import Camera
 from ..errors import InputError, Scan4DError
 from ..files import whole_file
 from ..folders import cache_folder
-from ..gpu.context import Gpu
+from ..gpu.context import Gpu, headless
 from ..gpu.pose import GpuPose
+from ..helper import Helper
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
+from ..task import Task, in_background
 from ..view import View
 
 _TURNS = 3
@@ -42,57 +47,119 @@ def fastest(
     remembered. One that the driver does not compile is left out. file: what is remembered; None: in
     the user's cache folder. A damaged file counts as none, and one that cannot be written is passed over.
     """
-    file = file or cache_folder() / "fastest.json"
-    remembered = _read(file)
-    key = f"{gpu.device}, {gpu.driver}: {task} by {', '.join(names)}"
-    if remembered.get(key) not in names:
+    file = file or _file()
+    found = _remembered(gpu, task, names, file)
+    if found is None:
         with gpu.timers.paused():
             times = _times(gpu, variants())
-        remembered[key] = min(times, key=lambda name: times[name], default=names[0])
+        found = min(times, key=lambda name: times[name], default=names[0])
+        remembered = {**_read(file), _key(gpu, task, names): found}
         with suppress(InputError), whole_file(file) as temporary:
             temporary.write_text(json.dumps(remembered, indent=1), encoding="utf-8")
-    return remembered[key]
+    return found
+
+
+def _key(gpu: Gpu, task: str, names: Sequence[str]) -> str:
+    return f"{gpu.device}, {gpu.driver}: {task} by {', '.join(names)}"
+
+
+def _remembered(gpu: Gpu, task: str, names: Sequence[str], file: Path) -> str | None:
+    """The name that was found earlier; None where there is none."""
+    found = _read(file).get(_key(gpu, task, names))
+    return found if found in names else None
+
+
+Variants = Callable[[GpuPose, Surface], Mapping[str, Callable[[], object]]]
 
 
 def instancing_for(
-    surface: Surface,
-    setting: str,
-    on_software: str,
-    task: str,
-    names: Sequence[str],
-    variants: Callable[[GpuPose, Surface], Mapping[str, Callable[[], object]]],
+    surface: Surface, setting: str, presumed: str, task: str, names: Sequence[str], variants: Variants
 ) -> str:
-    """Resolve a parameter `instancing`. Where it is "auto", and told in the statistics: `on_software` on
-    software drivers, on others what is the `fastest` of the variants, which are made for a trial."""
+    """Resolve a parameter `instancing`. Where it is "auto", and told in the statistics: what was found to be
+    the `fastest` of the variants on a graphics card; `presumed` on software drivers, and as long as nothing
+    was found. variants: makes them for a trial; a function of a module, or a `partial` of one."""
     if setting != "auto":
         return setting
-    gpu, chosen = surface.gpu, on_software
+    gpu, chosen = surface.gpu, presumed
     if not gpu.software:
-        known = gpu.cached(_choices)
-        if task not in known:
-            known[task] = fastest(gpu, task, names, lambda: variants(*_trial(gpu)))
-        chosen = known[task]
-        surface.bind_view()  # in place of the trial's
+        chosen = gpu.cached(_Choices).choose(presumed, _Trial(task, tuple(names), variants))
     surface.stats.chosen["instancing"] = chosen
     return chosen
 
 
-def _choices(_: Gpu) -> dict[str, str]:
-    """The fastest way of each task on a device, as far as it was asked for."""
-    return {}
+@dataclass(frozen=True)
+class _Trial:
+    """Variants of a task that another process measures; see `fastest`."""
+
+    task: str
+    names: tuple[str, ...]
+    variants: Variants
 
 
-def _trial(gpu: Gpu) -> tuple[GpuPose, Surface]:
+class _Choices:
+    """The variant of each task on a device, as far as one was asked for. What it says never changes.
+
+    trials: the results of those that run or ran in another process.
+    """
+
+    def __init__(self, gpu: Gpu) -> None:
+        self._gpu = gpu
+        self._chosen: dict[str, str] = {}
+        self._waiting: set[str] = set()
+        self._helper = Helper()
+        self.trials: dict[str, Future[None]] = {}
+
+    def choose(self, presumed: str, trial: _Trial) -> str:
+        """The variant of a task. The second picture that asks begins the trial of what nobody measured."""
+        task = trial.task
+        if task not in self._chosen:
+            found = _remembered(self._gpu, task, trial.names, _file())
+            self._chosen[task] = found or presumed
+            if not found:
+                self._waiting.add(task)
+        elif task in self._waiting:
+            self._waiting.remove(task)
+            self._begin(trial)
+        return self._chosen[task]
+
+    def _begin(self, trial: _Trial) -> None:
+        job = Task("Measuring how splats are drawn fastest")
+        given = (_file(), trial.task, trial.names, trial.variants, _TRIAL_POINTS, _TRIAL_SIZE)
+
+        def run() -> None:
+            try:
+                self._helper.call(job, measure, *given)
+            finally:
+                self._helper.close()  # it holds memory of the card
+
+        self.trials[trial.task] = in_background(job, run)
+
+
+def measure(
+    file: Path, task: str, names: Sequence[str], variants: Variants, points: int, size: tuple[int, int]
+) -> None:
+    """Find the `fastest` way of a task on a context of its own, by a picture of so many points and pixels,
+    for `file` to remember."""
+    gpu = headless()
+    fastest(gpu, task, names, lambda: variants(*_trial(gpu, points, size)), file)
+    gpu.ctx.release()
+
+
+def _file() -> Path:
+    return cache_folder() / "fastest.json"
+
+
+def _trial(gpu: Gpu, count: int, size: tuple[int, int]) -> tuple[GpuPose, Surface]:
     """Splats to try variants on: a sphere of points in random order, and a picture of it begun."""
-    i = np.arange(_TRIAL_POINTS) + 0.5
-    polar, turn = np.arccos(1 - 2 * i / _TRIAL_POINTS), np.pi * (1 + 5**0.5) * i
+    i = np.arange(count) + 0.5
+    polar, turn = np.arccos(1 - 2 * i / count), np.pi * (1 + 5**0.5) * i
     points = np.stack([np.cos(turn) * np.sin(polar), np.cos(polar), np.sin(turn) * np.sin(polar)], axis=1)
     points = np.random.default_rng(0).permutation(points)
-    radii = np.full(_TRIAL_POINTS, 1.5 * (4 * np.pi / _TRIAL_POINTS) ** 0.5)
+    radii = np.full(count, 1.5 * (4 * np.pi / count) ** 0.5)
     cloud = PointCloud.from_arrays(points, normals=points, colors=0.5 * points + 0.5, radii=radii)
-    pose, surface = GpuPose(gpu, Pose(0, 0.0, "trial", cloud)), Surface(gpu, _TRIAL_SIZE)
-    camera = Camera.orbit(pose.bounds, aspect=_TRIAL_SIZE[0] / _TRIAL_SIZE[1])
-    surface.start(pose, View.of(camera, _TRIAL_SIZE, cloud.origin, pose.bounds))
+    pose, surface = GpuPose(gpu, Pose(0, 0.0, "trial", cloud)), Surface(gpu, size)
+    camera = Camera.orbit(pose.bounds, aspect=size[0] / size[1])
+    surface.start(pose, View.of(camera, size, cloud.origin, pose.bounds))
     return pose, surface
 
 

@@ -173,11 +173,11 @@ def take_normals(splats: gl.BufferTexture, surface: Surface) -> None:
 
 def _instancing(surface: Surface, setting: str, two: bool) -> str:
     """How points become splats; in one pass and in two this need not be the same."""
+    task = f"packed splats, {1 + two} passes"
+    return instancing_for(surface, setting, "tiles", task, VARIANTS, partial(_variants, two))
 
-    def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
-        points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {
-            name: partial(_draw, points, surface, _splats(1.0, 1.0), name, two, False) for name in VARIANTS
-        }
 
-    return instancing_for(surface, setting, "tiles", f"packed splats, {1 + two} passes", VARIANTS, variants)
+def _variants(two: bool, pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    """Pictures of a pose by each variant."""
+    points = Points.of(pose, surface, 1.0, use_radii=True)
+    return {name: partial(_draw, points, surface, _splats(1.0, 1.0), name, two, False) for name in VARIANTS}

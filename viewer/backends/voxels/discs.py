@@ -77,9 +77,11 @@ def _draw(points: Points, surface: Surface, splats: Splats, variant: str, two: b
 
 def _instancing(surface: Surface, setting: str, two: bool) -> str:
     """How octants become discs; in one pass and in two this need not be the same."""
+    task = f"voxels as discs, {1 + two} passes"
+    return instancing_for(surface, setting, TILES, task, VARIANTS, partial(_variants, two))
 
-    def variants(pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
-        points = Points.of(pose, surface, 1.0, use_radii=True)
-        return {variant: partial(_draw, points, surface, _splats(1.0), variant, two) for variant in VARIANTS}
 
-    return instancing_for(surface, setting, TILES, f"voxels as discs, {1 + two} passes", VARIANTS, variants)
+def _variants(two: bool, pose: GpuPose, surface: Surface) -> dict[str, Callable[[], None]]:
+    """Pictures of a pose by each variant."""
+    points = Points.of(pose, surface, 1.0, use_radii=True)
+    return {variant: partial(_draw, points, surface, _splats(1.0), variant, two) for variant in VARIANTS}
