@@ -5,6 +5,9 @@
 #include "common/color.glsl"
 #include "amplify/packed.glsl"
 #include "hpr/extents.glsl"
+#if STEADY
+#include "hpr/steady.glsl"
+#endif
 
 layout(binding = TEXTURE_SUMS) uniform isamplerBuffer sums;  // as hpr/circulation.glsl adds them
 layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;  // as hpr/sizes.glsl has them; NO_DEPTH: no candidate
@@ -33,6 +36,10 @@ void main() {
     vec3 to_eye = view_perspective ? -to_view(texelFetch(positions, int(row)).xyz) : vec3(0.0, 0.0, 1.0);
     to_eye = normalize(to_eye * mat3(world_to_view));
     vec3 normal = vec3(numbers[0], numbers[1], numbers[2]);
+#if STEADY
+    vec3 steady = steady_normal(texelFetch(positions, int(row)).w);
+    if (steady != vec3(0.0)) normal = dot(steady, to_eye) < 0.0 ? -steady : steady;
+#endif
     normal = normal == vec3(0.0) ? to_eye : normalize(normal);
     float leaning = reach / max(dot(normal, to_eye), LEAST_FACING);
     float radius = min(max(leaning, min(LEANING * spacing, 3.0 * reach)), OUTSIDE * spacing);

@@ -190,6 +190,7 @@ class Storage(IntEnum):
     # Neighborhoods and their splats, beside a list.
     SPLATS = 0
     FOUND = 1
+    PLACES = 1
     SLOTS = 0
     DRAWN_ROWS = 1
     NEAR_TO = 0

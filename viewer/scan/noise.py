@@ -2,13 +2,14 @@
 
 The nearest neighbours of some points tell the noise: their distances to a quadric, since a plane would take
 bends of the surface for noise. So many neighbours are used that they reach several times as far as the noise.
-`steady_positions` moves points to planes through those around, weighted by a B-spline (moving least squares,
+`steady_points` moves points to planes through those around, weighted by a B-spline (moving least squares,
 Alexa 2003).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,20 +102,42 @@ def _off_quadric(points: NDArray[np.float64]) -> tuple[float, float]:
     return float(np.sqrt((off * off).sum() / (len(points) - _TERMS))), reach
 
 
+class SteadyPoints(NamedTuple):
+    """Points with less noise.
+
+    positions: (N, 3) float32, relative to the cloud's origin. normals: (N, 3) float32, of the planes that the
+    points moved to, either side up; 0 where too few points lie around.
+    """
+
+    positions: NDArray[np.float32]
+    normals: NDArray[np.float32]
+
+
 def steady_positions(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
     """Points of a cloud with less of its noise, (N, 3), relative to its origin."""
+    return steady_points(cloud, noise).positions
+
+
+def steady_points(cloud: PointCloud, noise: Noise) -> SteadyPoints:
+    """The points of a cloud on planes through the points around."""
     edge = float(np.hypot(_CELLS[0] * noise.spacing, _CELLS[1] * noise.deviation))
     points = cloud.positions.astype(np.float64)
     if cloud.remainders is not None:
         points += cloud.remainders
-    for _ in range(2 if noise.deviation > _OUTLIERS * noise.spacing else 1):
-        points = _moved_to_planes(points, edge, _FARTHEST * noise.deviation)
-    return points.astype(np.float32)
+    farthest, times = _FARTHEST * noise.deviation, 2 if noise.deviation > _OUTLIERS * noise.spacing else 1
+    for _ in range(times):
+        points, normals = _moved_to_planes(points, edge, farthest)
+    # Planes lie inside round bodies. One more move shows how far, and is taken back for each move before.
+    inside, _ = _moved_to_planes(points, edge, farthest)
+    points += times * (points - inside)
+    return SteadyPoints(points.astype(np.float32), normals.astype(np.float32))
 
 
-def _moved_to_planes(points: NDArray[np.float64], edge: float, farthest: float) -> NDArray[np.float64]:
-    """Points moved to the planes of those around, (N, 3). edge: of cells, a third of how far the B-spline
-    reaches."""
+def _moved_to_planes(
+    points: NDArray[np.float64], edge: float, farthest: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points moved to the planes of those around, and the normals of these, both (N, 3). edge: of cells, a
+    third of how far the B-spline reaches."""
     from .noise_kernels import move_to_planes
 
     in_cells = (points - np.median(points, axis=0)) / edge + _MOST_CELLS
@@ -123,6 +146,6 @@ def _moved_to_planes(points: NDArray[np.float64], edge: float, farthest: float) 
     codes = (cells[:, 0] << 42) + (cells[:, 1] << 21) + cells[:, 2]
     order = codes.argsort(kind="stable")
     firsts = np.flatnonzero(np.diff(codes[order], prepend=-1, append=-1))
-    moves = np.zeros((len(points), 3))
-    move_to_planes(in_cells, rows[order], firsts, codes[order][firsts[:-1]], _ENOUGH, farthest / edge, moves)
-    return points + edge * moves
+    planes = np.zeros((len(points), 6))
+    move_to_planes(in_cells, rows[order], firsts, codes[order][firsts[:-1]], _ENOUGH, farthest / edge, planes)
+    return points + edge * planes[:, :3], planes[:, 3:]

@@ -51,9 +51,10 @@ def move_to_planes(
     codes: NDArray[np.int64],
     enough: float,
     farthest: float,
-    moves: NDArray[np.float64],
+    planes: NDArray[np.float64],
 ) -> None:
-    """Moves of points (N, 3) to the planes of least squares through those around, weighted by a B-spline.
+    """Planes of least squares through the points around each point, weighted by a B-spline: (N, 6), the move
+    of the point to its plane, and the normal.
 
     in_cells: (N, 3), in edges of cells from the corner of the first. rows: of points in the order of their
     cells, of which `firsts` (M + 1,) are the first ones of each, and codes (M,) the cells, ascending: x, y
@@ -114,4 +115,5 @@ def move_to_planes(
             off += normal[1] * (y - sums[2] / sums[0]) + normal[2] * (z - sums[3] / sums[0])
             off = min(max(off, -farthest), farthest)
             for i in range(3):
-                moves[row, i] = -off * normal[i]
+                planes[row, i] = -off * normal[i]
+                planes[row, 3 + i] = normal[i]

@@ -59,15 +59,17 @@ class PoseNoise:
 class Layer:
     """How a picture shows the layers of splats.
 
+    noise: of the points, None as long as it is not known. left: the share of it that the splats still have.
+
     thickness: scan units from the nearest splat of a layer to the farthest, 0: the nearest alone is shown.
     smoothing: factor on the falloff of weights. known: whether the noise is known.
     """
 
-    def __init__(self, noise: Noise | None) -> None:
+    def __init__(self, noise: Noise | None, left: float = 1.0) -> None:
         self.known = noise is not None
         self.thickness, self.smoothing = 0.0, 1.0
         if noise is not None and noise.deviation > DETAIL * noise.spacing:
-            self.thickness = _THICK * math.sqrt(noise.deviation**2 - (DETAIL * noise.spacing) ** 2)
+            self.thickness = left * _THICK * math.sqrt(noise.deviation**2 - (DETAIL * noise.spacing) ** 2)
             noisy = min(noise.deviation / (_NOISY * noise.spacing), 1.0)
             self.smoothing = 1 - (1 - _SMOOTHEST) * noisy
 
@@ -99,10 +101,11 @@ def surface_param(default: str, group: str, **declared: Any) -> Any:
     )
 
 
-def layer_of(pose: GpuPose, frame: FrameView, surface: Surface, blends: bool) -> Layer:
+def layer_of(pose: GpuPose, frame: FrameView, surface: Surface, blends: bool, left: float = 1.0) -> Layer:
     """The layers in a picture of a pose, by `surface` of its parameters. Tells the surface's statistics.
 
-    blends: whether the picture has a second pass anyway. Else previews that have to be fast get none.
+    blends: whether the picture has a second pass anyway. Else previews that have to be fast get none. left:
+    the share of the noise of points that their splats still have.
     """
     if frame.params.surface == NEAREST:
         return NEAREST_ALONE
@@ -110,7 +113,7 @@ def layer_of(pose: GpuPose, frame: FrameView, surface: Surface, blends: bool) ->
         surface.stats.simplified = True
         return NEAREST_ALONE
     noise = pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None)
-    layer = Layer(noise)
+    layer = Layer(noise, left)
     stats = surface.stats
     if layer.is_local:
         assert noise is not None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..gpu import gl
 from ..gpu.bindings import Storage, Texture
@@ -11,7 +12,8 @@ from ..gpu.compact import IndexList
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits
-from ..scan.noise import noise_of, steady_positions
+from ..scan import noise as noises
+from ..scan.noise import Noise, noise_of
 from ..scan.points import NOTHING, PointCloud
 from ..scan.spacing import typical_spacing
 from .calibration import body_of, copies
@@ -19,6 +21,7 @@ from .calibration import body_of, copies
 ENOUGH = 6  # points in a ball that tell how far apart they lie
 _BALL = 2.0  # its radius, in usual distances between points; it is doubled where there are too few
 _LEVELS = 6
+_NET_STEPS = 4095  # along an axis of an octahedron's net
 _PER_CELL = 4  # points, in the table of voxels
 
 
@@ -29,12 +32,32 @@ def copies_in(pose: GpuPose) -> gl.BufferTexture | None:
     return pose.packed(copies, texel_format=gl.R32UI)
 
 
+def is_steadied(pose: GpuPose) -> bool:
+    """Whether `steady_points` gives other positions than the scan has, since these are noisy."""
+    return noise_of(pose.stored).stands_out
+
+
 def steady_points(pose: GpuPose) -> gl.BufferTexture:
-    """The positions of a pose, with less noise where there is some."""
-    noise = noise_of(pose.stored)
-    if not noise.stands_out:
+    """The positions of a pose, with less noise where there is some: then with normals in the fourth number,
+    as hpr/steady.glsl reads it."""
+    if not is_steadied(pose):
         return pose.array("positions")
-    return pose.packed(steady_positions, noise, texel_format=gl.RGB32F)
+    return pose.packed(_steady_texels, noise_of(pose.stored), texel_format=gl.RGBA32F)
+
+
+def _steady_texels(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
+    """Positions with less noise and normals, (N, 4): a whole number with 12 bits for each axis of an
+    octahedron's net, and 1 more; 0: no normal."""
+    steady = noises.steady_points(cloud, noise)
+    normals = steady.normals
+    size = np.abs(normals).sum(axis=1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        net = normals[:, :2] / size[:, None]
+    turned = (1 - np.abs(net[:, ::-1])) * np.where(net < 0, -1, 1)
+    net = np.where(normals[:, 2:] < 0, turned, net)
+    steps = np.rint((np.nan_to_num(net) + 1) * (0.5 * _NET_STEPS))
+    word = np.where(size > 0, steps[:, 0] + (_NET_STEPS + 1) * steps[:, 1] + 1, 0)
+    return np.concatenate([steady.positions, word[:, None]], axis=1).astype(np.float32)
 
 
 def _usual(cloud: PointCloud) -> float:

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.backend("auto_splats")
 
 NAME, SIZE = "auto_splats", (320, 240)
+BENT = 0.6  # the share of the bend that counts in shaders/auto_splats/steady.comp
 WORST = 1.1  # times the error of the normals of the whole cloud
 
 
@@ -113,6 +114,64 @@ def test_planes_go_through_all_points_of_a_wider_ball(
     assert distinct.mean() > 0.9
     away = errors(found.normals[distinct], expected[distinct])
     assert (away < 0.1).mean() > 0.99  # at outlines, some points of a ball may lie outside the cells searched
+
+
+def plain_centers(
+    participants: NDArray[np.float64], places: NDArray[np.float64], reaches: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Where splats of places (N, 3) lie by least squares in float64, (N, 3), and whether normals are distinct
+    and the heights around bend in a way that is well known, (N,).
+
+    Heights above the plane are a level plus a bend times the squared distance, of which BENT counts.
+    """
+    centers, is_clear = np.empty_like(places), np.zeros(len(places), bool)
+    for i, rows in enumerate(cKDTree(participants).query_ball_point(places, reaches)):
+        away = (participants[rows] - places[i]) / reaches[i]
+        squared = (away**2).sum(axis=1)
+        weights = 1 - squared
+        values, vectors = np.linalg.eigh(np.cov(away.T, aweights=weights, ddof=0))
+        heights = away @ vectors[:, 0]
+        level = np.average(heights, weights=weights)
+        spread = np.average(squared**2, weights=weights) - np.average(squared, weights=weights) ** 2
+        terms = np.stack([np.ones(len(rows)), squared], axis=1) * np.sqrt(weights)[:, None]
+        bent = np.linalg.lstsq(terms, heights * np.sqrt(weights), rcond=None)[0][0]
+        centers[i] = places[i] + reaches[i] * (level + BENT * (bent - level)) * vectors[:, 0]
+        is_clear[i] = values[1] - values[0] > 0.02 and spread > 0.01
+    return centers, is_clear
+
+
+def test_centers_of_splats_move_onto_the_surface(renderer: Renderer, draw: Callable[..., Surface]) -> None:
+    cloud, even = bare(sphere(6000), 0.5), sphere(6000)
+    surface = draw(cloud, camera_of(cloud), SIZE, NAME, params={"cull": False})
+    found, neighborhoods = drawn(draw, cloud), surface.cached(Neighborhoods)
+    pose = renderer.resident(Pose(0, 0.0, "noisy", cloud))
+    widening = search_of(backend(NAME).params({}), pose, noise_of(cloud)).widening
+    places = cloud.positions[found.rows].astype(np.float64)
+    reaches = widening * found.radii.astype(np.float64)
+    expected, is_clear = plain_centers(cloud.positions[found.neighbors].astype(np.float64), places, reaches)
+    assert is_clear.mean() > 0.8
+    centers = neighborhoods.read("places", np.float32, 3)[found.rows].astype(np.float64)
+    spacing = typical_spacing(even)
+    off = np.linalg.norm(centers - expected, axis=1)[is_clear] / spacing
+    assert (off < 0.01).mean() > 0.99  # at outlines, some points of a ball may lie outside the cells searched
+
+    def distances(points: NDArray[np.float64]) -> NDArray[np.float64]:
+        return (np.linalg.norm(points + (cloud.origin - even.origin), axis=1) - 1) / spacing
+
+    assert distances(places).std() > 0.4
+    assert distances(centers).std() < 0.25
+    assert abs(distances(centers).mean()) < 0.1  # of a ball of three spacings on a sphere of 22
+
+
+def test_the_nearest_splats_stay_at_their_points(draw: Callable[..., Surface]) -> None:
+    """Moved centres show in the local surface alone."""
+    cloud = bare(sphere(6000), 0.5)
+    camera = camera_of(cloud)
+    local, nearest = (
+        draw(cloud, camera, SIZE, NAME, params={"surface": surface}).depth for surface in ("local", "nearest")
+    )
+    both = np.isfinite(local) & np.isfinite(nearest)
+    assert np.mean(nearest[both] - local[both]) < -0.3 * typical_spacing(sphere(6000))
 
 
 @pytest.mark.parametrize(("noise", "params"), [(0.0, {}), (0.5, {"adaptive": False})])

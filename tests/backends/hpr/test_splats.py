@@ -12,10 +12,13 @@ from scenes import NOTHING, sphere, sphere_hits
 from sector_scenes import Scene
 
 from viewer.backends.hpr.splats import SectorSplats
+from viewer.bench.metrics import angles_between
+from viewer.bench.scenes.defects import noisy
 from viewer.camera import Camera
 from viewer.drawing.renderer import Renderer
 from viewer.look import Look
 from viewer.picture.surface import Surface
+from viewer.scan.estimate import cloud_normals
 from viewer.scan.points import PointCloud
 
 Draw = Callable[..., Surface]
@@ -154,3 +157,21 @@ def test_the_same_bits_each_time(draw: Draw) -> None:
     )
     np.testing.assert_array_equal(first.normal, second.normal)
     np.testing.assert_array_equal(first.row, second.row)
+
+
+@pytest.mark.parametrize("noise", [0.3, 0.6])
+def test_normals_of_noisy_points_are_about_as_right_as_those_of_the_whole_cloud(
+    draw: Draw, noise: float
+) -> None:
+    even = sphere(6000)
+    moved = noisy(noise)(even, np.random.default_rng(1))
+    cloud = PointCloud(moved.positions, moved.origin)
+    camera, size = Camera.orbit(even.bounds(), 30, 10), (240, 240)
+    surface = draw(cloud, camera, size, "hpr", look=Look(light="head"))
+    depth, normals = sphere_hits(camera, size)
+    both = (surface.coverage > 0) & np.isfinite(depth)
+    of_picture = angles_between(surface.normal[both], normals[both])
+    of_cloud = angles_between(cloud_normals(cloud), even.positions)
+    of_cloud = np.minimum(of_cloud, 180 - of_cloud)
+    assert np.nanmean(of_picture) < 1.1 * np.nanmean(of_cloud)
+    assert np.nanquantile(of_picture, 0.95) < 20

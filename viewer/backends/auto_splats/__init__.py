@@ -17,7 +17,7 @@ from ...picture.surface import Surface
 from ...scan.noise import Noise
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
-from ...splatting.local import DETAIL, PoseNoise, layer_of, surface_param
+from ...splatting.local import DETAIL, LOCAL, PoseNoise, layer_of, surface_param
 from ...splatting.packed import VARIANTS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .grids import border_of
@@ -34,6 +34,7 @@ _USUAL_COUNT = 10  # points of a neighborhood, for which the next numbers hold
 # By how many radii of neighborhoods the ball of a plane grows for each spacing of noise, and its most radii.
 # These values give about the least errors of normals on models whose surface is known.
 _WIDENING, _WIDEST = 2.6, 1.95
+_LEFT = 0.4  # share of the noise that is left in splats whose centres moved onto such a surface
 _NEIGHBORS, _SPLATS, _SPEED = "Neighbours", "Splats", "Speed"
 
 
@@ -184,16 +185,18 @@ class AutoSplats(Backend):
             give_value(found, surface, params.radius_scale)
             return surface.stats.share < 1 or noise is None
         instancing, scale = params.instancing, params.radius_scale
+        is_moved = search.widening > 1 and params.surface == LOCAL
         if not found.is_whole:
-            draw_depths(_points(pose, found, params), surface, instancing=instancing, radius_scale=scale)
+            draw_depths(_points(pose, found, is_moved), surface, instancing=instancing, radius_scale=scale)
             found.find_late(pose, surface, search)
         if search.widening > 1:
             surface.stats.chosen["adaptive"] = (
                 f"balls of {search.widening:.2g} radii, because points are noisy"
             )
-        layer = layer_of(pose, frame, surface, blends=params.passes == "two")
+        left = _LEFT if is_moved else 1.0
+        layer = layer_of(pose, frame, surface, blends=params.passes == "two", left=left)
         draw_splats(
-            _points(pose, found, params),
+            _points(pose, found, is_moved),
             surface,
             instancing=instancing,
             radius_scale=scale,
@@ -212,9 +215,12 @@ def _noise_of(pose: GpuPose, frame: FrameView) -> Noise | None:
     return pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None)
 
 
-def _points(pose: GpuPose, found: Neighborhoods, params: Params) -> Points:
-    """The points whose neighborhoods were found, with their splats."""
+def _points(pose: GpuPose, found: Neighborhoods, is_moved: bool) -> Points:
+    """The points whose neighborhoods were found, with their splats. is_moved: whether splats lie where the
+    fits of noisy points put them, in place of at their points."""
     buffers = {name: found[name] for name in ("splats", "looks")}
+    if is_moved:
+        buffers["positions"] = found["places"]
     return Points(
         pose,
         use_radii=True,

@@ -37,7 +37,7 @@ from ...view import View
 from .grids import COARSEST, FINEST_COARSE, Grids
 
 # Bytes of a pose's row, of a participant, of a point that is seen.
-_SPLAT, _LOOK, _SLOT, _FOUND = 12, 8, 16, 16
+_SPLAT, _LOOK, _PLACE, _SLOT, _FOUND = 12, 8, 12, 16, 16
 _FIRST_BALL = 0.56  # that is searched, in usual radii: most neighborhoods are within
 _DIRECTIONS = 24  # in which the cells of points are measured
 _LANES = 32  # that search together for one point, of the few that are left
@@ -91,7 +91,8 @@ class Neighborhoods:
     """The neighborhoods of points that a picture shows, and their splats.
 
     Buffers by name, as texels. By the pose's row: "splats" and "looks", as `Points.buffers` has them;
-    "extents", the radius of the neighborhood in the last picture that found one, 0: none. Of the points
+    "extents", the radius of the neighborhood in the last picture that found one, 0: none; "places", where the
+    centres of splats lie whose planes go through wider balls than neighborhoods. Of the points
     whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan units,
     0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots": the
     participants, positions and rows.
@@ -199,6 +200,8 @@ class Neighborhoods:
             if self._reserve("extents", 4 * len(pose.cloud), gl.R32F):
                 self._gpu.clear(self["extents"].buffer, 0)
             self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
+            if search.widening > 1:
+                self._reserve("places", _PLACE * len(pose.cloud), gl.RGB32F)
             for name, nbytes, texel in (
                 ("drawn", 4, gl.R32UI),
                 ("found", _FOUND, gl.RGBA32F),
@@ -402,6 +405,7 @@ class Neighborhoods:
         defines = {"LANES": 1, "ELLIPTICAL": str(search.elliptical).lower()}
         with self._gpu.timers.measure("steady"):
             program = self._searching("auto_splats/steady.comp", pose, search, defines)
+            self._bind_storage(places=Storage.PLACES)
             self._gpu.set(program, first=first, widening=search.widening)
             self._gpu.dispatch(program, self.count - first)
 

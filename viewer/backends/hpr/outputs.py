@@ -6,17 +6,19 @@ from ...gpu.pose import GpuPose
 from ...look import wants_normals
 from ...picture.surface import Surface
 from ...splatting.amplify import Points
-from ...splatting.local import layer_of
+from ...splatting.local import LOCAL, layer_of
 from ...splatting.packed import draw_splats, take_normals
 from ...splatting.squares import draw_squares
 from ...visibility.calibration import EyeCalibration
 from ...visibility.candidates import Candidates
 from ...visibility.covering import Covering
+from ...visibility.spacing import is_steadied, steady_points
 from .. import FrameView
 from .faces import draw_faces
 from .reconstruction import fill_between
 from .splats import SectorSplats
 
+_LEFT = 0.4  # share of the noise that is left in steadied points
 OUTPUTS = ("points", "faces", "splats", "reconstruction")
 
 
@@ -38,8 +40,11 @@ def show_visible(
         draw_faces(pose, surface, nearest, seen.visible, splats, params.longest)
     elif params.output == "splats":
         buffers = {name: splats[name] for name in ("splats", "looks")}
+        is_moved = is_steadied(pose) and params.surface == LOCAL
+        if is_moved:
+            buffers["positions"] = steady_points(pose)
         points = Points(pose, use_radii=True, count=len(pose.cloud), buffers=buffers, elliptical=False)
-        layer = layer_of(pose, frame, surface, blends=True)
+        layer = layer_of(pose, frame, surface, blends=True, left=_LEFT if is_moved else 1.0)
         draw_splats(points, surface, radius_scale=params.radius_scale, two=True, layer=layer)
         return surface.stats.share < 1 or not layer.known
     else:

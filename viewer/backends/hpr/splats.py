@@ -17,6 +17,7 @@ from ...picture.surface import Surface
 from ...visibility.calibration import EyeCalibration, body_of
 from ...visibility.candidates import Candidates
 from ...visibility.covering import Covering
+from ...visibility.spacing import is_steadied, steady_points
 
 _INFINITE = 1e12  # weight, from which on nearness alone counts but for ties
 _MOST_SECTORS = 1 << 22  # of which 24 bytes are kept
@@ -78,7 +79,7 @@ class SectorSplats:
             self._map = Candidates(self._gpu, sectors, len(pose.cloud))
         self._map.distinct = body_of(pose.stored).count
         nearest, among = sectors.weighted(_INFINITE), seen.visible
-        self._map.find(pose.array("positions"), nearest, _GAPS * steps, among=among)
+        self._map.find(steady_points(pose), nearest, _GAPS * steps, among=among)
         self.find(pose, self._map)
         self._state = seen.state
         return self._map
@@ -93,7 +94,7 @@ class SectorSplats:
         def bind(_: Program) -> None:
             candidates.rows.bind(Texture.CANDIDATES)
             candidates.sector_positions.bind(Texture.SPOTS)
-            pose.array("positions").bind(Texture.POSITIONS)
+            steady_points(pose).bind(Texture.POSITIONS)
 
         def visits(cells: str) -> Visits:
             return Visits(cells, sectors.count, bind, candidates.defines, sectors)
@@ -106,7 +107,12 @@ class SectorSplats:
         take_keys(gpu, visits("hpr/sizes.glsl"), self["keys"])
         with gpu.timers.measure("splats"):
             has_colors = pose.cloud.colors is not None
-            defines = {"HAS_COLORS": int(has_colors), **fixed.defines, **candidates.defines}
+            defines = {
+                "HAS_COLORS": int(has_colors),
+                "STEADY": int(is_steadied(pose)),
+                **fixed.defines,
+                **candidates.defines,
+            }
             program = gpu.compute("hpr/splats.comp", defines, params=sectors)
             bind(program)
             if has_colors:
