@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scenes import sphere
 
-from viewer.scan.noise import Noise, noise_of, steady_points, steady_positions
+from viewer.scan.noise import Noise, noise_of, steadied, steady_positions
 from viewer.scan.points import PointCloud
 
 COUNT = 20_000
@@ -61,7 +61,7 @@ def test_noise_is_taken_off(times: float, left: float) -> None:
 @pytest.mark.parametrize("times", [0.3, 0.6])
 def test_steady_points_lie_on_the_surface_and_have_its_normals(times: float) -> None:
     cloud = PointCloud.from_arrays(noisy(times * SPACING), origin=np.zeros(3))
-    steady = steady_points(cloud, noise_of(cloud))
+    steady = steadied(cloud, noise_of(cloud))
     radii = np.linalg.norm(steady.positions, axis=1)
     assert abs(radii.mean() - 1) < 0.05 * SPACING
     facing = np.abs((steady.normals * steady.positions).sum(axis=1)) / radii
@@ -81,7 +81,7 @@ def test_what_lies_far_from_all_others_stays() -> None:
     cloud = PointCloud.from_arrays(points)
     steady = steady_positions(cloud, noise_of(cloud))
     np.testing.assert_array_equal(steady[-2:], cloud.positions[-2:])
-    np.testing.assert_array_equal(steady_points(cloud, noise_of(cloud)).normals[-2:], 0)
+    np.testing.assert_array_equal(steadied(cloud, noise_of(cloud)).normals[-2:], 0)
     assert np.isfinite(steady).all()
     assert off(steady[:-2]) < 0.7 * SPACING
 

@@ -2,7 +2,7 @@
 
 The nearest neighbours of some points tell the noise: their distances to a quadric, since a plane would take
 bends of the surface for noise. So many neighbours are used that they reach several times as far as the noise.
-`steady_points` moves points to planes through those around, weighted by a B-spline (moving least squares,
+`steadied` moves points to planes through those around, weighted by a B-spline (moving least squares,
 Alexa 2003).
 """
 
@@ -115,10 +115,10 @@ class SteadyPoints(NamedTuple):
 
 def steady_positions(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
     """Points of a cloud with less of its noise, (N, 3), relative to its origin."""
-    return steady_points(cloud, noise).positions
+    return steadied(cloud, noise).positions
 
 
-def steady_points(cloud: PointCloud, noise: Noise) -> SteadyPoints:
+def steadied(cloud: PointCloud, noise: Noise) -> SteadyPoints:
     """The points of a cloud on planes through the points around."""
     edge = float(np.hypot(_CELLS[0] * noise.spacing, _CELLS[1] * noise.deviation))
     points = cloud.positions.astype(np.float64)

@@ -12,8 +12,7 @@ from ..gpu.compact import IndexList
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits
-from ..scan import noise as noises
-from ..scan.noise import Noise, noise_of
+from ..scan.noise import Noise, noise_of, steadied
 from ..scan.points import NOTHING, PointCloud
 from ..scan.spacing import typical_spacing
 from .calibration import body_of, copies
@@ -48,7 +47,7 @@ def steady_points(pose: GpuPose) -> gl.BufferTexture:
 def _steady_texels(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
     """Positions with less noise and normals, (N, 4): a whole number with 12 bits for each axis of an
     octahedron's net, and 1 more; 0: no normal."""
-    steady = noises.steady_points(cloud, noise)
+    steady = steadied(cloud, noise)
     normals = steady.normals
     size = np.abs(normals).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
