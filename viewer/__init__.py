@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from .scan.points import PointCloud
     from .scan.pose import Pose
     from .scan.range_view import RangeView
+    from .scan.winding import winding_number
 
 __version__ = "0.1.0"
 __all__ = [
     "Camera", "Layers", "Look", "NormalSearch", "PointCloud", "Pose", "RangeView", "Rigid", "Scan4DError",
-    "VisibleNormals", "estimate_normals", "open_scan", "render",
+    "VisibleNormals", "estimate_normals", "open_scan", "render", "winding_number",
 ]  # fmt: skip
 
 _HOMES = {
@@ -39,6 +40,7 @@ _HOMES = {
     "VisibleNormals": "analysis.visible_normals",
     "estimate_normals": "analysis.visible_normals",
     "open_scan": "scan.open",
+    "winding_number": "scan.winding",
 }
 
 

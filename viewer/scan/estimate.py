@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..task import checkpoint
+from .morton import morton_codes
 from .planes import AROUND, NeighborSearch, plane_normals
 from .points import PointCloud, checked_viewpoint
 from .pose import Pose
@@ -21,13 +22,6 @@ from .sides import LINKED, facing, facing_out
 Vectors = NDArray[np.float64]  # (N, 3)
 
 _FLOAT = np.finfo(np.float32)
-_GRID = 1 << 10  # cells along an axis, by which points are put in order
-_SPREAD = (
-    (16, 0x030000FF),
-    (8, 0x0300F00F),
-    (4, 0x030C30C3),
-    (2, 0x09249249),
-)  # of ten bits, with two between each
 
 
 def estimate(pose: Pose, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
@@ -108,23 +102,10 @@ def _distinct(positions: NDArray[np.float32]) -> tuple[Vectors, NDArray[np.intp]
     They stand in an order of their own, whatever that of the points is: near ones together (by Morton codes),
     so that neighbours are found in less time.
     """
-    order = np.lexsort((*positions.T, _codes(positions)))
+    order = np.lexsort((*positions.T, morton_codes(positions)))
     ordered = positions[order]
     first = np.ones(len(ordered), bool)
     first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
     row = np.empty(len(ordered), np.intp)
     row[order] = np.cumsum(first) - 1
     return ordered[first].astype(np.float64), row
-
-
-def _codes(positions: NDArray[np.float32]) -> NDArray[np.uint32]:
-    """The Morton codes of cells, (N,)."""
-    low = positions.min(axis=0)
-    extent = (positions.max(axis=0) - low).max() or np.float32(1)
-    codes = np.zeros(len(positions), np.uint32)
-    for axis in range(3):
-        cells = ((positions[:, axis] - low[axis]) / extent * (_GRID - 1)).astype(np.uint32)
-        for shift, mask in _SPREAD:
-            cells = (cells | cells << np.uint32(shift)) & np.uint32(mask)
-        codes |= cells << np.uint32(axis)
-    return codes
