@@ -14,11 +14,15 @@ from viewer.app.playing.ahead import Ahead
 from viewer.app.playing.playback import Playback
 from viewer.app.playing.player import Pace
 from viewer.app.session import Session
+from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Document
+from viewer.drawing.foresight import Foresight
 from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.drawing.work import BackgroundWork
 from viewer.rigid import STILL
+from viewer.scan.noise import known_noise
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.timeline import Timeline
@@ -119,6 +123,48 @@ def test_frames_are_asked_for_as_they_are_due_and_none_at_rest(renderer: Noting,
     playback.seek(9, 0.0)
     ahead.advance(0.0)
     assert [index for index in renderer.work.asked[-1] if index] == [9, 10, 11]
+
+
+def test_noise_is_estimated_ahead_of_the_playhead(start: Callable) -> None:
+    """While a frame is shown, Scan4D finds what pictures of the next ones read, and draws none of them."""
+    playback, ahead = start()
+    clouds = [playback.timeline.pose(index).cloud for index in range(COUNT)]
+
+    def is_known(index: int) -> bool:
+        ahead.advance(0.0)
+        return known_noise(clouds[index]) is not None
+
+    until(lambda: is_known(0))
+    assert all(known_noise(cloud) is None for cloud in clouds[1:]), "at rest the one that is shown"
+    playback.toggle(0.0)
+    for index in range(COUNT):
+        until(lambda index=index: is_known(index))
+
+
+def test_facts_are_found_once_for_each_cloud_and_its_parameters(start: Callable) -> None:
+    playback, _ = start()
+    pose = playback.timeline.pose(3)
+    foresight = Foresight()
+    asked: list[object] = []
+
+    class Asked(type(backend("surfels"))):  # type: ignore[misc]
+        """Surfels that note what is asked of them."""
+
+        def foresee(self, cloud: PointCloud, params: Any) -> None:
+            asked.append(params)
+
+    noting = Asked("surfels")
+    requests = [
+        Request(pose, CAMERA, noting, noting.params({"surface": surface})) for surface in ("local", "nearest")
+    ]
+
+    def is_done() -> bool:
+        foresight.begin(requests)
+        return len(asked) == 2
+
+    until(is_done)
+    foresight.begin(requests)
+    assert asked == [request.params for request in requests]
 
 
 def test_what_would_be_late_comes_last_but_for_every_frame(renderer: Noting, start: Callable) -> None:

@@ -4,6 +4,7 @@ without it."""
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Future
 from dataclasses import replace
 
 import numpy as np
@@ -22,9 +23,9 @@ from viewer.mesh.reference import pixel_rays
 from viewer.picture.surface import Surface
 from viewer.scan.noise import Noise, noise_of
 from viewer.scan.points import PointCloud
-from viewer.scan.pose import Pose
+from viewer.scan.pose import Pose, ScanKey
 from viewer.scan.spacing import typical_spacing
-from viewer.splatting.local import Layer
+from viewer.splatting.local import Layer, PoseNoise
 from viewer.view import View
 
 Draw = Callable[..., Surface]
@@ -216,6 +217,41 @@ def test_the_background_estimates_the_noise(
         pass
     finished = draw(cloud, looking_at(cloud), SIZE, name, params={**params, **LOCAL})
     np.testing.assert_array_equal(surface.depth, finished.depth)
+
+
+@pytest.mark.backend("surfels")
+def test_a_picture_goes_by_the_last_known_noise_of_its_scan(renderer: Renderer) -> None:
+    scan, other = ScanKey(), ScanKey()
+    clouds = [replace(noisy_sphere(noise), radii=None) for noise in (0.3, 0.4)]
+    drawn_by = backend("surfels")
+    surface = Surface(renderer.gpu, SIZE)
+
+    def words(pose: Pose, wait: bool) -> str:
+        request = Request(pose, looking_at(clouds[0]), drawn_by, drawn_by.params(LOCAL))
+        is_refinable = render_frame(renderer, request, surface, wait=wait)
+        assert is_refinable == ("until" in surface.stats.chosen["surface"] or "last" in words_of())
+        return words_of()
+
+    def words_of() -> str:
+        return surface.stats.chosen["surface"]
+
+    def unknown(cloud: PointCloud, scan: ScanKey) -> tuple[Pose, Future[Noise]]:
+        """A pose whose noise is being estimated, and what ends that."""
+        pose, future = Pose(1, 0.0, "noisy", replace(cloud), scan=scan), Future[Noise]()
+        renderer.resident(pose).cached(PoseNoise)._future = future
+        return pose, future
+
+    assert words(Pose(0, 0.0, "first", clouds[0], scan=scan), wait=True) == words_of()
+    stranger, _ = unknown(clouds[1], other)
+    assert "until" in words(stranger, wait=False), "another scan tells nothing"
+    second, future = unknown(clouds[1], scan)
+    assert "in the last frame" in words(second, wait=False)
+    future.set_result(noise_of(clouds[1]))
+    own = words(second, wait=False)
+    assert "in the last frame" not in own
+    shown = surface.depth
+    words(Pose(2, 0.0, "again", replace(clouds[1]), scan=scan), wait=True)
+    np.testing.assert_array_equal(shown, surface.depth)
 
 
 def test_noise_tells_how_thick_layers_are() -> None:

@@ -25,6 +25,7 @@ from ..params import Parameter, describe, param, parse
 from ..picture.frame_view import CHANGES as CHANGES
 from ..picture.frame_view import FrameView
 from ..picture.surface import Surface
+from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..view import View
 
@@ -177,6 +178,11 @@ class Backend(ABC):
     def upload(self, gpu: Gpu, arrays: Any) -> Derived:
         """Put what `derive` gave on the GPU, for `draw` to find as `frame.derived`; on the GL thread."""
         raise NotImplementedError
+
+    def foresee(self, cloud: PointCloud, params: Any) -> None:
+        """Find the facts about a pose's points (`PointCloud.remember`) that pictures read but need not wait
+        for, before pictures are due; on any thread. By default, there are none."""
+        return
 
     @property
     def about(self) -> str:

@@ -27,7 +27,7 @@ from ..splatting import passes
 from ..splatting.amplify import FEEDS, Points, amplify
 from ..splatting.fastest import instancing_for
 from ..splatting.gaps import GapRadii
-from ..splatting.local import NEAREST_ALONE, Layer, layer_of, surface_param
+from ..splatting.local import NEAREST_ALONE, Layer, foresee_noise, layer_of, surface_param
 from ..splatting.splat_culling import draw_unhidden, may_cull
 from ..splatting.splats import FRAGMENT, SURFEL, Splats
 from ..splatting.subpixel import average, splat_subpixel, subpixel_share
@@ -176,6 +176,10 @@ class Surfels(Backend):
             if pose.views or pose.overview.normals is None
             else with_levels(pose, {}, {"passes": "one", "surface": "nearest"})
         )
+
+    def foresee(self, cloud: PointCloud, params: Params) -> None:
+        """Estimate the noise of points."""
+        foresee_noise(cloud, params)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Splat in as many passes as are asked for; complete where all points are drawn in their size."""

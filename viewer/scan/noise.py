@@ -55,6 +55,11 @@ def noise_of(cloud: PointCloud) -> Noise:
     return cloud.remember(_noise)
 
 
+def known_noise(cloud: PointCloud) -> Noise | None:
+    """The noise of a cloud where it was found before, on any thread; else None, at once."""
+    return cloud.recall(_noise)
+
+
 def _noise(cloud: PointCloud) -> Noise:
     noise = _NONE
     if not len(cloud):

@@ -279,6 +279,10 @@ class PointCloud:
             self._facts[key] = find(self, *args, **kwargs)
         return self._facts[key]
 
+    def recall(self, find: Callable[[PointCloud], T]) -> T | None:
+        """The small fact that `remember(find)` found before; None where it did not yet."""
+        return self._facts.get((find,))
+
     def __getstate__(self) -> dict[str, Any]:
         """All but the facts, which another process finds again where it needs them."""
         return {**self.__dict__, "_facts": {}}

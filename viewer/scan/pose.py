@@ -59,13 +59,19 @@ class Average:
         return int(np.median(still)) if len(still) else 1
 
 
+class ScanKey:
+    """A token that the poses of a scan share."""
+
+    __slots__ = ("__weakref__",)
+
+
 @dataclass(frozen=True, eq=False)
 class Pose:
     """One moment of a scan, on the CPU.
 
     index: its number on the timeline. time: seconds. label: the file or frame it came from. points: its
     points, or those of the range views where it was scanned as such. average: how they were averaged over
-    frames, None where they are as scanned. life: see `Life`.
+    frames, None where they are as scanned. life: see `Life`. scan: of its scan, see `ScanKey`.
 
     Merging the points of range views takes time and memory. It happens when something first reads `cloud`;
     the `overview` needs no merging.
@@ -76,13 +82,14 @@ class Pose:
     label: str
     points: PointCloud | RangePoints
     average: Average | None = None
+    scan: ScanKey = field(default_factory=ScanKey, repr=False)
     life: Life = field(default_factory=Life, init=False, repr=False)
 
     @classmethod
-    def of(cls, index: int, time: float, label: str, scanned: Scanned) -> Pose:
+    def of(cls, index: int, time: float, label: str, scanned: Scanned, scan: ScanKey | None = None) -> Pose:
         """The pose of what a frame holds. Raises InputError where range views see nothing."""
         points = scanned if isinstance(scanned, PointCloud) else RangePoints.of(scanned)
-        return cls(index, time, label, points)
+        return cls(index, time, label, points, scan=scan or ScanKey())
 
     @property
     def raw(self) -> Pose:

@@ -24,7 +24,7 @@ from .averaging import Averaging, averaged
 from .cache import PoseCache, default_budget
 from .faces import Faces
 from .points import UNKNOWN_UNIT, PointCloud
-from .pose import Pose
+from .pose import Pose, ScanKey
 from .range_view import RangeView, in_one_unit
 from .reading.record import Reading
 from .reading.sequence import Decided, ReportKind
@@ -94,6 +94,7 @@ class Timeline:
         self.finish: Callable[[Pose], object] = lambda pose: None
         self.source = source
         self.decided: Decided = getattr(source, "decided", None) or Decided()
+        self._scan = ScanKey()
         self._state = threading.Condition()  # guards all that follows
         self._cache = PoseCache(default_budget() if cache_bytes is None else cache_bytes)
         self._loading: dict[int, Future[Pose]] = {}
@@ -539,7 +540,7 @@ class Timeline:
                     scanned = self._in_unit(index, scanned)
                     for assumed in {view.assumed for view in scanned if view.assumed}:
                         self._tell_once("assumed", f"{label}: {shortened(assumed)}", index)
-                return Pose.of(index, float(self.times[index]), label, scanned)
+                return Pose.of(index, float(self.times[index]), label, scanned, self._scan)
         except InputError as error:
             if error.where is None:
                 error.where = label

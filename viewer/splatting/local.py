@@ -11,7 +11,8 @@ from __future__ import annotations
 import math
 from concurrent.futures import Future
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 from ..gpu.bindings import Storage
 from ..gpu.context import Gpu
@@ -19,7 +20,9 @@ from ..gpu.pose import GpuPose
 from ..params import param
 from ..picture.frame_view import FrameView
 from ..picture.surface import Surface
-from ..scan.noise import Noise, noise_of
+from ..scan.noise import Noise, known_noise, noise_of
+from ..scan.points import PointCloud
+from ..scan.pose import ScanKey
 from ..task import Task, in_background
 from .splats import Splats
 
@@ -41,6 +44,8 @@ class PoseNoise:
 
     def find(self, pose: GpuPose, *, wait: bool) -> Noise | None:
         """The noise; without `wait`, None as long as it is not known."""
+        if self._found is None:
+            self._found = known_noise(pose.stored)
         if self._found is None and wait:
             with pose.preparing("derive"):
                 self._found = noise_of(pose.stored)
@@ -56,17 +61,50 @@ class PoseNoise:
         """Nothing is on the GPU."""
 
 
+class NoiseEstimate(NamedTuple):
+    """The noise that a picture goes by. is_own: whether it is that of the pose's points; else it is that of
+    the last pose of the scan whose noise is known, or None."""
+
+    noise: Noise | None
+    is_own: bool
+
+
+class _LastNoise:
+    """The noise of the last pose drawn of each scan. Made with `Gpu.cached`."""
+
+    def __init__(self, _: Gpu) -> None:
+        self.by_scan: WeakKeyDictionary[ScanKey, Noise] = WeakKeyDictionary()
+
+
+def estimated_noise(pose: GpuPose, frame: FrameView) -> NoiseEstimate:
+    """The noise for a picture of a pose. A picture that is to be finished waits for that of the pose itself.
+    Others take that of the last pose of the same scan until then, so that the surface does not jump from pose
+    to pose while a scan plays."""
+    last = pose.gpu.cached(_LastNoise).by_scan
+    own = pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None)
+    if own is None:
+        return NoiseEstimate(last.get(pose.pose.scan), False)
+    last[pose.pose.scan] = own
+    return NoiseEstimate(own, True)
+
+
+def foresee_noise(cloud: PointCloud, params: Any) -> None:
+    """Find what `layer_of` reads of points (`Backend.foresee`)."""
+    if params.surface == LOCAL:
+        noise_of(cloud)
+
+
 class Layer:
     """How a picture shows the layers of splats.
 
     noise: of the points, None as long as it is not known. left: the share of it that the splats still have.
 
     thickness: scan units from the nearest splat of a layer to the farthest, 0: the nearest alone is shown.
-    smoothing: factor on the falloff of weights. known: whether the noise is known.
+    smoothing: factor on the falloff of weights. known: whether the noise is known, and that of these points.
     """
 
-    def __init__(self, noise: Noise | None, left: float = 1.0) -> None:
-        self.known = noise is not None
+    def __init__(self, noise: Noise | None, left: float = 1.0, is_own: bool = True) -> None:
+        self.known = noise is not None and is_own
         self.thickness, self.smoothing = 0.0, 1.0
         if noise is not None and noise.deviation > DETAIL * noise.spacing:
             self.thickness = left * _THICK * math.sqrt(noise.deviation**2 - (DETAIL * noise.spacing) ** 2)
@@ -112,14 +150,16 @@ def layer_of(pose: GpuPose, frame: FrameView, surface: Surface, blends: bool, le
     if not blends and frame.moving and (surface.gpu.software or frame.share < 1):
         surface.stats.simplified = True
         return NEAREST_ALONE
-    noise = pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None)
-    layer = Layer(noise, left)
+    noise, is_own = estimated_noise(pose, frame)
+    layer = Layer(noise, left, is_own)
     stats = surface.stats
     if layer.is_local:
         assert noise is not None
         share = noise.deviation / noise.spacing
         stats.chosen["surface"] = f"local, because the noise is {share:.2g} spacings"
-    elif layer.known:
+        if not is_own:
+            stats.chosen["surface"] += " in the last frame whose noise Scan4D has estimated"
+    elif noise is not None:
         stats.chosen["surface"] = "nearest, because the points have too little noise to change the picture"
     else:
         stats.chosen["surface"] = "nearest, until Scan4D has estimated the noise of the points"

@@ -68,6 +68,13 @@ def _usual(cloud: PointCloud) -> float:
     return typical_spacing(cloud)
 
 
+def foresee_spacing(cloud: PointCloud) -> None:
+    """Find the facts that the search for visible points reads, on any thread (`Backend.foresee`)."""
+    noise_of(cloud)
+    body_of(cloud)
+    cloud.remember(_usual)
+
+
 class Spacings:
     """The distance between neighbours around each point of a pose, without noise, by the number of them
     in a ball.

@@ -1,4 +1,4 @@
-"""Poses prepared before they are due: estimates and octrees ahead of the playhead, as reading is."""
+"""Poses prepared before they are due: estimates, octrees and noise ahead of the playhead, as reading is."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...document.document import Document
+from ...drawing.foresight import Foresight
 from ...drawing.plan import Effort, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request
@@ -31,6 +32,7 @@ class Ahead(WindowPart):
 
     def __post_init__(self) -> None:
         self._asked: Any = None
+        self.foresight = Foresight()
         self.playback.is_prepared = self.is_prepared
         self.renderer.steps_to = self._steps_to
 
@@ -49,6 +51,7 @@ class Ahead(WindowPart):
         requests = [self._request(pose) for pose in (playback.pose, *reversed(ahead)) if pose is not None]
         wanted = [request for request in requests if request is not None]
         self.renderer.work.prepare_ahead(wanted, afresh=asked != self._asked)
+        self.foresight.begin(wanted)
         self._asked = asked
 
     def _next(self) -> list[int]:

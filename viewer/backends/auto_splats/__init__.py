@@ -14,10 +14,19 @@ from dataclasses import dataclass
 from ...gpu.pose import GpuPose
 from ...params import param
 from ...picture.surface import Surface
-from ...scan.noise import Noise
+from ...scan.noise import Noise, noise_of
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
-from ...splatting.local import DETAIL, LOCAL, PoseNoise, layer_of, surface_param
+from ...splatting.local import (
+    DETAIL,
+    LOCAL,
+    NoiseEstimate,
+    estimated_noise,
+    foresee_noise,
+    layer_of,
+    surface_param,
+)
 from ...splatting.packed import VARIANTS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .grids import border_of
@@ -169,11 +178,17 @@ class AutoSplats(Backend):
         """Two passes, and one, of bare points; with normals, surfels draw about the same in less time."""
         return () if pose.views or self.suits(pose) is None else ({}, {"passes": "one", "surface": "nearest"})
 
+    def foresee(self, cloud: PointCloud, params: Params) -> None:
+        """Estimate the noise of points."""
+        if params.adaptive:
+            noise_of(cloud)
+        foresee_noise(cloud, params)
+
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Find neighborhoods and draw their splats; complete where all points shall be drawn."""
         params: Params = frame.params
         found = surface.cached(Neighborhoods)
-        noise = _noise_of(pose, frame)
+        noise, is_own = _noise_of(pose, frame)
         search = search_of(params, pose, noise or _NO_NOISE)
         anew = bool(frame.changed - {"parameters", "values"})
         border = border_of(pose.cloud, frame.view, params.k)
@@ -183,7 +198,7 @@ class AutoSplats(Backend):
             surface.clear()
             surface.own("normal")
             give_value(found, surface, params.radius_scale)
-            return surface.stats.share < 1 or noise is None
+            return surface.stats.share < 1 or not is_own
         instancing, scale = params.instancing, params.radius_scale
         is_moved = search.widening > 1 and params.surface == LOCAL
         if not found.is_whole:
@@ -205,14 +220,14 @@ class AutoSplats(Backend):
             layer=layer,
         )
         give_value(found, surface, params.radius_scale)
-        return surface.stats.share < 1 or not layer.known or noise is None
+        return surface.stats.share < 1 or not layer.known or not is_own
 
 
-def _noise_of(pose: GpuPose, frame: FrameView) -> Noise | None:
-    """The noise that planes adapt to; None as long as it is not known. The background estimates it."""
+def _noise_of(pose: GpuPose, frame: FrameView) -> NoiseEstimate:
+    """The noise that planes adapt to. The background estimates it."""
     if not frame.params.adaptive:
-        return _NO_NOISE
-    return pose.cached(PoseNoise).find(pose, wait=frame.budget_ms is None)
+        return NoiseEstimate(_NO_NOISE, True)
+    return estimated_noise(pose, frame)
 
 
 def _points(pose: GpuPose, found: Neighborhoods, is_moved: bool) -> Points:

@@ -19,9 +19,11 @@ from dataclasses import dataclass
 from ...gpu.pose import GpuPose
 from ...params import param
 from ...picture.surface import Surface
+from ...scan.points import PointCloud
 from ...splatting.local import surface_param
 from ...visibility.candidates import UNLIMITED
 from ...visibility.search import DEPTH, HULL, MODES, MOST_SECTORS, QUALITY, SearchSettings, SeenPicture
+from ...visibility.spacing import foresee_spacing
 from .. import AROUND_ALL, NO_DETAIL, Backend, FrameView, Limit
 from .outputs import OUTPUTS, show_visible
 
@@ -158,6 +160,11 @@ class VisiblePoints(Backend):
         "zoomed out x10^9": Limit(0.02, AROUND_ALL),
         "collinear points": Limit(0.02, AROUND_ALL),
     }
+
+    def foresee(self, cloud: PointCloud, params: Params) -> None:
+        """Estimate the noise and the spacing of points, which the search for visible points reads."""
+        if len(cloud):
+            foresee_spacing(cloud)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Find what the eye sees, unless that is known, and show it."""

@@ -19,9 +19,10 @@ from ...picture.surface import Surface
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
 from ...scan.octree.traverse import Sight, Traversal
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...splatting.amplify import Points
-from ...splatting.local import NEAREST_ALONE, layer_of, surface_param
+from ...splatting.local import NEAREST_ALONE, foresee_noise, layer_of, surface_param
 from ...splatting.passes import blends
 from ...view import View
 from .. import AROUND_ALL, NO_DETAIL, NO_SPACING, Backend, Derives, FrameView, Limit
@@ -210,6 +211,10 @@ class Voxels(Backend):
     def upload(self, gpu: Gpu, octree: Octree) -> OctreeCuts:
         """Nothing is uploaded until a view is known."""
         return OctreeCuts(gpu, octree)
+
+    def foresee(self, cloud: PointCloud, params: Params) -> None:
+        """Estimate the noise of points."""
+        foresee_noise(cloud, params)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Draw the nodes that the view tells apart; complete where all were found, and all shall be drawn."""
