@@ -112,7 +112,9 @@ def test_a_filled_place_between_points_of_one_surface_is_taken(draw: Draw, hole:
 
 
 def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
-    cloud = plane(10, depth=4.0, spacing=0.5)
+    whole = plane(60, depth=4.0, spacing=0.05)
+    hole = np.linalg.norm(whole.world()[:, :2], axis=1) < 4 * 0.05
+    cloud = PointCloud.from_arrays(whole.world()[~hole])
     surface = draw(cloud, looking_down_z(), SIZE, filling.BACKEND)
     y, x = np.argwhere(surface.level == 2)[0].tolist()
     picked, pose = pick(surface, x, y), Pose(0, 0.0, "", cloud)
@@ -122,7 +124,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     made = SurfacePoint.of(picked, pose, filled=True)
     assert (made.id, made.level) == (None, 2)
     assert made.position == tuple(picked.position)
-    nearest = np.linalg.norm(cloud.positions - picked.position, axis=1).min()
+    nearest = np.linalg.norm(cloud.world() - picked.position, axis=1).min()
     assert made.spacing is not None
     assert made.spacing >= nearest * (1 - 1e-5)
     assert made.uncertainty is not None

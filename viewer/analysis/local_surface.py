@@ -1,14 +1,17 @@
-"""The surface in a pixel, from the points that are seen around: where it is, how it leans, how sure it is.
+"""A surface on the ray through a pixel, from the points of the cloud around: where it is, how it leans, how
+sure that is.
 
-Points on a surface say more together than the nearest of them alone. A robust parabola tells which of them
-belong to one surface (loess: Cleveland 1979). Through these goes the surface that bends least (a thin plate,
-Duchon 1977) as they are exact, or beside them as they are noisy, whichever is more likely (restricted maximum
-likelihood), and what it leaves open is the variance of its prediction: universal kriging (Matheron 1969; for
-thin plates Wahba 1983, whose intervals hold their coverage over a surface).
+Points on a surface say more together than the nearest of them alone. A robust paraboloid tells which of them
+belong to one surface (loess: Cleveland 1979). Through these goes the surface that bends least beside a
+paraboloid (a thin plate, Duchon 1977): through the points where they are exact, and between them where they
+are noisy. What it leaves open is the variance of its prediction: universal kriging (Matheron 1969; Wahba 1983
+shows that such intervals hold their coverage over a surface). Each ratio of noise to bending counts as much
+as the points make it likely (restricted likelihood), since few points do not tell it well.
 """
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -16,128 +19,174 @@ from numpy.typing import NDArray
 
 from ..view import View
 
-MOST = 24  # points that are looked at, the nearest: some three rings around the middle
-LEAST = 8  # two more than a parabola has unknowns
-_SURE = 12  # from so many points on, a parabola tells which belong together; a plane of fewer
-_ROUNDS = 3  # of looking for the points nearest to the place that was found
-_BEHIND = 3  # surfaces that are looked for behind one that ends before the pixel
+MOST = 24  # points that give the surface: some three rings around the middle
+LEAST = 8  # two more than a paraboloid has unknowns
+_SURE = 12  # from so many points on, a paraboloid tells which belong together; a plane of fewer
+_BENT = 14  # from so many points on, the surface bends beside a paraboloid; beside a plane of fewer
+_ROUNDS = 4  # of looking for the points nearest to the position that was found
+_WINDOW = 1.5, 4.0  # spacings and deviations to each side of a surface in which its points are looked for
+_BEYOND = 3.0  # times as far as it is, what lies beyond that
+_FARTHEST = 4.0  # reaches of the points from the start to the surface, at most
 _REWEIGHTED = 2  # times
 _CUT = 6.0  # median absolute residuals beyond which a point does not belong (Cleveland 1979)
-# Standard deviation across, in distances to the farthest point that is looked at, beyond which points fill
-# space: those that do have 0.22 and more (95 %), a surface with noise of 0.5 spacings has 0.17 (median).
-_THICK = 0.2
+_NORMAL = 1.4826  # standard deviation of a normal distribution, in median absolute residuals
+# Points that are looked at, and the deviation across, in distances to the farthest of them, up to which they
+# are a surface. More are looked at where they are not. Of points that fill space, so many have 0.19, 0.33 and
+# 0.45 or more (99 %). A surface with noise of 0.6 spacings has 0.29, 0.23 and 0.16 (median).
+_THICKEST = {MOST: 0.18, 2 * MOST: 0.3, 4 * MOST: 0.4}
 _NOISES = (0.0, *(10.0 ** (n / 2) for n in range(-6, 5)))  # variances that are tried, of noise to bending
 _EXACT = 1e-9  # of the bending, added where there is no noise: so that rounding does not count
+_ROUND = 12  # nearest points that lie all round a place in the surface (99.4 % of cases by chance)
+_CLOSENESS = 1e-9  # weight of the farthest point
 _ASIDE = 0.5  # pixels to each side, between which the slope is taken
+_SIDES = _ASIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
 _TURNS = np.linspace(0, 2 * np.pi, 48, endpoint=False)
 _DIRECTIONS = np.stack([np.cos(_TURNS), np.sin(_TURNS)])  # all round, (2, 48)
 
 Float = NDArray[np.float64]
 
 
+class Column(NamedTuple):
+    """The points of a cloud round the ray through a pixel.
+
+    view: of the picture. ids: (n,) indices in the file. positions: (n, 3), relative to the view's origin.
+    offsets: (n, 2), pixels to the right and down from the pixel's centre. depths: (n,), in terms of the view.
+    away: (n,), distances from the ray, scan units. reach: all points of the cloud that are so near to the
+    ray are there, scan units. spacing: the usual distance between neighbours.
+    """
+
+    view: View
+    ids: NDArray[np.intp]
+    positions: Float
+    offsets: Float
+    depths: Float
+    away: Float
+    reach: float
+    spacing: float
+
+
 class LocalSurface(NamedTuple):
-    """The surface in the direction of a pixel, as points tell it.
+    """The surface on the ray through a pixel, as points tell it.
 
     depth: there, scan units. slope: (2,) change of depth per pixel to the right and down. deviation: standard
     deviation of `depth`, scan units. used: (n,) numbers of the points that gave it, the nearest first.
-    doubt: the chance that another surface is seen there, 0 to 1: the pixel lies beyond points of this one,
-    which may end before it, or of one before it, which may not. `deviation` holds how far apart they are.
+    spacing: distance between the points around it, scan units. doubt: the chance that another surface is seen
+    there, 0 to 1, such as where this one may end before the pixel.
     """
 
     depth: float
     slope: Float
     deviation: float
     used: NDArray[np.intp]
+    spacing: float
     doubt: float = 0.0
 
+    def lean(self, view: View) -> float:
+        """How much longer the surface is than it looks, 1 / cosine of its angle to the picture."""
+        return _lean(view, self.depth, self.slope)
 
-def local_surface(
-    view: View, pixel: Float, about: Float, positions: Float, seen: int | None = None
-) -> LocalSurface | None:
-    """The surface in the direction of a pixel; None where the points do not tell.
 
-    pixel: (2,) coordinates, the centre being at a half. about: (3,) a place of the surface near there, the
-    nearest points to which are looked at first. positions: (N, 3), in front of the eye; both relative to the
-    view's origin. seen: the number of the point that has to belong to it. Where that surface ends or bends
-    away before the pixel, which a splat beyond its edge shows, it is the one behind. Where it may end there,
-    it is the likelier of both.
+class Unclear(Enum):
+    """Why points tell no surface: they are few; they fill space; the column is too narrow to hold those that
+    would tell it."""
+
+    FEW = "few"
+    THICK = "thick"
+    NARROW = "narrow"
+
+
+class _Around(NamedTuple):
+    """Points around the ray that may form a surface: their numbers, the nearest first; which belong; depth
+    and slope of their paraboloid on the ray; deviation of the points across it, scan units; its mean
+    curvature times two, 1 / scan units; how far the points reach, scan units."""
+
+    near: NDArray[np.intp]
+    belongs: NDArray[np.bool_]
+    depth: float
+    slope: Float
+    noise: float
+    curvature: float
+    reach: float
+
+
+def local_surface(column: Column, start: float) -> LocalSurface | Unclear:
+    """The surface of the points that are nearest to the ray at a depth.
+
+    The depth that is found may lie beside the start: the points are looked for again around it.
     """
-    if len(positions) < LEAST:
-        return None
-    pixels, depths = view.project(positions)
-    front = None
-    for _ in range(_BEHIND + 1):
-        found, reach = _fitted(view, pixel, about, positions, pixels - pixel, depths, seen)
-        if front is not None:
-            return _either(front, found)
-        if found is not None:
-            if not found.doubt:
-                return found
-            front = found
-        if not reach:
+    around: _Around | Unclear = Unclear.FEW
+    for count, thickest in _THICKEST.items():
+        if count == MOST or len(column.ids) > count or np.isfinite(column.reach):
+            around = _around(column, start, count, thickest)
+        if around is not Unclear.THICK:
             break
-        # Of what lies farther back, what the picture has nearest to the pixel.
-        behind = depths > (view.depths(about) if front is None else front.depth) + reach
-        if not behind.any():
-            break
-        seen = int(np.where(behind, np.hypot(*(pixels - pixel).T), np.inf).argmin())
-        about = positions[seen]
-    return front
+    if isinstance(around, Unclear):
+        return around
+    used = around.near[around.belongs][:MOST]
+    found = _plate(column, around, used)
+    if found is None:
+        return Unclear.FEW
+    # Noise along the normals moves points of a bent surface apart on one side and together on the other, so
+    # that the mean of them lies to that side. Which way noise goes is not known.
+    lean = found.lean(column.view)
+    aside = around.noise**2 * around.curvature * lean
+    return found._replace(deviation=float(np.hypot(found.deviation, aside)))
 
 
-def _either(front: LocalSurface, behind: LocalSurface | None) -> LocalSurface:
-    """The likelier of a surface that may end before the pixel and the one behind it. That it may be the other
-    adds to the variance as much as they are apart, squared, by its chance."""
-    if behind is None:
-        return front
-    likelier, doubt = (front, front.doubt) if front.doubt <= 0.5 else (behind, 1 - front.doubt)
-    apart = np.sqrt(doubt) * (behind.depth - front.depth)
-    return likelier._replace(deviation=float(np.hypot(likelier.deviation, apart)), doubt=doubt)
-
-
-def _fitted(
-    view: View,
-    pixel: Float,
-    about: Float,
-    positions: Float,
-    offsets: Float,
-    depths: Float,
-    seen: int | None,
-) -> tuple[LocalSurface | None, float]:
-    """The surface about a place; and, where it is not met in the direction of the pixel, how far its points
-    reach, else 0."""
-    start, place, is_seen = float(view.depths(about)), about, seen is None
+def _around(column: Column, start: float, count: int, thickest: float) -> _Around | Unclear:
+    """The points that are nearest to the ray along their surface, by several rounds. start: where that is
+    looked for at first. thickest: how noisy they may be, in terms of how far they reach."""
+    view, depth, slope, noise, spacing = column.view, start, np.zeros(2), 0.0, column.spacing
     for _ in range(_ROUNDS):
-        distances = np.linalg.norm(positions - place, axis=1)
-        near = np.argsort(distances, kind="stable")[: MOST + 1]
-        reach = max(float(distances[near[-1]]), np.finfo(float).tiny)
-        near = near[:MOST]
-        closeness = (1 - np.minimum(distances[near] / reach, 1) ** 3) ** 3  # tricube
-        slope, off, belongs, deeper = _parabola(offsets[near], depths[near] - start, closeness)
-        is_seen |= seen in near[belongs]
-        if view.perspective and start + deeper <= 0:
-            return None, 0.0
-        place = view.unproject(pixel[None], np.array([start + deeper]))[0]
-        if np.linalg.norm(place - about) > reach:
-            return None, reach
-    used = near[belongs]
-    if len(used) < LEAST or not is_seen:
-        return None, 0.0
-    # Across the surface rather than along the ray.
-    lean = np.hypot(1, np.linalg.norm(slope) / view.footprint(start))
-    if np.sqrt(np.mean(off[belongs] ** 2)) / lean > _THICK * reach:
-        return None, 0.0  # they fill space
-    return _plate(view, offsets[used], depths[used], start, slope, used), reach
+        away = _distances(column, depth, slope, max(_WINDOW[0] * spacing, _WINDOW[1] * noise))
+        near = np.argsort(away, kind="stable")[: count + 1]
+        if len(near) <= LEAST and np.isinf(column.reach):
+            return Unclear.FEW
+        reach = max(float(away[near].max(initial=0.0)), np.finfo(float).tiny)
+        if reach > column.reach or (len(near) <= count and np.isfinite(column.reach)):
+            return Unclear.NARROW
+        near = near[:count]
+        closeness = (1 - np.minimum(away[near] / reach, 1) ** 3) ** 3 + _CLOSENESS  # tricube
+        factors, off, usual = _paraboloid(column.offsets[near], column.depths[near] - depth, closeness)
+        slope, depth = factors[1:3], depth + float(factors[0])
+        if view.perspective and depth <= 0:
+            return Unclear.FEW
+        lean = _lean(view, depth, slope)
+        noise, spacing = _NORMAL * usual / lean, reach * float(np.sqrt(np.pi / len(near)))
+        if abs(depth - start) > _FARTHEST * reach * lean:
+            return Unclear.FEW
+    belongs = (off <= _CUT * usual) | (usual <= 0)
+    if np.count_nonzero(belongs) < LEAST:
+        return Unclear.FEW
+    if noise > thickest * reach:
+        return Unclear.THICK
+    bend = 2 * float(factors[3] + factors[5]) if len(factors) > 3 else 0.0
+    curvature = bend / (float(view.footprint(depth)) ** 2 * lean**3)
+    return _Around(near, belongs, depth, slope, noise, curvature, reach)
 
 
-def _parabola(
-    offsets: Float, depths: Float, closeness: Float
-) -> tuple[Float, Float, NDArray[np.bool_], float]:
-    """Slope at the middle of a robust parabola (of few points, plane), how far points are off, (n,), which
-    belong, and the depth at the middle."""
+def _distances(column: Column, depth: float, slope: Float, window: float) -> Float:
+    """How far points are from a position on the ray, (n,): along the surface, as what lies across it within a
+    window may be noise; that beyond the window counts more."""
+    footprint = float(column.view.footprint(depth))
+    deeper = column.depths - depth
+    across = (deeper - column.offsets @ slope) / _lean(column.view, depth, slope)
+    squared = (column.offsets**2).sum(axis=1) * footprint**2 + deeper**2
+    along = np.sqrt(np.maximum(squared - across**2, 0))
+    return np.hypot(along, _BEYOND * np.maximum(np.abs(across) - window, 0))
+
+
+def _lean(view: View, depth: float, slope: Float) -> float:
+    return float(np.hypot(1, np.linalg.norm(slope) / view.footprint(depth)))
+
+
+def _paraboloid(offsets: Float, depths: Float, closeness: Float) -> tuple[Float, Float, float]:
+    """A robust paraboloid (of few points, plane): its factors of 1, x, y, xx, xy, yy, how far points are off
+    it, (n,), and the median of that."""
     scale = max(float(np.abs(offsets).max()), np.finfo(float).tiny)
     x, y = (offsets / scale).T
-    terms = [np.ones_like(x), x, y, *([x * x, x * y, y * y] if len(x) >= _SURE else [])]
+    bent = len(x) >= _SURE
+    terms = [np.ones_like(x), x, y, *([x * x, x * y, y * y] if bent else [])]
     factors, weights = np.stack(terms, axis=1), closeness
     for round_ in range(_REWEIGHTED + 1):
         root = np.sqrt(weights)
@@ -148,49 +197,79 @@ def _parabola(
             break
         share = np.minimum(off / (_CUT * usual), 1)
         weights = closeness * (1 - share**2) ** 2  # bisquare
-    return found[1:3] / scale, off, weights > 0, float(found[0])
+    found[1:3] /= scale
+    found[3:] /= scale**2
+    return found, off, usual
 
 
-def _plate(
-    view: View, offsets: Float, depths: Float, start: float, slope: Float, used: NDArray[np.intp]
-) -> LocalSurface | None:
-    """The thin plate through the points, at the middle."""
+def _plate(column: Column, around: _Around, used: NDArray[np.intp]) -> LocalSurface | None:
+    """The thin plate through points, on the ray; None where they lie on a line or in one place."""
     # Distances are along the surface: where it is steep, points next to each other in the picture are far
     # apart.
-    footprint = view.footprint(start)
-    along = np.linalg.cholesky(footprint**2 * np.eye(2) + np.outer(slope, slope))
-    sides = _ASIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
-    flat = np.concatenate([offsets, sides]) @ along
-    doubt = _chance_of_end(flat[: len(offsets)])
+    footprint = float(column.view.footprint(around.depth))
+    along = np.linalg.cholesky(footprint**2 * np.eye(2) + np.outer(around.slope, around.slope))
+    flat = np.concatenate([column.offsets[used], _SIDES]) @ along
+    count = len(used)
+    doubt = _chance_of_end(flat[:count])
     scale = float(np.sqrt((flat**2).sum(axis=1).max()))
-    flat, count = flat / scale, len(offsets)
-    bending = _bending(flat, flat[:count])
-    lines = np.column_stack([np.ones(len(flat)), flat])
-    values = (depths - start) / scale
+    flat /= scale
+    x, y = flat.T
+    terms = [np.ones_like(x), x, y, *([x * x, x * y, y * y] if count >= _BENT else [])]
+    found = _predicted(
+        _bending(flat, flat[:count]), np.stack(terms, axis=1), (column.depths[used] - around.depth) / scale
+    )
+    if found is None:
+        return None
+    means, variance = found
+    slope = scale * np.array([means[1] - means[2], means[3] - means[4]]) / (2 * _ASIDE)
+    depth = around.depth + scale * float(means[0])
+    spacing = around.reach * float(np.sqrt(np.pi / len(around.near)))
+    return LocalSurface(depth, slope, scale * float(np.sqrt(variance)), used, spacing, doubt)
 
-    free = np.linalg.qr(lines[:count], mode="complete")[0][:, 3:]  # what no plane explains
-    stiffness, modes = np.linalg.eigh(free.T @ bending[:count] @ free)
+
+def _predicted(bending: Float, terms: Float, values: Float) -> tuple[Float, float] | None:
+    """Values at some places, and the variance of the first, by kriging.
+
+    bending: (n + m, n), between n points and m places and the points. terms: (n + m, t), of the trend there.
+    values: (n,), of the points. Each noise counts by how likely it makes the values.
+    """
+    count, trend = len(values), terms.shape[1]
+    basis, triangle = np.linalg.qr(terms[:count], mode="complete")
+    corner = np.diag(triangle)
+    if np.abs(corner).min() <= _EXACT * np.abs(corner).max():
+        return None  # the points do not tell the trend
+    among, between = bending[:count], bending[count:].T
+    free = basis[:, trend:]
+    stiffness, modes = np.linalg.eigh(free.T @ among @ free)
     usual = float(stiffness.mean())
     if not usual > 0:
         return None  # all in one place
-    power = (modes.T @ (free.T @ values)) ** 2
-    noise, variance = _likeliest(np.maximum(stiffness, 0), power, usual)
-
-    system = np.zeros((count + 3, count + 3))
-    system[:count, :count] = bending[:count] + noise * np.eye(count)
-    system[:count, count:], system[count:, :count] = lines[:count], lines[:count].T
-    asked = np.concatenate([bending[count:].T, lines[count:].T])
-    try:
-        weights = np.linalg.solve(system, asked)
-    except np.linalg.LinAlgError:
-        return None  # on a line
-    found = weights[:count].T @ values
-    open_ = max(0.0, -float(weights[:, 0] @ asked[:, 0]))
+    stiffness, modes = np.maximum(stiffness, 0), free @ modes
+    strength = modes.T @ values
+    noises, variances, chances = _likely(stiffness, strength**2, usual)
+    by_trend = basis[:, :trend] @ np.linalg.solve(triangle[:trend].T, terms[count:].T)
+    aside = modes.T @ (between - among @ by_trend)
+    shares = aside / (stiffness + noises[:, None])[:, :, None]  # (noises, modes, places)
+    means = by_trend.T @ values + np.einsum("nmp,m->np", shares, strength)
+    weights = by_trend[:, 0] + shares[:, :, 0] @ modes.T
+    left = np.einsum("ni,ij,nj->n", weights, among, weights) - 2 * weights @ between[:, 0]
+    left = np.maximum(left + noises * (weights**2).sum(axis=1), 0)
+    mean = chances @ means
     # The variance itself is known from so many numbers: that of Student's t.
-    known = len(power)
-    deviation = scale * np.sqrt(variance * open_ * known / (known - 2))
-    slope = scale * np.array([found[1] - found[2], found[3] - found[4]]) / (2 * _ASIDE)
-    return LocalSurface(start + scale * float(found[0]), slope, float(deviation), used, doubt)
+    known = len(strength)
+    within = variances * left * known / (known - 2)
+    return mean, float(chances @ (within + (means[:, 0] - mean[0]) ** 2))
+
+
+def _likely(stiffness: Float, power: Float, usual: float) -> tuple[Float, Float, Float]:
+    """(noises, variances, chances): noises in terms of bending, the variance of bending with each, and how
+    likely they are."""
+    noises = usual * np.maximum(np.array(_NOISES), _EXACT)
+    stiff = stiffness + noises[:, None]
+    variances = np.maximum((power / stiff).mean(axis=1), np.finfo(float).tiny)
+    likely = -0.5 * (len(power) * np.log(variances) + np.log(stiff).sum(axis=1))
+    chances = np.exp(np.maximum(likely - likely.max(), -700.0))
+    return noises, variances, chances / chances.sum()
 
 
 def _chance_of_end(flat: Float) -> float:
@@ -198,7 +277,8 @@ def _chance_of_end(flat: Float) -> float:
 
     Points by chance, one per s^2, leave out a strip of length s and width d in exp(-d / s) of cases.
     """
-    beyond = float((-flat @ _DIRECTIONS).min(axis=0).max())  # the way to where points are
+    nearest = flat[np.argsort((flat**2).sum(axis=1))[:_ROUND]]
+    beyond = float((-nearest @ _DIRECTIONS).min(axis=0).max())  # the way to where points are
     area = 4 * np.pi * np.sqrt(max(float(np.linalg.det(np.cov(flat.T))), 0.0))  # of an even ellipse
     if beyond <= 0 or area <= 0:
         return 0.0
@@ -209,12 +289,3 @@ def _bending(some: Float, others: Float) -> Float:
     """r^2 ln r for each of some places (M, 2) and others (N, 2), (M, N)."""
     squared = ((some[:, None] - others) ** 2).sum(axis=2)
     return 0.5 * squared * np.log(np.where(squared > 0, squared, 1.0))
-
-
-def _likeliest(stiffness: Float, power: Float, usual: float) -> tuple[float, float]:
-    """(noise, variance): the noise in terms of bending that is most likely, and the bending's variance."""
-    noises = usual * np.maximum(np.array(_NOISES), _EXACT)[:, None]
-    variances = np.maximum((power / (stiffness + noises)).mean(axis=1), np.finfo(float).tiny)
-    unlikely = len(power) * np.log(variances) + np.log(stiffness + noises).sum(axis=1)
-    best = int(unlikely.argmin())
-    return float(noises[best, 0]), float(variances[best])

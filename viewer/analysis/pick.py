@@ -1,7 +1,8 @@
 """Picking on what is seen: what one pixel of a Surface shows, never a point behind it.
 
-The renderer tells which surface is seen. Where it is, the points around tell (`local_surface`): the one that
-wins a pixel is the nearest of many, or lies beside it.
+The renderer tells roughly where. Which surface is seen (`front_layer`) and where it is (`local_surface`), the
+points of the cloud around the pixel's ray tell: the point that wins a pixel is the nearest of many, or lies
+beside it or behind them.
 """
 
 from __future__ import annotations
@@ -15,21 +16,21 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry import Vector, vector
 from ..gpu.constants import EMPTY, NOTHING
 from ..picture.surface import Surface
-from ..scan.points import PointCloud
-from ..scan.spacing import ENOUGH, nearest_rows, spacing_at
-from .local_surface import LocalSurface, local_surface
+from ..scan.rays import Ray
+from ..scan.spacing import ENOUGH, spacing_at
+from .front_layer import LEFT_OUT, front_layer, lie_all_round
+from .local_surface import Column, LocalSurface, Unclear
 from .words import SURE
 
-LEFT_OUT = 0.05  # the share beyond
 _REACH = 4  # pixels from points to the middle of a gap, where spacings are less
 _GAP = 1.5  # spacings from points to the middle of a gap between them, at most
 _BEHIND = (
     4.0,
     4.0,
 )  # spacings and distances in the picture that what is seen through a gap is behind it, at least
-_WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
-_AROUND = 3, 64  # pixels, at least and at most, in which points are looked for
-_SPACINGS = 3.0  # in which they are looked for: two dozen points
+_FARTHEST = 64  # pixels in which something is looked for
+_COLUMN = 10.0  # spacings from the ray to points that are looked at, at first
+_ENLARGED = 3  # times, to twice as many spacings each, where points are sparse
 _BETWEEN = 3.0  # spacings from a filled place to points of its surface, at most, all round it
 FOLLOWED = 8  # of them are kept, to follow
 
@@ -123,10 +124,9 @@ def pick(
     depth, row, level = surface.texel(across, down)
     if level == EMPTY:
         return None
-    view, place, pixel = surface.view, surface.layers.world_from_pose, np.array([x + 0.5, y + 0.5])
-    ids, points = surface.points_around(across, down, _reach(surface, depth))
+    place, pixel = surface.layers.world_from_pose, np.array([x + 0.5, y + 0.5])
+    column, found = _seen(surface, pixel, depth)
     if row == NOTHING:
-        found = local_surface(view, pixel, view.unproject(pixel[None], np.array([depth]))[0], points)
         if found is not None:  # the renderer's word stands; how far the points disagree counts
             found = found._replace(
                 depth=depth, deviation=float(np.hypot(found.deviation, found.depth - depth))
@@ -134,15 +134,11 @@ def pick(
         return Picked(
             _position(surface, pixel, depth),
             level,
-            *_shown_by(surface, pixel, found, ids, points),
-            between=found is not None and _is_between(surface, pixel, found, points),
+            *_shown_by(surface, pixel, found, column),
+            between=found is not None and _is_between(surface, pixel, found, column.positions),
         )
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
     id_ = at if cloud.ids is None else int(cloud.ids[at])
-    found = _through(surface, pixel, ids, points, id_)
-    if found is None and spacing and len(ids) < ENOUGH:
-        ids, points = _nearest(surface, cloud, at)
-        found = _through(surface, pixel, ids, points, id_)
     if found is None:
         pixel = np.array([across + 0.5, down + 0.5])
         depth = _measured_depth(surface, cloud, at, depth)
@@ -153,7 +149,7 @@ def pick(
     return Picked(
         _position(surface, pixel, depth if found is None else found.depth),
         level,
-        *_shown_by(surface, pixel, found, ids, points),
+        *_shown_by(surface, pixel, found, column),
         doubt=0.0 if found is None else found.doubt,
         row=row,
         id=id_,
@@ -186,37 +182,37 @@ def _is_between(
     if not len(near) or SURE * found.deviation > _BETWEEN * spacing:
         return False
     across, down = (surface.view.project(near)[0] - pixel).T
-    return _lie_all_round(down, across)
+    return lie_all_round(down, across)
 
 
-def _through(
-    surface: Surface, pixel: NDArray[np.float64], ids: NDArray[np.intp], points: NDArray[np.float64], id_: int
-) -> LocalSurface | None:
-    """The surface of points that one belongs to, in the direction of a pixel."""
-    seen = int(np.argmax(ids == id_))
-    return local_surface(surface.view, pixel, points[seen], points, seen)
+def _seen(surface: Surface, pixel: NDArray[np.float64], depth: float) -> tuple[Column, LocalSurface | None]:
+    """The points round the ray through a place of the picture, and the surface that they show there; None
+    where they do not tell. depth: what the picture shows."""
+    usual = surface.scanned.pose.spacing
+    for enlarged in range(_ENLARGED + 1):
+        reach = _COLUMN * usual * 2**enlarged
+        column = _column(surface, pixel, depth, reach)
+        if enlarged == _ENLARGED:
+            column = column._replace(reach=np.inf)
+        found = front_layer(column, depth)
+        if found is not Unclear.NARROW and found is not Unclear.FEW:
+            break
+    return column, None if isinstance(found, Unclear) else found
 
 
-def _reach(surface: Surface, depth: float) -> int:
-    """How many pixels to each side have some rings of points at a depth."""
-    least, most = _AROUND
-    return int(np.clip(np.ceil(_SPACINGS * _pitch(surface, depth)), least, most))
+def _column(surface: Surface, pixel: NDArray[np.float64], depth: float, reach: float) -> Column:
+    """The points that are so near to the ray through a place of the picture, scan units."""
+    view = surface.view
+    ids, points = surface.points_along(pixel, depth, reach)
+    pixels, depths = view.project(points)
+    ray = Ray(view.unproject(pixel[None], np.array([depth]))[0], view.along(pixel))
+    usual = surface.scanned.pose.spacing
+    return Column(view, ids, points, pixels - pixel, depths, ray.away(points), reach, usual)
 
 
 def _pitch(surface: Surface, depth: float) -> float:
     """The usual distance between points at a depth, pixels."""
     return float(surface.scanned.pose.spacing / surface.view.footprint(depth))
-
-
-def _nearest(surface: Surface, cloud: PointCloud, at: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """The points nearest to one, each place once: indices in the file, positions as `points_around` has
-    them."""
-    rows = nearest_rows(cloud, at)
-    rows = rows[np.unique(cloud.positions[rows], axis=0, return_index=True)[1]]
-    points = cloud.world(rows) - surface.view.origin
-    ahead = surface.view.depths(points) > surface.view.near
-    ids = rows if cloud.ids is None else cloud.ids[rows].astype(np.intp)
-    return ids[ahead], points[ahead]
 
 
 def _position(surface: Surface, pixel: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
@@ -229,8 +225,7 @@ def _shown_by(
     surface: Surface,
     pixel: NDArray[np.float64],
     found: LocalSurface | None,
-    ids: NDArray[np.intp],
-    points: NDArray[np.float64],
+    column: Column,
 ) -> tuple[NDArray[np.float64] | None, tuple[Neighbor, ...]]:
     """Covariance and neighbours of a place on a local surface.
 
@@ -249,8 +244,10 @@ def _shown_by(
     deeper = surface.layers.world_from_pose.directions(surface.view.along(pixel)) * found.deviation
     off = np.column_stack([*(side / np.sqrt(12) for side in aside), deeper])
     kept = found.used[:FOLLOWED]
-    offsets = surface.layers.world_from_pose.points(points[kept] + surface.view.origin) - position
-    neighbors = (Neighbor(id, vector(offset)) for id, offset in zip(ids[kept].tolist(), offsets, strict=True))
+    offsets = surface.layers.world_from_pose.points(column.positions[kept] + surface.view.origin) - position
+    neighbors = (
+        Neighbor(id, vector(offset)) for id, offset in zip(column.ids[kept].tolist(), offsets, strict=True)
+    )
     return off @ off.T, tuple(neighbors)
 
 
@@ -266,7 +263,7 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     depth = shown if np.isfinite(shown) else _nearest_depth(surface, x, y)
     if not np.isfinite(depth):
         return x, y
-    reach = int(np.clip(np.ceil(_GAP * _pitch(surface, depth)), _REACH, _AROUND[1]))
+    reach = int(np.clip(np.ceil(_GAP * _pitch(surface, depth)), _REACH, _FARTHEST))
     depths = surface.depth_around(x, y, reach)
     spacings, steepness = _BEHIND
     away = _distances(reach)
@@ -277,7 +274,7 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
     down, across = (
         np.argwhere((away <= max(reach, np.sqrt(2) * _REACH)) & (depths < shown - behind)).T - reach
     )
-    if not _lie_all_round(down, across):
+    if not lie_all_round(down, across):
         return x, y
     nearest = np.argmin(down**2 + across**2)
     meant = x + int(across[nearest]), y + int(down[nearest])
@@ -286,7 +283,7 @@ def before_gap(surface: Surface, x: int, y: int) -> tuple[int, int]:
 
 def _nearest_depth(surface: Surface, x: int, y: int) -> float:
     """The depth at the nearest pixel that shows something; +inf where none within `_AROUND` does."""
-    reach = _AROUND[1]
+    reach = _FARTHEST
     depths = surface.depth_around(x, y, reach)
     return float(depths.flat[np.where(np.isfinite(depths), _distances(reach), np.inf).argmin()])
 
@@ -298,12 +295,6 @@ def _distances(reach: int) -> NDArray[np.float64]:
 
 def _has(surface: Surface, x: int, y: int) -> bool:
     return 0 <= x < surface.size[0] and 0 <= y < surface.size[1]
-
-
-def _lie_all_round(down: NDArray[np.intp], across: NDArray[np.intp]) -> bool:
-    """Whether places lie round the origin in all directions; not so on one side of a line."""
-    angles = np.sort(np.arctan2(down, across))
-    return len(angles) > 0 and bool(np.diff(angles, append=angles[0] + 2 * np.pi).max() < _WIDEST)
 
 
 def are_seen(

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..scan.points import PointCloud
+from ..scan.rays import Ray
 from ..task import Task, in_background
 from ..view import View
 from .context import Gpu
@@ -72,6 +73,15 @@ class Ordered:
         for chunk in chunks:
             listed[self.rows[chunk * self.chunk : (chunk + 1) * self.chunk]] = True
         return np.flatnonzero(listed).astype(np.uint32)
+
+    def along(self, ray: Ray, reach: float) -> NDArray[np.intp]:
+        """The chunks whose boxes come so near to a ray, (C,) ascending.
+
+        ray: relative to the cloud's origin. reach: scan units.
+        """
+        low, high = self.low.astype(np.float64), self.high.astype(np.float64)
+        radii = np.linalg.norm(high - low, axis=1) / 2
+        return np.flatnonzero(ray.away((low + high) / 2) <= radii + reach)
 
     def numbers(self, size: int) -> NDArray[np.uint32]:
         """The number of the chunk of so many points that each row is in, (N,), where rows are in an order of
@@ -179,6 +189,21 @@ class Chunks:
         if not view.may_show(*whole, margin + _SLACK).any():
             return np.empty(0, np.intp)
         return np.flatnonzero(view.may_show(low, high, margin + _SLACK))
+
+    def rows_along(self, ray: Ray, reach: float) -> NDArray[np.uint32] | None:
+        """The rows, in any order, of the chunks that come so near to a ray; None for all.
+
+        ray: relative to the cloud's origin.
+        """
+        cloud = self._pose.stored
+        if len(cloud) < LEAST:
+            return None
+        order = self._known_order(cloud)
+        if order is None or order.is_scattered:
+            return None
+        chunks = order.along(ray, reach)[:, None] * order.chunk + np.arange(order.chunk)
+        places = chunks[chunks < len(cloud)]
+        return places.astype(np.uint32) if order.rows is None else order.rows[places]
 
     def take_order(self) -> Ordered | None:
         """The order that points stay in from now on, if chunks are small in it; None where there are few

@@ -15,9 +15,12 @@ from ..gpu.chunks import Chunks
 from ..gpu.pose import GpuPose
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
+from ..scan.rays import Ray, rows_along
 from ..view import View
 from .counts import Counted, cloud_counted, samples_counted
 from .laid_over import laid_over
+
+_ENOUGH = 64  # samples near a place that tell of the surface there
 
 Find = Callable[[NDArray], NDArray]  # values (n, ...) of rows (n,)
 
@@ -130,7 +133,24 @@ class PointRows:
     def file_points(self, rows: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Indices in the file (n,) and positions (n, 3), relative to the view's origin, of the points that
         rows stand for, as measures use them."""
-        points, scan = self.points(rows), self.measured
+        return self._of_scan(self.points(rows), view)
+
+    def points_along(
+        self, ray: Ray, reach: float, view: View, seen: Callable[[], NDArray[np.intp]]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """The same of the points of the scan that are so near to a ray, whether they are seen or not.
+
+        ray: relative to the view's origin. seen: gives the rows that pixels around show.
+        """
+        scan = self.measured
+        moved = Ray(ray.start + (view.origin - scan.origin), ray.step)
+        are_drawn = scan is self.scanned.stored
+        some = self.scanned.cached(Chunks).rows_along(moved, reach) if are_drawn else None
+        return self._of_scan(rows_along(scan, moved, reach, some), view)
+
+    def _of_scan(self, points: NDArray[np.intp], view: View) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """Indices in the file and positions of points of the scan, as `file_points` gives them."""
+        scan = self.measured
         ids = points if scan.ids is None else scan.ids[points]
         return ids.astype(np.intp), scan.world(points) - view.origin
 
@@ -247,6 +267,18 @@ class SampleRows(PointRows):
     def frames(self, rows: NDArray) -> NDArray[np.uint8] | None:
         average = self.pose.pose.average
         return None if average is None else average.counts[rows]
+
+    def points_along(
+        self, ray: Ray, reach: float, view: View, seen: Callable[[], NDArray[np.intp]]
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """The points that pixels around show, and those near the ray's start: no others are at hand."""
+        rows, points = self.file_points(seen(), view)
+        near = self.pose.pose.measured.range_points.around(ray.start + view.origin, _ENOUGH)
+        assert near.ids is not None
+        ids = np.concatenate([rows, near.ids.astype(np.intp)])
+        points = np.concatenate([points, near.world() - view.origin])
+        once = np.unique(ids, return_index=True)[1]
+        return ids[once], points[once]
 
 
 def _scalar(cloud: PointCloud, name: str, zero: float) -> NDArray[np.float32]:

@@ -16,9 +16,12 @@ from ..gpu.constants import EMPTY, NOTHING
 from ..gpu.context import Gpu
 from ..look import Look, rgba
 from ..scan.points import PointCloud
+from ..scan.rays import Ray
 from ..srgb import linear_from_bytes
 from .counts import count_points
 from .target import RenderTarget
+
+_AROUND = 3, 64  # pixels, at least and at most, in which samples of range views are looked for
 
 
 class Texel(NamedTuple):
@@ -118,11 +121,30 @@ class Surface(RenderTarget):
         outside the picture."""
         return self._around(self.depths.buffer, np.float32(np.inf), x, y, reach)
 
-    def points_around(self, x: int, y: int, reach: int) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """The points of the scan that are seen round pixel (x, y), each once: (n,) their indices in the file,
-        (n, 3) their positions relative to the view's origin. reach: pixels to each side."""
+    def points_along(
+        self, pixel: NDArray[np.float64], depth: float, reach: float
+    ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+        """The points of the scan round the ray through a place of the picture (2,), before the eye, each
+        position once: (n,) their indices in the file, ascending, and (n, 3) positions relative to the view's
+        origin.
+
+        depth: what the picture shows there; of range views, only points near that and those that are seen
+        around come, so that none are merged. reach: distance from the ray, scan units.
+        """
+        ray = Ray(self.view.unproject(pixel[None], np.array([depth]))[0], self.view.along(pixel))
+        beside = int(np.clip(np.ceil(reach / self.view.footprint(depth)), *_AROUND))
+        x, y = pixel.astype(int).tolist()
+        ids, points = self.kind.points_along(ray, reach, self.view, partial(self._rows_around, x, y, beside))
+        ahead = self.view.depths(points) > self.view.near
+        ids, points = ids[ahead], points[ahead]
+        once = np.unique(points, axis=0, return_index=True)[1]
+        once = once[np.argsort(ids[once])]
+        return ids[once], points[once]
+
+    def _rows_around(self, x: int, y: int, reach: int) -> NDArray[np.intp]:
+        """The rows that pixels round one show, each once."""
         rows = np.unique(self._around(self.rows.buffer, np.uint32(NOTHING), x, y, reach))
-        return self.kind.file_points(rows[rows != NOTHING].astype(np.intp), self.view)
+        return rows[rows != NOTHING].astype(np.intp)
 
     def _around(self, buffer: moderngl.Buffer, empty: np.generic, x: int, y: int, reach: int) -> NDArray:
         """Words of the pixels round one, in one read; `empty` outside the picture."""
