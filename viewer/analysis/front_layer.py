@@ -39,6 +39,8 @@ def front_layer(column: Column, shown: float) -> LocalSurface | Unclear:
         return Unclear.NARROW
     if not found:
         return unclear.get(shown, Unclear.FEW)
+    if _chances(found).sum() < LEFT_OUT:
+        return Unclear.FEW
     if _hides(column, found, [start for start, why in unclear.items() if why is Unclear.THICK]):
         return Unclear.THICK
     return _likeliest(found)
@@ -96,19 +98,22 @@ def _hides(column: Column, found: list[LocalSurface], starts: list[float]) -> bo
 
 
 def _likeliest(found: list[LocalSurface]) -> LocalSurface:
-    """The most likely of surfaces from front to back: each is seen where none before it is, and it does not
-    end. What lies behind them all counts as none."""
-    chances, passed = [], 1.0
-    for surface in found:
-        chances.append(passed * (1 - surface.doubt))
-        passed *= surface.doubt
-    shares = np.array(chances) / sum(chances)
+    """The most likely of surfaces from front to back. What lies behind them all counts as none."""
+    chances = _chances(found)
+    shares = chances / chances.sum()
     likeliest = found[int(shares.argmax())]
     likeliest = likeliest._replace(doubt=float(1 - shares.max()))
     if likeliest.doubt <= LEFT_OUT:
         return likeliest
     apart = shares @ (np.array([surface.depth for surface in found]) - likeliest.depth) ** 2
     return likeliest._replace(deviation=float(np.hypot(likeliest.deviation, np.sqrt(apart))))
+
+
+def _chances(found: list[LocalSurface]) -> NDArray[np.float64]:
+    """The chance that each of some surfaces, from front to back, is seen: where none before it is, and it
+    does not end."""
+    doubts = np.array([surface.doubt for surface in found])
+    return np.cumprod(np.append(1.0, doubts[:-1])) * (1 - doubts)
 
 
 def lie_all_round(down: NDArray, across: NDArray) -> bool:

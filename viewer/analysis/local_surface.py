@@ -37,6 +37,7 @@ _THICKEST = {MOST: 0.18, 2 * MOST: 0.3, 4 * MOST: 0.4}
 _NOISES = (0.0, *(10.0 ** (n / 2) for n in range(-6, 5)))  # variances that are tried, of noise to bending
 _EXACT = 1e-9  # of the bending, added where there is no noise: so that rounding does not count
 _ROUND = 12  # nearest points that lie all round a place in the surface (99.4 % of cases by chance)
+_RIDGE = 1e-13  # of the trace of normal equations, that is added to their diagonal
 _CLOSENESS = 1e-9  # weight of the farthest point
 _ASIDE = 0.5  # pixels to each side, between which the slope is taken
 _SIDES = _ASIDE * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1]])
@@ -139,7 +140,7 @@ def _around(column: Column, start: float, count: int, thickest: float) -> _Aroun
     view, depth, slope, noise, spacing = column.view, start, np.zeros(2), 0.0, column.spacing
     for _ in range(_ROUNDS):
         away = _distances(column, depth, slope, max(_WINDOW[0] * spacing, _WINDOW[1] * noise))
-        near = np.argsort(away, kind="stable")[: count + 1]
+        near = _least(away, count + 1)
         if len(near) <= LEAST and np.isinf(column.reach):
             return Unclear.FEW
         reach = max(float(away[near].max(initial=0.0)), np.finfo(float).tiny)
@@ -176,6 +177,14 @@ def _distances(column: Column, depth: float, slope: Float, window: float) -> Flo
     return np.hypot(along, _BEYOND * np.maximum(np.abs(across) - window, 0))
 
 
+def _least(values: Float, count: int) -> NDArray[np.intp]:
+    """Numbers of the least values, ascending."""
+    if len(values) <= count:
+        return np.argsort(values, kind="stable")
+    some = np.sort(np.argpartition(values, count)[:count])
+    return some[np.argsort(values[some], kind="stable")]
+
+
 def _lean(view: View, depth: float, slope: Float) -> float:
     return float(np.hypot(1, np.linalg.norm(slope) / view.footprint(depth)))
 
@@ -189,10 +198,12 @@ def _paraboloid(offsets: Float, depths: Float, closeness: Float) -> tuple[Float,
     terms = [np.ones_like(x), x, y, *([x * x, x * y, y * y] if bent else [])]
     factors, weights = np.stack(terms, axis=1), closeness
     for round_ in range(_REWEIGHTED + 1):
-        root = np.sqrt(weights)
-        found = np.linalg.lstsq(factors * root[:, None], depths * root, rcond=None)[0]
+        weighted = factors.T * weights
+        square = weighted @ factors
+        square.flat[:: len(square) + 1] += _RIDGE * np.trace(square)  # of points on a line
+        found = np.linalg.solve(square, weighted @ depths)
         off = np.abs(depths - factors @ found)
-        usual = float(np.median(off))
+        usual = float(np.partition(off, len(off) // 2)[len(off) // 2])
         if round_ == _REWEIGHTED or usual <= 0:
             break
         share = np.minimum(off / (_CUT * usual), 1)

@@ -27,6 +27,7 @@ _CHUNK = 1 << 6  # points at least
 LEAST = 1 << 18  # points of a pose, below which looking at all of them takes next to no time
 _ON_CARDS = 16  # times as many on graphics cards: they look at all points sooner than Python lists chunks
 MOST = 0.5  # share of the points from which on all are looked at, as that needs no list
+_FEW = 0.1  # the same of points near a ray, which are fetched one by one
 # Mean size of the boxes, in that of the pose: from where on another order is worth a second of a thread,
 # and from where on an order is of no use.
 _LOOSE, _SCATTERED = 0.15, 0.5
@@ -201,7 +202,10 @@ class Chunks:
         order = self._known_order(cloud)
         if order is None or order.is_scattered:
             return None
-        chunks = order.along(ray, reach)[:, None] * order.chunk + np.arange(order.chunk)
+        near = order.along(ray, reach)
+        if len(near) > _FEW * len(order.low):
+            return None
+        chunks = near[:, None] * order.chunk + np.arange(order.chunk)
         places = chunks[chunks < len(cloud)]
         return places.astype(np.uint32) if order.rows is None else order.rows[places]
 
