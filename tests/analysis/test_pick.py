@@ -104,6 +104,48 @@ def test_picks_are_on_the_surface_though_the_nearest_wins_a_pixel(draw: Draw, wh
     assert np.mean(held) > 0.93
 
 
+NOISE = 0.3  # spacings
+
+
+@pytest.mark.parametrize("which", ["surfels", "points of a pixel", *rarely("voxels", "auto splats")])
+def test_under_noise_picks_are_on_the_surface_within_what_is_said(draw: Draw, which: str) -> None:
+    """The nearest of noisy points win the pixels, but all points of the cloud around tell of the surface."""
+    name, params = RENDERERS[which]
+    exact, size = sphere(20_000), (160, 120)
+    spacing = np.sqrt(4 * np.pi / len(exact))
+    away = 1 + np.random.default_rng(5).normal(scale=NOISE * spacing, size=(len(exact), 1))
+    cloud = PointCloud.from_arrays(exact.world() * away, normals=exact.normals)
+    camera = Camera.orbit(cloud.bounds(), 25, 40)
+    surface = draw(cloud, camera, size, name, params=params)
+    truth, shown = sphere_hits(camera, size)[0], surface.level == 0
+    off, held = [], []
+    facing = np.isfinite(truth) & (truth < np.nanmin(truth) + 0.5) & shown
+    for y, x in np.argwhere(facing)[:: max(1, int(facing.sum()) // 150)].tolist():
+        picked = pick(surface, x, y, shown=before_gap(surface, x, y))
+        assert picked is not None
+        assert picked.uncertainty is not None
+        off.append(-(camera.rotation() @ (picked.position - camera.eye))[2] - truth[y, x])
+        held.append(abs(off[-1]) <= picked.uncertainty)
+    assert len(held) > 100
+    assert abs(np.mean(off)) < 0.1 * spacing
+    assert np.mean(held) > 0.93
+
+
+def test_small_points_show_the_far_side_and_picks_the_near_one(draw: Draw) -> None:
+    cloud, size = sphere(4_000), (240, 180)
+    camera = Camera.orbit(cloud.bounds(), 25, 40)
+    surface = draw(cloud, camera, size, "points", params={"point_size": 1})
+    truth = sphere_hits(camera, size)[0]
+    far = np.isfinite(truth) & (truth < np.nanmin(truth) + 0.4) & (surface.depth > truth + 1)
+    assert far.sum() > 300
+    for y, x in np.argwhere(far & (surface.level == 0))[::40].tolist():
+        picked = pick(surface, x, y, shown=before_gap(surface, x, y))
+        assert picked is not None
+        assert np.linalg.norm(picked.position) == pytest.approx(1, abs=0.01)
+        assert (camera.eye - picked.position) @ picked.position > 0, "on the near side"
+        assert not picked.at_outline
+
+
 @pytest.mark.parametrize("projection", CAMERAS)
 def test_every_point_is_picked_at_its_own_pixel(draw: Draw, projection: str) -> None:
     rng = np.random.default_rng(3)

@@ -40,7 +40,7 @@ def test_it_says_where_another_surface_may_be_meant() -> None:
         describe_pick(Picked(np.zeros(3), level=0, doubt=doubt), "", Scale("m"), 1.0)
         for doubt in (0.04, 0.06)
     ]
-    assert [("at an outline" in some) for some in words] == [False, True]
+    assert [(any("in front or behind" in word for word in some)) for some in words] == [False, True]
 
 
 def test_what_was_filled_is_no_point() -> None:

@@ -84,7 +84,7 @@ def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown
     if not picked.measured:
         words.append(f"in a hole that the renderer filled from level {picked.level}")
     if picked.at_outline:
-        words.append("at an outline")
+        words.append(f"may be the surface in front or behind ({picked.doubt:.0%})")
     return words
 
 

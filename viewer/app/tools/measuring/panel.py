@@ -79,6 +79,6 @@ def _end_words(end: SurfacePoint, scale: Scale) -> str:
     spacing = "unknown" if end.spacing is None else f"{scale.factor * end.spacing:.3g} {scale.unit}"
     seen = f", in a hole that the renderer filled from level {end.level}" if end.level else ""
     seen += f", on an average of {end.averaged} frames" if end.averaged else ""
-    seen += ", at an outline: the point may lie on the surface in front or behind" if end.at_outline else ""
+    seen += ", may be the surface in front or behind" if end.at_outline else ""
     sure = "" if end.uncertainty is None else f" ± {scale.factor * end.uncertainty:.2g}"
     return f"{what}, {frame_in_words(end.frame)}: {position}{sure} {scale.unit}, spacing {spacing}{seen}"
