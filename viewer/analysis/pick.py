@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..geometry import Vector, vector
 from ..gpu.constants import EMPTY, NOTHING
 from ..picture.surface import Surface
+from ..scan.points import PointCloud
 from ..scan.rays import Ray
 from ..scan.spacing import ENOUGH, spacing_at
 from .front_layer import LEFT_OUT, front_layer, lie_all_round
@@ -113,10 +114,10 @@ def pick(
 ) -> Picked | None:
     """Pick what pixel (x, y) shows, row 0 at the top; None where it shows nothing or is none of the picture.
 
-    Reads a few lines of pixels around from the GPU. shown: the pixel that shows the surface which is meant,
-    where it is another one (`before_gap`). spacing: whether to find the spacing too, which looks at every
-    point of the cloud (see `spacing_at`), or of range views at the pixels around; where few points are seen,
-    those that it finds tell of the surface.
+    Reads a pixel from the GPU, and looks at the points of the cloud once; of range views, at those that
+    pixels around show. shown: the pixel that shows the surface which is meant, where it is another one
+    (`before_gap`). spacing: whether to find the spacing too, which looks at every point once more (see
+    `spacing_at`).
     """
     across, down = shown or (x, y)
     if not (_has(surface, x, y) and _has(surface, across, down)):
