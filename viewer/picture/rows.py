@@ -138,7 +138,8 @@ class PointRows:
     def points_along(
         self, ray: Ray, reach: float, view: View, seen: Callable[[], NDArray[np.intp]]
     ) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-        """The same of the points of the scan that are so near to a ray, whether they are seen or not.
+        """Indices in the file (n,) and positions (n, 3), relative to the view's origin, of the points of the
+        scan that are so near to a ray, whether they are seen or not.
 
         ray: relative to the view's origin. seen: gives the rows that pixels around show.
         """
