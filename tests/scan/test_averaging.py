@@ -118,16 +118,50 @@ def test_the_first_frame_is_as_scanned() -> None:
     assert made.average.share == 0
 
 
-def test_points_without_correspondence_are_as_scanned() -> None:
-    """Rows of frames that were sampled anew are other places."""
-    poses = []
-    for frame in range(FRAMES):
-        rows = np.random.default_rng(frame).permutation(COUNT)
-        poses.append(Pose(frame, 0.0, "", PointCloud.from_arrays(SPHERE[rows])))
+def resampled(frame: int, step: float, sigma: float = SIGMA) -> Pose:
+    """Other points of the sphere in each frame, whose top moves up by so many deviations a frame."""
+    rng = np.random.default_rng((3, frame))
+    normals = rng.normal(size=(COUNT + 10 * frame, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    points = normals * (10 + sigma * rng.normal(size=(len(normals), 1)))
+    points[normals[:, 2] > 0.7] += (0, 0, step * SIGMA * frame)
+    return Pose(frame, 0.0, "", PointCloud.from_arrays(points, origin=np.zeros(3), precise=False))
+
+
+def test_frames_without_common_points_are_averaged_along_the_normal() -> None:
+    poses = [resampled(frame, 0.0) for frame in range(FRAMES)]
     made = average(poses)
-    assert np.array_equal(made.cloud.positions, poses[-1].cloud.positions)
     assert made.average is not None
-    assert made.average.matched == "nothing"
+    assert made.average.matched == "surface"
+    assert made.average.share > 0.85
+    still = made.average.counts > 1
+    before, after = (np.linalg.norm(pose.cloud.positions, axis=1)[still] - 10 for pose in (poses[-1], made))
+    assert after.std() < before.std() / 2
+    assert abs(after.mean()) < SIGMA / 5
+    moved = made.cloud.positions - poses[-1].cloud.positions
+    along = np.abs(np.einsum("ij,ij->i", moved, poses[-1].cloud.positions)) / 10
+    assert along[still] == pytest.approx(np.linalg.norm(moved[still], axis=1), rel=0.05, abs=0.02 * SIGMA)
+
+
+@pytest.mark.parametrize("step", [5, 30])
+def test_moving_surfaces_keep_their_bits(step: float) -> None:
+    poses = [resampled(frame, step) for frame in range(FRAMES)]
+    made = average(poses)
+    assert made.average is not None
+    raised = poses[-1].cloud.positions / 10
+    top = np.linalg.norm(raised - (0, 0, 0.1 * step * SIGMA * (FRAMES - 1)), axis=1) < 1.05
+    top &= raised[:, 2] > 0.9 + 0.1 * step * SIGMA * (FRAMES - 1)
+    assert top.sum() > 50
+    assert (made.average.counts[top] == 1).mean() > 0.98
+    one = made.average.counts == 1
+    assert np.array_equal(made.cloud.positions[one], poses[-1].cloud.positions[one])
+
+
+def test_without_noise_a_surface_stays_where_it_is() -> None:
+    poses = [resampled(frame, 0.0, sigma=0.0) for frame in range(FRAMES)]
+    made = average(poses)
+    spacing = np.sqrt(4 * np.pi * 100 / COUNT)
+    assert np.abs(np.linalg.norm(made.cloud.positions, axis=1) - 10).mean() < 0.02 * spacing
 
 
 def test_dropped_points_are_matched_by_their_ids() -> None:

@@ -12,12 +12,16 @@ is far smaller than the noise of one point.
 * If a cell drifts steadily within its run, none of its points is averaged.
 
 A point whose run is one frame keeps its very bits.
+
+Frames may hold other points of the surface, in no common order. Then the mean surface of each cell takes the
+place of the point in the tests, and points move along the normal only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import chain, islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -30,7 +34,7 @@ from .range_points import RangePoints
 from .range_view import RangeView
 
 if TYPE_CHECKING:
-    from .averaging_kernels import Frames
+    from .averaging_kernels import Frames, Grid
 
 MOST_FRAMES = 64
 _OCCUPIED = 8.0, 16.0, 32.0  # points of a cell: at least, wanted and at most, on average
@@ -44,6 +48,7 @@ _UNUSUAL = 2.5  # times the usual noise, beyond which points of a cell move diff
 _APART = 1.0  # spacings that rows of one place are apart at most, in most cells
 _CUT = 1.4  # times the points of a cell that a plane through its middle has
 _SAME_ROWS = 0.5  # share of the ids that two frames have in common at least
+_PRESENT = 0.25  # of the points of a cell that another frame has there at least
 _SHORTEST = 4  # frames of a run that motion ended; in a shorter one, points may still move
 _ROUNDING = float(4 * np.finfo(np.float32).eps)
 _SHARES = np.divide(1, np.maximum(np.arange(256), 1)).astype(np.float32)
@@ -169,12 +174,13 @@ class _Runs:
 @dataclass(frozen=True)
 class _Cells:
     """Cells of points. labels: (N,) int32, the cell of each point. spacing: of the points, about. farthest:
-    the largest coordinate."""
+    the largest coordinate. grid: of cubic cells."""
 
     labels: NDArray[np.int32]
     count: int
     spacing: float
     farthest: float = 0.0
+    grid: Grid | None = None
 
     @classmethod
     def of(cls, positions: NDArray[np.float32]) -> _Cells:
@@ -186,19 +192,26 @@ class _Cells:
         least, wanted, most = _OCCUPIED
         edge = float((ends[:, 1] - low).max()) * np.sqrt(_PER_EXTENT * wanted / len(positions)) or 1.0
         for _ in range(_TRIALS):
-            count = label_cells(positions, low, edge, labels)
+            grid = label_cells(positions, low, edge, labels)
+            count = len(grid.codes)
             points = len(positions) / count
             if least <= points <= most:
                 break
             edge *= np.sqrt(wanted / points)
-        return cls(labels, count, edge / np.sqrt(_CUT * points), float(np.abs(ends).max()))
+        return cls(labels, count, edge / np.sqrt(_CUT * points), float(np.abs(ends).max()), grid)
 
 
 def _of_cloud(cloud: PointCloud, earlier: Iterable[Pose]) -> _Made:
     """The averaged points of a cloud."""
     if len(cloud) < _FEWEST:
         return _Made(cloud, np.ones(len(cloud), np.uint8), "rows")
-    cells = _Cells.of(cloud.positions)
+    cells, poses = _Cells.of(cloud.positions), iter(earlier)
+    first = list(islice(poses, 1))
+    return _by_rows(cloud, cells, chain(first, poses)) or _by_surface(cloud, cells, chain(first, poses))
+
+
+def _by_rows(cloud: PointCloud, cells: _Cells, earlier: Iterable[Pose]) -> _Made | None:
+    """The averaged points of a cloud whose rows are the same points in all frames, else None."""
     runs = _Runs(cloud.positions, cells.labels, cells.count, _ROUNDING * cells.farthest)
     colors = None if cloud.colors is None else _of_numbers(cloud.colors, cells, _STEP)
     normals = None if cloud.normals is None else _of_numbers(cloud.normals, cells, np.inf)
@@ -206,11 +219,13 @@ def _of_cloud(cloud: PointCloud, earlier: Iterable[Pose]) -> _Made:
         checkpoint()
         then = pose.cloud
         rows = _common_rows(cloud, then)
+        if rows is None and number == 1:
+            return None
         if rows is None:
             break
         joined = runs.add(number, rows.of(then.positions), then.origin - cloud.origin, rows.is_there)
         if number == 1 and cloud.topology is None and np.sqrt(runs.usual) > _APART * cells.spacing:
-            return _Made(cloud, np.ones(len(cloud), np.uint8), "nothing")
+            return None
         if colors is not None and then.colors is not None:
             colors.add(number, rows.of(then.colors), np.zeros(3), joined)
         if normals is not None and then.normals is not None:
@@ -227,6 +242,55 @@ def _of_cloud(cloud: PointCloud, earlier: Iterable[Pose]) -> _Made:
     if normals is not None:
         changed["normals"] = _unit(normals.means(still), still)
     return _Made(replace(cloud, **changed), runs.run.counts, "rows")
+
+
+def _by_surface(cloud: PointCloud, cells: _Cells, earlier: Iterable[Pose]) -> _Made:
+    """The averaged points of a cloud if other frames have other points of the surface.
+
+    In a cell that stands still, each point moves along the normal to the mean of the surfaces of the frames.
+    Colours stay as scanned.
+    """
+    from .averaging_kernels import fit_cells, move_to_surface, smooth_planes, sum_moments
+
+    assert cells.grid is not None
+    sums = np.zeros((cells.count, 10), np.float32)
+    sum_moments(cloud.positions, np.zeros(3, np.float32), cells.grid, sums)
+    planes = np.empty((cells.count, 7))
+    fit_cells(sums.astype(np.float64), planes)
+    known = planes[np.isfinite(planes[:, 6]), 6]
+    usual = float(np.median(known)) if len(known) else 0.0
+    is_plane = planes[:, 6] <= _UNUSUAL**2 * usual
+    variances = np.where(is_plane, planes[:, 6], usual) + (_ROUNDING * cells.farthest / cells.grid.edge) ** 2
+    pooled, frames, is_open = sums.astype(np.float64), np.ones(cells.count, np.uint8), is_plane.copy()
+    for pose in earlier:
+        checkpoint()
+        then = np.zeros_like(sums)
+        shift = (pose.cloud.origin - cloud.origin).astype(np.float32)
+        sum_moments(pose.cloud.positions, shift, cells.grid, then)
+        apart = _along(planes, then) - _along(planes, pooled)
+        is_there = then[:, 0] >= np.maximum(_FEWEST, _PRESENT * sums[:, 0])
+        with np.errstate(divide="ignore"):
+            limits = _TOGETHER**2 * variances * (1 / then[:, 0] + 1 / pooled[:, 0])
+        is_open &= ~is_there | (np.square(apart) <= limits)
+        joins = is_open & is_there
+        pooled[joins] += then[joins]
+        frames[joins] += 1
+        if not is_open.any():
+            break
+    frames[~is_open & (frames < _SHORTEST)] = 1
+    pooled[frames == 1] = sums[frames == 1]
+    near = np.empty((cells.count, 27), np.int32)
+    smooth = smooth_planes(cells.grid, pooled, near)
+    counts = frames[cells.labels]
+    limits = _ALONE * np.sqrt(variances)
+    moved = move_to_surface(cloud.positions, cells.labels, cells.grid, smooth, near, limits, counts)
+    return _Made(replace(cloud, positions=moved), counts, "surface")
+
+
+def _along(planes: NDArray[np.float64], sums: NDArray[np.floating]) -> NDArray[np.float64]:
+    """How far the mean points of cells lie off planes, (M,); 0 where there is no point."""
+    means = sums[:, 1:4] / np.maximum(sums[:, :1], 1)
+    return np.einsum("ij,ij->i", means - planes[:, :3], planes[:, 3:6])
 
 
 def _of_numbers(values: NDArray, cells: _Cells, rounding: float) -> _Runs:

@@ -19,7 +19,7 @@ from .spacing import ENOUGH, roughness, typical_spacing
 from .upright import Upright, guess_up
 
 Scanned = PointCloud | tuple[RangeView, ...]  # what a frame holds
-Matched = Literal["rows", "pixels", "surface", "nothing"]  # by what points of two frames are the same
+Matched = Literal["rows", "pixels", "surface"]  # by what points of two frames are the same
 
 _TELEPHOTO = 0.5  # degrees from bottom to top, below which rays may be as good as parallel
 
@@ -36,7 +36,7 @@ class Average:
 
     raw: the pose as scanned. frames: how many frames count at most. counts: (N,) uint8, how many frames each
     point is the mean of, by row of the cloud, or by sample of the range views (0: it sees no point).
-    matched: by what the frames were matched; "nothing": their points have nothing in common. is_measured:
+    matched: by what the frames were matched; "surface": their points have no common order. is_measured:
     whether measures use the averaged points.
     """
 

@@ -59,8 +59,6 @@ class FrameAveraging(WindowPart):
         average = None if pose is None else pose.average
         if average is None:
             return "Averaging..." if self.waits else ""
-        if average.matched == "nothing":
-            return "Frames have no points in common: no average"
         if average.usual == 1:
             return "No point stands still: no average"
         return f"{100 * average.share:.0f} % of the points stand still: mean of {average.usual} frames"
