@@ -34,7 +34,7 @@ from .range_points import RangePoints
 from .range_view import RangeView
 
 if TYPE_CHECKING:
-    from .averaging_kernels import Frames, Grid
+    from .averaging_kernels import CellGrid, Frames
 
 MOST_FRAMES = 64
 _OCCUPIED = 8.0, 16.0, 32.0  # points of a cell: at least, wanted and at most, on average
@@ -180,7 +180,7 @@ class _Cells:
     count: int
     spacing: float
     farthest: float = 0.0
-    grid: Grid | None = None
+    grid: CellGrid | None = None
 
     @classmethod
     def of(cls, positions: NDArray[np.float32]) -> _Cells:

@@ -53,7 +53,7 @@ def _find(code: int, table: NDArray[np.int64], codes: NDArray[np.int64]) -> int:
     return slot
 
 
-class Grid(NamedTuple):
+class CellGrid(NamedTuple):
     """Numbered cubic cells. low: (3,) float32, the corner of the first. edge: of a cell. table: number of the
     cell by slot. codes: (M,) of the cells, 21 bits for each coordinate."""
 
@@ -66,7 +66,7 @@ class Grid(NamedTuple):
 @compiled
 def label_cells(
     points: NDArray[np.float32], low: NDArray[np.float32], edge: float, labels: NDArray[np.int32]
-) -> Grid:
+) -> CellGrid:
     """Number the cubic cells that points (N, 3) lie in, in the order of their first points.
 
     low: (3,), the corner of the first cell. labels: (N,), written; a cell farther than 2^21 edges off counts
@@ -95,12 +95,12 @@ def label_cells(
             table[slot] = count
             count += 1
         labels[i] = table[slot]
-    return Grid(low, edge, table, codes[:count])
+    return CellGrid(low, edge, table, codes[:count])
 
 
 @compiled
 def sum_moments(
-    points: NDArray[np.float32], shift: NDArray[np.float32], grid: Grid, sums: NDArray[np.float32]
+    points: NDArray[np.float32], shift: NDArray[np.float32], grid: CellGrid, sums: NDArray[np.float32]
 ) -> None:
     """Sum the moments of points (N, 3) in the cells of a grid, in edges from the corner of each cell.
 
@@ -163,7 +163,7 @@ def _spline(apart: float) -> float:
 
 
 @compiled
-def smooth_planes(grid: Grid, sums: NDArray[np.float64], near: NDArray[np.int32]) -> NDArray[np.float64]:
+def smooth_planes(grid: CellGrid, sums: NDArray[np.float64], near: NDArray[np.int32]) -> NDArray[np.float64]:
     """Fit planes to the points of each cell and the cells around, as `fit_cells` has them.
 
     sums: (M, 10), as `sum_moments` has them. near: (M, 27), written: the numbers of the cells around, x
@@ -200,7 +200,7 @@ def smooth_planes(grid: Grid, sums: NDArray[np.float64], near: NDArray[np.int32]
 def move_to_surface(
     points: NDArray[np.float32],
     labels: NDArray[np.int32],
-    grid: Grid,
+    grid: CellGrid,
     planes: NDArray[np.float64],
     near: NDArray[np.int32],
     limits: NDArray[np.float64],
