@@ -41,9 +41,12 @@ def front_layer(column: Column, shown: float) -> LocalSurface | Unclear:
         return unclear.get(shown, Unclear.FEW)
     if _chances(found).sum() < LEFT_OUT:
         return Unclear.FEW
-    if _hides(column, found, [start for start, why in unclear.items() if why is Unclear.THICK]):
+    likeliest = _likeliest(found)
+    if unclear.get(shown) is Unclear.THICK and shown < likeliest.depth - _BEHIND * column.spacing:
         return Unclear.THICK
-    return _likeliest(found)
+    if _hides(column, found, [start for start, why in unclear.items() if why is not Unclear.FEW]):
+        return Unclear.THICK
+    return likeliest
 
 
 def _surfaces(column: Column, shown: float) -> tuple[list[LocalSurface], dict[float, Unclear]]:

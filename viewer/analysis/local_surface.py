@@ -26,7 +26,7 @@ _BENT = 14  # from so many points on, the surface bends beside a paraboloid; bes
 _ROUNDS = 4  # of looking for the points nearest to the position that was found
 _WINDOW = 1.5, 4.0  # spacings and deviations to each side of a surface in which its points are looked for
 _BEYOND = 3.0  # times as far as it is, what lies beyond that
-_FARTHEST = 4.0  # reaches of the points from the start to the surface, at most
+_DRIFT = 2.0, 4.0  # spacings and deviations from the start to the surface, at most
 _REWEIGHTED = 2  # times
 _CUT = 6.0  # median absolute residuals beyond which a point does not belong (Cleveland 1979)
 _NORMAL = 1.4826  # standard deviation of a normal distribution, in median absolute residuals
@@ -88,10 +88,11 @@ class LocalSurface(NamedTuple):
 
 
 class Unclear(Enum):
-    """Why points tell no surface: they are few; they fill space; the column is too narrow to hold those that
-    would tell it."""
+    """Why points tell no surface: they are few; they fill space; they tell one elsewhere; the column is too
+    narrow to hold those that would tell it."""
 
     FEW = "few"
+    AWAY = "away"
     THICK = "thick"
     NARROW = "narrow"
 
@@ -154,8 +155,8 @@ def _around(column: Column, start: float, count: int, thickest: float) -> _Aroun
             return Unclear.FEW
         lean = _lean(view, depth, slope)
         noise, spacing = _NORMAL * usual / lean, reach * float(np.sqrt(np.pi / len(near)))
-        if abs(depth - start) > _FARTHEST * reach * lean:
-            return Unclear.FEW
+    if abs(depth - start) > (_DRIFT[0] * spacing + _DRIFT[1] * noise) * lean:
+        return Unclear.AWAY
     belongs = (off <= _CUT * usual) | (usual <= 0)
     if np.count_nonzero(belongs) < LEAST:
         return Unclear.FEW

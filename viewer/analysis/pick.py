@@ -128,15 +128,17 @@ def pick(
     place, pixel = surface.layers.world_from_pose, np.array([x + 0.5, y + 0.5])
     column, found = _seen(surface, pixel, depth)
     if row == NOTHING:
-        if found is not None:  # the renderer's word stands; how far the points disagree counts
+        between = found is not None and _is_between(surface, pixel, found, column.positions)
+        if found is not None and not between:  # the renderer's word stands; how far points disagree counts
             found = found._replace(
                 depth=depth, deviation=float(np.hypot(found.deviation, found.depth - depth))
             )
         return Picked(
-            _position(surface, pixel, depth),
+            _position(surface, pixel, depth if found is None else found.depth),
             level,
             *_shown_by(surface, pixel, found, column),
-            between=found is not None and _is_between(surface, pixel, found, column.positions),
+            doubt=0.0 if found is None else found.doubt,
+            between=between,
         )
     cloud, at = surface.point_at(row, least=ENOUGH if spacing else 1)
     id_ = at if cloud.ids is None else int(cloud.ids[at])
