@@ -85,15 +85,16 @@ def test_view_passes_everything_to_the_window(run: Run, scans: Path, monkeypatch
     )
     monkeypatch.setenv("DISPLAY", ":7")
     ball = str(scans / "ball.npz")
-    assert run("view", ball, "demo", "--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1).code == 0
+    stated = ("--unit", "mm", "--fps", 12, "--up", "-z", "--device", 1, "--average", 8)
+    assert run("view", ball, "demo", *stated).code == 0
     assert run("view").code == 0
     opened = [options.pop("opened") for _, options in calls]
     assert [timeline.name for timeline in opened] == ["ball.npz", "demo"], "opened once, and handed over"
     assert (opened[0].unit, opened[0].times[0]) == ("mm", 0.0)
-    nothing = {"replay": None, "session": None, "refused": None, "corrections": {}, "average": None}
+    nothing = {"replay": None, "session": None, "refused": None, "corrections": {}}
     assert calls == [
-        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, **nothing}),
-        (["demo"], {"unit": None, "fps": None, "up": None, "device": None, **nothing}),
+        ([ball, "demo"], {"unit": "mm", "fps": 12, "up": "-z", "device": 1, "average": 8, **nothing}),
+        (["demo"], {"unit": None, "fps": None, "up": None, "device": None, "average": None, **nothing}),
     ]
 
 
