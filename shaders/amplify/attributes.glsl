@@ -13,6 +13,11 @@ layout(location = 3) in vec4 in_axes;
 #else
 const vec4 in_axes = vec4(0.0);
 #endif
+#if HAS_CELLS
+layout(location = 5) in vec4 in_cell;
+#else
+const vec4 in_cell = vec4(0.0);
+#endif
 
 #ifdef FED_COLOR
 layout(location = 4) in vec4 in_color;
@@ -22,5 +27,5 @@ Point attribute_point(int i) {
 #ifdef FED_COLOR
     fed_color = in_color.rgb;
 #endif
-    return Point(in_position, in_normal, in_radius, in_axes, uint(i));
+    return Point(in_position, in_normal, in_radius, in_axes, in_cell, uint(i));
 }

@@ -4,6 +4,7 @@ struct Point {
     vec3 normal;    // as stored
     float radius;   // as stored, 0 where the scan has none
     vec4 axes;      // one half-axis, and the length of the other; 0 where the splat is round
+    vec4 cell;      // as surfels/cell.glsl reads it; 0 where the point is the splat's centre and nothing ends it
     uint row;
 };
 

@@ -4,7 +4,7 @@
 #include "amplify/radii.glsl"
 
 #if REORDERED
-// Two texels a point, three with half-axes: position and radius; normal and row; half-axes.
+// Two to four texels a point: position and radius; normal and row; half-axes and cell where points have these.
 layout(binding = TEXTURE_ARRANGED) uniform usamplerBuffer arranged;
 #else
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
@@ -13,6 +13,9 @@ layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 #if HAS_AXES
 layout(binding = TEXTURE_AXES) uniform samplerBuffer axes;
+#endif
+#if HAS_CELLS
+layout(binding = TEXTURE_CELLS) uniform samplerBuffer cells;
 #endif
 #endif
 #ifdef FED_COLOR
@@ -33,14 +36,21 @@ int drawn_row(int i) {
 
 Point texel_point(int at) {
 #if REORDERED
-    at *= 2 + HAS_AXES;
+    at *= 2 + HAS_AXES + HAS_CELLS;
     uvec4 first = texelFetch(arranged, at), second = texelFetch(arranged, at + 1);
 #if HAS_AXES
     vec4 half_axes = uintBitsToFloat(texelFetch(arranged, at + 2));
 #else
     const vec4 half_axes = vec4(0.0);
 #endif
-    return Point(uintBitsToFloat(first.xyz), uintBitsToFloat(second.xyz), uintBitsToFloat(first.w), half_axes, second.w);
+#if HAS_CELLS
+    vec4 cell = uintBitsToFloat(texelFetch(arranged, at + 3));
+#else
+    const vec4 cell = vec4(0.0);
+#endif
+    return Point(
+        uintBitsToFloat(first.xyz), uintBitsToFloat(second.xyz), uintBitsToFloat(first.w), half_axes, cell, second.w
+    );
 #else
     vec3 position = texelFetch(positions, at).xyz;
     float radius = stored_radius(at);
@@ -60,6 +70,11 @@ Point texel_point(int at) {
 #else
     const vec4 half_axes = vec4(0.0);
 #endif
-    return Point(position, normal, radius, half_axes, uint(at));
+#if HAS_CELLS
+    vec4 cell = texelFetch(cells, at);
+#else
+    const vec4 cell = vec4(0.0);
+#endif
+    return Point(position, normal, radius, half_axes, cell, uint(at));
 #endif
 }

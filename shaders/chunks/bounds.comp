@@ -1,7 +1,9 @@
 // What the splats of each chunk have in common: the box round their points; a cone round their normals, its middle and the
-// cosine of how far any is off it, -1 where one is unknown; and the longest of the radii that are known.
+// cosine of how far any is off it, -1 where one is unknown; and the longest of the radii that are known,
+// with how far the middle of a splat is off its point.
 #include "common/item.glsl"
 #include "chunks/point.glsl"
+#include "surfels/cell.glsl"
 
 layout(std430, binding = STORAGE_BOXES) writeonly buffer Boxes { float boxes[]; };  // lower corner, upper corner
 layout(std430, binding = STORAGE_CONES) writeonly buffer Cones { vec4 cones[]; };
@@ -16,6 +18,9 @@ float reach_of(Point point) {
 #if HAS_AXES
     float longer = max(length(point.axes.xyz), point.axes.w);
     reach = longer > 0.0 ? longer : reach;
+#endif
+#if HAS_CELLS
+    reach *= 1.0 + length(cell_offset(point.cell.x));
 #endif
     return is_known(reach) ? reach : 0.0;
 }

@@ -7,7 +7,7 @@
 precise vec3 disc_center, disc_normal;  // view space
 precise float disc_area;                // squared radius at the cut-off; of an ellipse, squared longer half-axis
 #if HAS_AXES
-precise vec3 disc_u, disc_v;  // half-axes at the cut-off, view space
+precise vec3 disc_u, disc_v;  // conjugate half-axes at the cut-off, view space
 #endif
 
 // False where it shows nothing: it faces away and such are left out, or it is thinner than a line.
@@ -21,9 +21,18 @@ bool begin_disc(Point point) {
     disc_normal = mat3(world_to_view) * n;
 #if HAS_AXES
     vec3 u, v;
-    precise vec2 lengths = splat_axes(point, n, -disc_center.z, u, v) * sqrt(mask_limit);
+    precise float cut_off = sqrt(mask_limit);
+    precise vec2 lengths = splat_axes(point, n, -disc_center.z, u, v);
+#if !HAS_CELLS
+    lengths *= cut_off;
+#endif
     disc_u = mat3(world_to_view) * u * lengths.x;
     disc_v = mat3(world_to_view) * v * lengths.y;
+#if HAS_CELLS
+    fit_to_cell(point, disc_normal, disc_center, disc_u, disc_v);
+    disc_u *= cut_off;
+    disc_v *= cut_off;
+#endif
 #endif
     precise float facing = dot(disc_normal, to_eye);
     if (cull_back && facing <= 0.0) return false;
@@ -34,14 +43,6 @@ bool begin_disc(Point point) {
 vec2 disc_range() {
     return -disc_center.z + sqrt(disc_area) * vec2(-1.0, 1.0);
 }
-
-#if HAS_AXES
-// A vector of the disc's plane in half-axes.
-vec2 in_disc(vec3 offset) {
-    precise vec2 local = vec2(dot(offset, disc_u) / dot(disc_u, disc_u), dot(offset, disc_v) / dot(disc_v, disc_v));
-    return local;
-}
-#endif
 
 // (key at the centre; its change a pixel right and down), a reversed depth-buffer value.
 // form: a, b, c; a pixel (x, y) off the centre is inside where a x^2 + 2 b x y + c y^2 <= key^2 in
@@ -62,7 +63,7 @@ vec3 disc_key(out precise vec3 form) {
         key = vec3(view_reach - depth, right.z, down.z) / (view_reach - view_near);
     }
 #if HAS_AXES
-    precise vec2 x = in_disc(right), y = in_disc(down);
+    precise vec2 x = in_half_axes(right, disc_u, disc_v), y = in_half_axes(down, disc_u, disc_v);
     form = vec3(dot(x, x), dot(x, y), dot(y, y));
 #else
     form = vec3(dot(right, right), dot(right, down), dot(down, down)) / disc_area;

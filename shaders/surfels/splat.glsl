@@ -2,6 +2,7 @@
 #include "common/view.glsl"
 #include "common/tangent.glsl"
 #include "amplify/point.glsl"
+#include "surfels/cell.glsl"
 // splatting/splats.py.
 #include <params>
 
@@ -60,4 +61,50 @@ vec2 splat_axes(Point point, vec3 n, float depth, out precise vec3 u, out precis
 #endif
     v = cross(n, u);  // the paper prints n x a, which is -u
     return lengths;
+}
+
+#if HAS_CELLS
+const float LEAST_SHARE = 0.15;  // of a splat's width that a neighbour's plane leaves
+
+// Move the middle of a splat from its point to that of its cell, and draw the splat in where the plane of a neighbour ends
+// the surface: where one of both planes faces the eye and the other does not, the splat would stick out of the outline. The side
+// towards the neighbour moves to the plane, and the opposite side stays. All in view space. n: normal of the splat; u, v: half-axes,
+// conjugate ones afterwards.
+void fit_to_cell(Point point, vec3 n, inout precise vec3 center, inout precise vec3 u, inout precise vec3 v) {
+    precise vec3 from = center;
+    float depth = -center.z, least = least_radius / scale_at(max(depth, view_near));
+    float longer = max(length(u), length(v));
+    precise vec3 along = normalize(u), across = normalize(v);
+    bool faces = dot(n, towards_eye(from)) > 0.0;
+    vec2 offset = cell_offset(point.cell.x);
+    center += offset.x * u + offset.y * v;
+    for (int k = 0; k < CELL_PLANES; ++k) {
+        float code = point.cell[k + 1];
+        vec3 plane = cell_plane(code);
+        precise vec3 to = cos(plane.x) * along + sin(plane.x) * across;
+        precise float end = plane.z * longer;
+        vec3 neighbor = cos(plane.y) * n + sin(plane.y) * to;
+        bool ends = code > 0.0 && (dot(neighbor, towards_eye(from + end * to)) > 0.0) != faces;
+        precise vec2 parts = vec2(dot(u, to), dot(v, to));
+        precise float half_width = max(length(parts), 1e-30);
+        precise float share = (end - dot(center - from, to)) / (2.0 * half_width) + 0.5;
+        share = ends ? clamp(share, min(max(LEAST_SHARE, least / half_width), 1.0), 1.0) : 1.0;
+        precise vec3 side = (share - 1.0) * (parts.x * u + parts.y * v) / half_width;
+        center += side;
+        u += side * (parts.x / half_width);
+        v += side * (parts.y / half_width);
+    }
+}
+#endif
+
+// A vector of a splat's plane in its half-axes u and v.
+vec2 in_half_axes(vec3 offset, vec3 u, vec3 v) {
+    precise vec2 local, squares = vec2(dot(u, u), dot(v, v)), parts = vec2(dot(offset, u), dot(offset, v));
+#if HAS_CELLS
+    precise float mixed = dot(u, v), divisor = squares.x * squares.y - mixed * mixed;
+    local = (squares.yx * parts - mixed * parts.yx) / divisor;
+#else
+    local = parts / squares;
+#endif
+    return local;
 }

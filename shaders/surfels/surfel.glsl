@@ -20,7 +20,7 @@ vec4 part_in_picture() {
         float t = dot(n, surfel_center - from) / dot(n, along);
         if (!(abs(t) < UNKNOWN) || (view_perspective && t <= 0.0)) return vec4(-1.0, -1.0, 1.0, 1.0);
         vec3 off = from + t * along - surfel_center;
-        vec2 local = vec2(dot(off, surfel_u) / dot(surfel_u, surfel_u), dot(off, surfel_v) / dot(surfel_v, surfel_v));
+        vec2 local = in_half_axes(off, surfel_u, surfel_v);
         lowest = min(lowest, local);
         highest = max(highest, local);
     }
@@ -36,6 +36,15 @@ bool begin_shape(Point point) {
     vec3 n = splat_normal(point, to_eye);
     if (cull_back && dot(mat3(world_to_view) * n, to_eye) <= 0.0) return false;
 
+    vec3 u, v;
+    vec2 lengths = splat_axes(point, n, depth, u, v);
+    surfel_u = mat3(world_to_view) * u * lengths.x;
+    surfel_v = mat3(world_to_view) * v * lengths.y;
+#if HAS_CELLS
+    fit_to_cell(point, mat3(world_to_view) * n, surfel_center, surfel_u, surfel_v);
+    depth = -surfel_center.z;
+#endif
+
     // Out of view: not even the sphere around the splat's corners reaches the picture.
     float reach = 1.4142136 * splat_reach(point, depth);
     if (depth + reach < view_near) return false;
@@ -45,10 +54,6 @@ bool begin_shape(Point point) {
         if (any(lessThan(pixel, vec2(-margin))) || any(greaterThan(pixel, vec2(view_size) + margin))) return false;
     }
 
-    vec3 u, v;
-    vec2 lengths = splat_axes(point, n, depth, u, v);
-    surfel_u = mat3(world_to_view) * u * lengths.x;
-    surfel_v = mat3(world_to_view) * v * lengths.y;
     float usual = view_perspective ? depth : view_size.y / view_scale;
     surfel_part = reach > HUGE * usual ? part_in_picture() : vec4(-1.0, -1.0, 1.0, 1.0);
     return true;

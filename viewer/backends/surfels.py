@@ -261,7 +261,7 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
                 surface.stats.chosen["radius"] = (
                     "radii as large as the gaps between points, because the scan's own radii leave gaps open"
                 )
-            return _Sizes(True, gaps.usual, gaps.largest, {"radii": gaps.texels}), True
+            return _Sizes(True, gaps.usual, gaps.largest, gaps.buffers), True
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)
     uniform = 0.0 if suffices else _uniform_radius(pose)

@@ -31,6 +31,7 @@ class Texture(IntEnum):
     COLORS = auto()  # of a Surface where the backend wrote them
     RADII = auto()
     AXES = auto()
+    CELLS = auto()  # of points, that splats are fitted to
     SPLATS = auto()  # normal, radius and half-axes in three words
     IDS = auto()
     VALUES = auto()  # of a scalar
@@ -203,6 +204,9 @@ class Storage(IntEnum):
     # Splats that become smaller, beside the forms of tiles.
     RADII = 4
     DISCS = 5
+    # Gaps round points, beside radii, slots and a list.
+    CELL_AXES = 5
+    CELLS = 6
     # Hidden points, beside scatter and a list.
     POINT_SPOTS = 4
     HOMES = 5

@@ -34,12 +34,13 @@ _BLOCK_BYTES = 1 << 16  # of a uniform block; some drivers allow less or more
 _BLOCK_POINTS = 64  # ranges begin at multiples of 256 bytes, whatever a point takes
 Attributes = tuple[tuple[str, str, int], ...]
 # What a point has: name of the pose's array, of the vertex attribute, floats. The first two always, radii
-# where points bring their own, half-axes where these are elliptical.
+# where points bring their own, half-axes where these are elliptical, cells where splats are fitted to them.
 _ATTRIBUTES = (
     ("positions", "in_position", 3),
     ("normals", "in_normal", 3),
     ("radii", "in_radius", 1),
     ("axes", "in_axes", 4),
+    ("cells", "in_cell", 4),
 )
 _COLOR = ("colors", "in_color", 4)  # bytes, where the feed brings colours as well
 
@@ -73,6 +74,7 @@ class Points:
     ascending, or else `ListedRows`. enlarged: the factor on their size with which they together cover what
     all do.
     buffers: in place of the pose's arrays of these names, such as normals that a compute pass found;
+    "cells", what surfels/cell.glsl reads, beside "radii" and "axes";
     "splats", normal, radius and half-axes of each row in three words, as amplify/packed.glsl reads them,
     in place of all three, but for the radii where these are given as well; "looks", colour and normal as
     surfels/passes/look.glsl reads them. elliptical: whether the half-axes of "splats" count; else they
@@ -132,14 +134,19 @@ class Points:
         given = "axes" in self.buffers if "radii" in self.buffers else self.pose.has("axes")
         return self.use_radii and given
 
+    @property
+    def use_cells(self) -> bool:
+        """Whether splats are fitted to the cells of points."""
+        return self.use_axes and "cells" in self.buffers
+
     def array(self, name: str) -> gl.BufferTexture:
-        """positions, normals, radii, axes or splats, indexed by row."""
+        """positions, normals, radii, axes, cells or splats, indexed by row."""
         return self.buffers.get(name) or self.pose.array(name)
 
     @property
     def attributes(self) -> Attributes:
         """Attributes that are read of each: (name of the pose's array, of the vertex attribute, numbers)."""
-        read = _ATTRIBUTES[: 4 if self.use_axes else 3 if self.use_radii else 2]
+        read = _ATTRIBUTES[: 2 + self.use_radii + self.use_axes + self.use_cells]
         return (*read, _COLOR) if self.colored else read
 
     @property
@@ -153,6 +160,7 @@ class Points:
         return {
             "HAS_RADIUS": int(self.use_radii),
             "HAS_AXES": int(self.use_axes),
+            "HAS_CELLS": int(self.use_cells),
             "PACKED": int(self.packed),
             "RADII_APART": int(self.use_radii and (not self.packed or "radii" in self.buffers)),
             "SAMPLED": int(self.rows is not None),

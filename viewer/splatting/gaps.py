@@ -6,6 +6,10 @@ alone, so that it follows the density of the scan, and is found without a tree: 
 of a grid, and each looks at those of the 27 cells around. Where a scan is much sparser than elsewhere,
 the search goes on with larger cells.
 
+Where points lie unevenly, or the surface bends much between them, a disc around a point would reach beyond
+outlines. A fitted splat is an ellipse round the Voronoi cell, and its middle may lie beside the point. It
+knows up to three neighbours whose planes end it (shaders/surfels/cell.glsl).
+
 Radii that a scan stores are held to this at a sample of its points. Where they leave gaps, they are enlarged.
 """
 
@@ -14,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,10 +41,24 @@ _KNOWN = 0.6  # cells: the 27 around tell all of a radius of 0.5, and nearly alw
 _BORDER = 2.0  # times as far as a point's cell reaches to most sides: where it has no end
 _ROWS = 4.0  # times as far, where points lie in rows: to opposite sides alike
 _CELL = {"DIRECTIONS": 8, "KNOWN": _KNOWN, "BORDER": _BORDER, "ROWS": _ROWS}
-_ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out
 _SPARE = 1.2  # times the radii found: these go by some directions, in a plane
+_FIT = {
+    "SPARE_FIT": 1.3,  # times how far cells reach: how far ellipses do
+    "THINNEST": 16.0,  # times as long as wide, at first
+    "OPEN": 1.5,  # times as far as the rough ellipse: from where on a side has no end
+    "ROUNDS": 4,  # towards the smallest ellipse
+    "ROUND_SHARE": 0.75,  # of the disc's area, from which on the disc is drawn
+    "ROW": 2.0,  # times as long as wide: cells of points in rows
+    "SPARE": _SPARE,
+    "NEAR": 2.5,  # radii: how far neighbours are whose planes count
+    "SLACK": 0.1,  # radii that a splat may rise over their planes
+    "LEAST_CUT": 0.05,  # radii that it would rise higher
+}
+_ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out
 _STRAY = 4.0  # usual radii: what is farther from all others is beside the surface
 _FEW = 2000  # one in so many may be left without a radius of its own
+_FITTED = 0.1  # of the points: where fewer have a cell that a disc does not do for, all get discs
+_OFFSET_STEPS = 2047.0  # of a half-axis, as surfels/cell.glsl has it
 _SAMPLE = 1 << 13  # points, about, at which stored radii are looked at
 _OPEN = 0.1  # of these: where more have too small a radius, the scan's leave gaps
 _AT_ONCE = 1 << 18  # points searched before something else may have its turn
@@ -53,11 +71,13 @@ class GapRadii:
     texels: a radius for each row, scan units, once all are found; 0 where a point is far from all others: it
     is to be as large as usual. None where no point has any, where there are more points than the driver
     takes, and where the radii that the scan stores leave no gaps: else none is smaller than these.
-    usual, largest: the radius that nine of ten do not exceed, and that none does.
+    fitted: "axes" and "cells" of each row, as `Points.buffers` has them; empty where discs do for nearly all.
+    usual, largest: the radius that nine of ten do not exceed, and how far the largest splat reaches.
     """
 
     def __init__(self, pose: GpuPose) -> None:
         self.texels: gl.BufferTexture | None = None
+        self.fitted: dict[str, gl.BufferTexture] = {}
         self.usual = self.largest = 0.0
         self._steps: Generator[None, None, None] | None = None
         self._positions: gl.BufferTexture | None = None
@@ -66,12 +86,17 @@ class GapRadii:
     @property
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
-        return 0 if self.texels is None else self.texels.buffer.size
+        return sum(texels.buffer.size for texels in self.buffers.values())
+
+    @property
+    def buffers(self) -> dict[str, gl.BufferTexture]:
+        """What `Points.buffers` takes of them; empty where there are none."""
+        return {} if self.texels is None else {"radii": self.texels, **self.fitted}
 
     def release(self) -> None:
         """Delete them."""
-        if self.texels is not None:
-            self.texels.release()
+        for texels in self.buffers.values():
+            texels.release()
 
     def presumes_none(self, pose: GpuPose) -> bool:
         """Whether they are not known, and stored radii left no gaps in the last pose that was looked at, as
@@ -102,16 +127,51 @@ class GapRadii:
                 last.found_none = not search.leave_gaps(stored[rows], sample)
                 if last.found_none:
                     return
-            radii = (yield from search.radii())[copies]
-        known = radii[radii > 0]
+            found = yield from search.splats(trusted=pose.stored.normals is not None)
+        found = FittedSplats(*(array[copies] for array in found))
+        known = found.radii[found.radii > 0]
         if known.size:
-            usual = np.quantile(known, 0.9)
-            radii = np.where(radii > _STRAY * usual, np.float32(0), radii)
+            is_stray = found.radii > _STRAY * np.quantile(known, 0.9)
+            found.radii[is_stray] = 0
             if stored is not None:
-                radii = np.maximum(radii, stored)
-                usual = np.quantile(radii[radii > 0], 0.9)
-            self.usual, self.largest = float(usual), float(radii.max())
-            self.texels = gl.BufferTexture(pose.gpu.buffer(radii), gl.R32F)
+                is_small = found.radii < stored
+                found.radii[is_small] = stored[is_small]
+                is_stray |= is_small
+            self._take(pose.gpu, found, is_stray)
+
+    def _take(self, gpu: Gpu, found: FittedSplats, is_round: NDArray[np.bool_]) -> None:
+        """Upload what was found. is_round: rows whose splats are discs around their points, (N,)."""
+        radii, axes, cells = found
+        axes[is_round] = 0
+        cells[is_round] = 0
+        self.usual, self.largest = float(np.quantile(radii[radii > 0], 0.9)), float(radii.max())
+        self.texels = gl.BufferTexture(gpu.buffer(radii), gl.R32F)
+        if np.count_nonzero(cells.any(axis=1)) > _FITTED * len(cells):
+            self.largest = max(self.largest, float(found.reaches().max()))
+            self.fitted = {
+                name: gl.BufferTexture(gpu.buffer(array), gl.RGBA32F)
+                for name, array in (("axes", axes), ("cells", cells))
+            }
+
+
+class FittedSplats(NamedTuple):
+    """Splats of rows.
+
+    radii: (N,) float32, scan units, of discs; 0 where a point is alone. axes: (N, 4) float32, scan units,
+    half-axes of ellipses as a pose has them; 0 where a disc does. cells: (N, 4) float32, as
+    surfels/cell.glsl reads them.
+    """
+
+    radii: NDArray[np.float32]
+    axes: NDArray[np.float32]
+    cells: NDArray[np.float32]
+
+    def reaches(self) -> NDArray[np.float64]:
+        """At most how far ellipses reach from their points, (N,), scan units; 0 where a disc does."""
+        code = self.cells[:, 0].astype(np.uint32)
+        steps = np.stack([code & 4095, code >> 12]).astype(np.float64) - (_OFFSET_STEPS + 1)
+        offset = np.where(code > 0, np.hypot(*steps) / _OFFSET_STEPS, 0.0)
+        return np.linalg.norm(self.axes[:, :3], axis=1) * (1 + offset)
 
 
 class _LastLook:
@@ -158,14 +218,17 @@ class _Search:
         self._lists = 1 << max((count - 1).bit_length(), 8)
         self._bins, self._listed = Bins(gpu, self._lists + 2), IndexList(gpu, count)
         self._radii = gl.BufferTexture(gpu.buffer(reserve=4 * count), gl.R32F)
-        self._gpu.clear(self._radii.buffer, 0)
+        self._axes = gl.BufferTexture(gpu.buffer(reserve=16 * count), gl.RGBA32F)
+        self._cells = gl.BufferTexture(gpu.buffer(reserve=16 * count), gl.RGBA32F)
+        for texels in (self._radii, self._axes, self._cells):
+            gpu.clear(texels.buffer, 0)
         self._bins.reserve(count + count // 16)
         self._grid, shared = self._fit()
         self.crowded = shared > _MOST
 
     def release(self) -> None:
         """Delete what it holds."""
-        self._gpu.discard(self._bins, self._listed, self._radii)
+        self._gpu.discard(self._bins, self._listed, self._radii, self._axes, self._cells)
 
     def leave_gaps(self, radii: NDArray[np.float32], sample: NDArray[np.uint32]) -> bool:
         """Whether radii (N,), 0 where unknown, leave gaps, as far as a sample of the rows tells; at
@@ -173,14 +236,14 @@ class _Search:
         self._listed.write(sample)
         for _ in self._round(self._grid, self._visits(self._grid), self._listed, ended=True):
             pass
-        reach = self._read()
+        reach = self._read(self._radii)
         known = (reach > 0) & (radii > 0)
         return bool((radii < reach)[known].mean() > _OPEN) if known.any() else False
 
-    def radii(self) -> Generator[None, None, NDArray[np.float32]]:
-        """The radii (N,), 0 where a point is alone."""
+    def splats(self, *, trusted: bool) -> Generator[None, None, FittedSplats]:
+        """The splats of all rows. trusted: whether the scan stores normals."""
         grid = self._grid
-        yield from self._round(grid, self._visits(grid), None)
+        yield from self._round(grid, self._visits(grid), None, trusted=trusted)
         for _ in range(1, _ROUNDS):
             self._list_unknown()
             if len(self._listed) * _FEW <= self._count:
@@ -188,11 +251,12 @@ class _Search:
             grid = _Grid.of(_WIDER * grid.cell_size, self._extent, self._lists)
             visits = self._visits(grid, thinned=True)
             self._bins.count(visits)
-            yield from self._round(grid, visits, self._listed)
-        return _SPARE * self._read()
+            yield from self._round(grid, visits, self._listed, trusted=trusted)
+        axes, cells = (self._read(texels).reshape(-1, 4) for texels in (self._axes, self._cells))
+        return FittedSplats(_SPARE * self._read(self._radii), axes, cells)
 
-    def _read(self) -> NDArray[np.float32]:
-        return self._gpu.read(self._radii.buffer, np.float32)
+    def _read(self, texels: gl.BufferTexture) -> NDArray[np.float32]:
+        return self._gpu.read(texels.buffer, np.float32)
 
     def _fit(self) -> tuple[_Grid, float]:
         """Find cells in which as many points are together as suits the search, and count; how many are."""
@@ -225,10 +289,16 @@ class _Search:
         list_flagged(self._gpu, flags, self._count, self._listed, lambda _: self._radii.bind(Texture.RADII))
 
     def _round(
-        self, grid: _Grid, visits: Visits, listed: IndexList | None, *, ended: bool = False
+        self,
+        grid: _Grid,
+        visits: Visits,
+        listed: IndexList | None,
+        *,
+        ended: bool = False,
+        trusted: bool = True,
     ) -> Generator[None, None, None]:
         """Search with one grid, whose visits are counted: for the points that are listed, or for all. ended:
-        for those alone whose cell has an end on all sides."""
+        for radii of those alone whose cell has an end on all sides. trusted: as `splats` has it."""
         gpu = self._gpu
         bins, length = self._bins, self._bins.length()
         bins.fill(visits, length)
@@ -242,6 +312,7 @@ class _Search:
                 if first:
                     yield
                 defines = {"LISTED": int(listed is not None), "ENDED": int(ended), **_CELL}
+                defines |= {"FITTED": int(not ended), "TRUSTED": int(trusted), **_FIT}
                 program = gpu.compute("surfels/gaps/radii.comp", defines, params=grid)
                 for texels, unit in (
                     (self._positions, Texture.POSITIONS),
@@ -251,6 +322,8 @@ class _Search:
                 ):
                     texels.bind(unit)
                 self._radii.buffer.bind_to_storage_buffer(Storage.RADII)
+                self._axes.buffer.bind_to_storage_buffer(Storage.CELL_AXES)
+                self._cells.buffer.bind_to_storage_buffer(Storage.CELLS)
                 with gpu.timers.measure("gaps"):
                     if listed is None:
                         gpu.set(program, first=first)

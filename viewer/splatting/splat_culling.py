@@ -183,7 +183,7 @@ class SplatChunks:
         gpu, boxes = self._gpu, self.boxes
         gpu.discard(self._arranged)
         self._arranged = None
-        nbytes = 16 * (2 + points.use_axes) * boxes.count
+        nbytes = 16 * (2 + points.use_axes + points.use_cells) * boxes.count
         if boxes.rows is None or nbytes > gpu.max_storage_bytes:
             return
         program = gpu.compute("chunks/arrange.comp", self._defines(points))

@@ -25,7 +25,7 @@ Point fetch_point() {
     int color_at = at + 6 + HAS_RADIUS + 4 * HAS_AXES;
     fed_color = vec3(number(color_at), number(color_at + 1), number(color_at + 2)) / 255.0;
 #endif
-    return Point(position, normal, radius, axes, uint(first + gl_InstanceID));
+    return Point(position, normal, radius, axes, vec4(0.0), uint(first + gl_InstanceID));
 }
 
 int corner_number() { return gl_VertexID; }

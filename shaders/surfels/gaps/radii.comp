@@ -5,7 +5,8 @@
 // At a border a cell does not end; it counts as BORDER times as far as it reaches to most sides. Where it reaches about
 // as far to opposite sides, points lie in rows that are far apart: it counts up to ROWS times as far.
 // LISTED: invocations are of the points in the list, else of slots. ENDED: no radius at a border or on a line. What
-// cells cannot tell stays 0.
+// cells cannot tell stays 0. FITTED: ellipses and planes as well (surfels/gaps/fit.glsl);
+// TRUSTED: also of points in rows, as the scan stores normals.
 #include "common/item.glsl"
 #if LISTED
 #include "common/list.glsl"
@@ -18,7 +19,9 @@ layout(binding = TEXTURE_SLOTS) uniform samplerBuffer slots;
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float radii[]; };
-
+#if FITTED
+#include "surfels/gaps/fit.glsl"
+#endif
 
 #if !LISTED
 uniform uint first;
@@ -96,8 +99,34 @@ void main() {
     vec4 forth = highest[0], back = -lowest[0];
     if (has_normal && is_undecided(forth, back, most_sides)) return;
     float rows = has_normal ? ROWS : BORDER;
-    float inverse = least_of(min(bounded(forth, back, most_sides, rows), bounded(back, forth, most_sides, rows)));
+    forth = bounded(forth, back, most_sides, rows);
+    back = bounded(back, highest[0], most_sides, rows);
+    float inverse = least_of(min(forth, back));
     float reach = 0.5 / max(inverse, 1e-30);
     if (reach > KNOWN) return;
     radii[row] = reach * cell_size;
+#if FITTED
+    if (!has_normal) return;
+    begin_fit(0.5 / max(forth, 1e-30), 0.5 / max(back, 1e-30), SPARE * reach, u, v);
+#if !TRUSTED
+    // Where points lie in rows, the nearest ones do not tell a normal, and a disc covers more of what lies beside.
+    if (rough.lengths.x > ROW * rough.lengths.y) return;
+#endif
+    float farthest = min(NEAR * fit_radius, 1.0);
+    for (int z = -1; z <= 1; ++z)
+        for (int y = -1; y <= 1; ++y) {
+            int run = int(list_of(cell + ivec3(-1, y, z))), last = int(texelFetch(starts, run + 3).r);
+            for (int j = int(texelFetch(starts, run).r); j < last; ++j) {
+                vec4 other = texelFetch(slots, j);
+                vec3 d = (other.xyz - place) / cell_size;
+                float squared = dot(d, d);
+                take_corner(d, squared);
+                if (squared == 0.0 || squared > farthest * farthest) continue;
+                vec3 other_n = texelFetch(normals, floatBitsToInt(other.w)).xyz;
+                float other_len = length(other_n);
+                if (other_len > 0.0 && other_len < UNKNOWN) take_plane(d, n, other_n / other_len);
+            }
+        }
+    store_fit(row);
+#endif
 }

@@ -1,0 +1,136 @@
+// What makes a splat of a point's cell where a disc would reach too far: an ellipse round the corners of the cell, whose middle
+// need not be the point, and the planes of neighbours that end it. The plain version is `Cell` in tests/splatting/cells.py.
+// Everything is in cells of the grid.
+#include "surfels/cell.glsl"
+
+layout(std430, binding = STORAGE_CELL_AXES) writeonly buffer Axes { vec4 cell_axes[]; };
+layout(std430, binding = STORAGE_CELLS) writeonly buffer Cells { vec4 cells[]; };
+
+const int CORNERS = 8, SECTORS = 6;
+const float TURN = 6.2831853;
+
+// lengths: of its half-axes. turn: of the longer one, from the first direction of the plane.
+struct Ellipse { vec2 middle, lengths; float turn; };
+
+// An ellipse round corners. rounds: of Khachiyan's method towards the smallest one.
+Ellipse ellipse_round(vec2 corners[CORNERS], int rounds) {
+    float weights[CORNERS], far[CORNERS];
+    for (int k = 0; k < CORNERS; ++k) weights[k] = 1.0 / float(CORNERS);
+    vec2 middle;
+    vec3 form;  // xx, xy, yy
+    float most;
+    for (int i = 0; i <= rounds; ++i) {
+        middle = vec2(0.0);
+        form = vec3(0.0);
+        most = 0.0;
+        for (int k = 0; k < CORNERS; ++k) middle += weights[k] * corners[k];
+        for (int k = 0; k < CORNERS; ++k) {
+            vec2 off = corners[k] - middle;
+            form += weights[k] * vec3(off.x * off.x, off.x * off.y, off.y * off.y);
+        }
+        float trace = form.x + form.z, divisor = max(form.x * form.z - form.y * form.y, 1e-12 * trace * trace);
+        for (int k = 0; k < CORNERS; ++k) {
+            vec2 off = corners[k] - middle;
+            far[k] = (form.z * off.x * off.x - 2.0 * form.y * off.x * off.y + form.x * off.y * off.y) / divisor;
+            most = max(most, far[k]);
+            weights[k] *= (far[k] + 1.0) / 3.0;
+        }
+    }
+    form *= most;
+    float mean = 0.5 * (form.x + form.z), half_difference = 0.5 * (form.x - form.z);
+    float spread = length(vec2(half_difference, form.y));
+    vec2 squares = vec2(mean + spread, max(mean - spread, 0.0));
+    float turn = spread > 0.0 ? 0.5 * atan(form.y, half_difference) : 0.0;
+    return Ellipse(middle, sqrt(squares), turn);
+}
+
+vec2 turned_by(float angle) { return vec2(cos(angle), sin(angle)); }
+
+void corners_of(vec4 forth, vec4 back, vec2 lengths, out vec2 corners[CORNERS]) {
+    for (int k = 0; k < CORNERS; ++k) {
+        float reach = k < 4 ? forth[k] : back[k - 4];
+        corners[k] = reach * lengths * turned_by(TURN / float(CORNERS) * float(k));
+    }
+}
+
+// Frame of the plane that the cell is looked at in again, and what is known of the planes of neighbours: the one of each
+// sector that cuts off most.
+Ellipse rough;
+vec3 rough_u, rough_v;
+float fit_radius;            // of the disc
+float cut_off[SECTORS];      // by the plane, in height over it
+vec3 cut_by[SECTORS];        // direction, tilt, distance
+
+// forth, back: how far the cell counts in eight directions.
+void begin_fit(vec4 forth, vec4 back, float radius, vec3 u, vec3 v) {
+    vec2 corners[CORNERS];
+    corners_of(forth, back, vec2(1.0), corners);
+    rough = ellipse_round(corners, 0);
+    rough.lengths.y = max(rough.lengths.y, rough.lengths.x / THINNEST);
+    vec2 along = turned_by(rough.turn);
+    rough_u = along.x * u + along.y * v;
+    rough_v = along.x * v - along.y * u;
+    rough.middle = vec2(dot(rough.middle, along), dot(rough.middle, vec2(-along.y, along.x)));
+    fit_radius = radius;
+    for (int k = 0; k < SECTORS; ++k) {
+        cut_off[k] = LEAST_CUT * radius;
+        cut_by[k] = vec3(0.0);
+    }
+    clear_cell();
+}
+
+// d: from the point to another one; other: the normal there.
+void take_plane(vec3 d, vec3 n, vec3 other) {
+    float height = dot(d, other);  // of the neighbour's plane over the point
+    vec2 parts = vec2(dot(other, rough_u), dot(other, rough_v));
+    float slope = length(parts);
+    if (height < 0.0 || !(slope > 1e-3)) return;
+    vec2 to = parts / slope;
+    float reach = dot(rough.middle, to) + SPARE_FIT * length(rough.lengths * to), room = height + SLACK * fit_radius;
+    float cut = slope * reach - room, turn = atan(to.y, to.x);
+    int sector = int(min(fract(turn / TURN) * float(SECTORS), float(SECTORS - 1)));
+    vec3 plane = vec3(turn, acos(clamp(dot(other, n), -1.0, 1.0)), room / slope);
+    for (int k = 0; k < SECTORS; ++k) {
+        bool better = cut > cut_off[k] || (cut == cut_off[k] && plane.z > cut_by[k].z);
+        if (sector != k || !better) continue;
+        cut_off[k] = cut;
+        cut_by[k] = plane;
+    }
+}
+
+void take_corner(vec3 d, float squared) {
+    bound_cell(vec2(dot(d, rough_u), dot(d, rough_v)) * rough.lengths / max(squared, 1e-30));
+}
+
+// The planes that cut off most, packed, the most first. turn: of the first half-axis from rough_u. longer: half-axis.
+vec3 packed_planes(float turn, float longer) {
+    vec3 words = vec3(0.0);
+    for (int i = 0; i < CELL_PLANES; ++i) {
+        int best = 0;
+        for (int k = 1; k < SECTORS; ++k) best = cut_off[k] > cut_off[best] ? k : best;
+        vec3 plane = cut_by[best];
+        float direction = fract((plane.x - turn) / TURN) * TURN;
+        words[i] = plane.z > 0.0 ? packed_plane(direction, plane.y, plane.z / longer) : 0.0;
+        cut_off[best] = -1.0;
+    }
+    return words;
+}
+
+// A side that does not end near the rough ellipse counts as that does.
+vec4 ended(vec4 reaches) { return mix(reaches, vec4(1.0), greaterThan(reaches, vec4(OPEN))); }
+
+void store_fit(uint row) {
+    vec2 corners[CORNERS];
+    vec4 forth = ended(0.5 / max(highest[0], 1e-30)), back = ended(0.5 / max(-lowest[0], 1e-30));
+    corners_of(SPARE_FIT * forth, SPARE_FIT * back, rough.lengths, corners);
+    Ellipse found = ellipse_round(corners, ROUNDS);
+    if (found.lengths.x * found.lengths.y > ROUND_SHARE * fit_radius * fit_radius) {
+        cell_axes[row] = vec4(0.0);
+        cells[row] = vec4(0.0, packed_planes(-rough.turn, fit_radius));
+        return;
+    }
+    vec2 along = turned_by(found.turn);
+    vec2 offset = vec2(dot(found.middle, along), dot(found.middle, vec2(-along.y, along.x)));
+    cell_axes[row] = vec4(found.lengths.x * (along.x * rough_u + along.y * rough_v), found.lengths.y) * cell_size;
+    cells[row] = vec4(packed_offset(offset / found.lengths), packed_planes(found.turn, found.lengths.x));
+}
