@@ -254,7 +254,9 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
             surface.stats.simplified = True
             surface.stats.skipped["gaps"] = "playback runs, and the radii of the last pose left no gaps"
         else:
-            known = gaps.find(pose, wait=frame.budget_ms is None)
+            in_haste = frame.moving and surface.gpu.software
+            known = gaps.find(pose, wait=frame.budget_ms is None, fits=not in_haste)
+            surface.stats.simplified = surface.stats.simplified or (in_haste and not gaps.fits)
         own = pose.stored.remember(_has_radii)
         if gaps.texels is not None:
             if own:

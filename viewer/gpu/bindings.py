@@ -31,7 +31,6 @@ class Texture(IntEnum):
     COLORS = auto()  # of a Surface where the backend wrote them
     RADII = auto()
     AXES = auto()
-    CELLS = auto()  # of points, that splats are fitted to
     SPLATS = auto()  # normal, radius and half-axes in three words
     IDS = auto()
     VALUES = auto()  # of a scalar
@@ -118,6 +117,8 @@ class Texture(IntEnum):
     NODE_CELLS = VISIBLE
     NODE_OFFSETS = COPIES  # of the surface in their cells
     NODE_COLORS = LIMITS
+    # Cells of points, to which splats are fitted, beside a pose; no program reads these and targets.
+    CELLS = SPOTS
 
 
 class Storage(IntEnum):

@@ -15,7 +15,7 @@ Radii that a scan stores are held to this at a sample of its points. Where they 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -51,6 +51,7 @@ _FIT = {
     "ROW": 2.0,  # times as long as wide: cells of points in rows
     "SPARE": _SPARE,
     "NEAR": 2.5,  # radii: how far neighbours are whose planes count
+    "BELOW": 0.06,  # sine of the angle by which these lie below the splat's plane at least
     "SLACK": 0.1,  # radii that a splat may rise over their planes
     "LEAST_CUT": 0.05,  # radii that it would rise higher
 }
@@ -72,6 +73,7 @@ class GapRadii:
     is to be as large as usual. None where no point has any, where there are more points than the driver
     takes, and where the radii that the scan stores leave no gaps: else none is smaller than these.
     fitted: "axes" and "cells" of each row, as `Points.buffers` has them; empty where discs do for nearly all.
+    fits: whether ellipses and planes were looked for.
     usual, largest: the radius that nine of ten do not exceed, and how far the largest splat reaches.
     """
 
@@ -80,8 +82,8 @@ class GapRadii:
         self.fitted: dict[str, gl.BufferTexture] = {}
         self.usual = self.largest = 0.0
         self._steps: Generator[None, None, None] | None = None
-        self._positions: gl.BufferTexture | None = None
-        self._found = _SLOT * len(pose.cloud) > pose.gpu.max_storage_bytes
+        self._sought: tuple[gl.BufferTexture, bool] | None = None
+        self._found = self.fits = _SLOT * len(pose.cloud) > pose.gpu.max_storage_bytes
 
     @property
     def nbytes(self) -> int:
@@ -103,22 +105,23 @@ class GapRadii:
         of a scan that plays: this does for a picture that moves, of whose time looking takes a third."""
         return not self._found and pose.stored.radii is not None and pose.gpu.cached(_LastLook).found_none
 
-    def find(self, pose: GpuPose, *, wait: bool) -> bool:
-        """Go on with finding them: to the end, or for some of the points. Whether all are there."""
-        if self._found:
+    def find(self, pose: GpuPose, *, wait: bool, fits: bool = True) -> bool:
+        """Go on with finding them: to the end, or for some of the points. Whether all are there. fits: also
+        ellipses and planes, which takes twice as long; what was found without them is found anew."""
+        if self._found and (self.fits or not fits):
             return True
-        positions = pose.array("positions")
-        if self._steps is None or self._positions is not positions:  # these count from another origin now
-            self._steps, self._positions = self._find(pose), positions
+        sought = pose.array("positions"), fits  # positions may count from another origin by now
+        if self._steps is None or self._sought != sought:
+            self._steps, self._sought = self._find(pose, fits), sought
         with pose.preparing("derive"):
             for _ in self._steps:
                 if not wait:
                     return False
-        self._steps = self._positions = None
-        self._found = True
+        self._steps = self._sought = None
+        self._found, self.fits = True, fits
         return True
 
-    def _find(self, pose: GpuPose) -> Generator[None, None, None]:
+    def _find(self, pose: GpuPose, fits: bool) -> Generator[None, None, None]:
         stored = _usable_radii(pose.stored)
         with _searching(pose) as (search, rows, copies):
             if stored is not None:
@@ -127,7 +130,7 @@ class GapRadii:
                 last.found_none = not search.leave_gaps(stored[rows], sample)
                 if last.found_none:
                     return
-            found = yield from search.splats(trusted=pose.stored.normals is not None)
+            found = yield from search.splats(_fit_defines(pose) if fits else {"FITTED": 0})
         found = FittedSplats(*(array[copies] for array in found))
         known = found.radii[found.radii > 0]
         if known.size:
@@ -141,9 +144,11 @@ class GapRadii:
 
     def _take(self, gpu: Gpu, found: FittedSplats, is_round: NDArray[np.bool_]) -> None:
         """Upload what was found. is_round: rows whose splats are discs around their points, (N,)."""
+        self.release()
         radii, axes, cells = found
         axes[is_round] = 0
         cells[is_round] = 0
+        self.fitted = {}
         self.usual, self.largest = float(np.quantile(radii[radii > 0], 0.9)), float(radii.max())
         self.texels = gl.BufferTexture(gpu.buffer(radii), gl.R32F)
         if np.count_nonzero(cells.any(axis=1)) > _FITTED * len(cells):
@@ -234,16 +239,16 @@ class _Search:
         """Whether radii (N,), 0 where unknown, leave gaps, as far as a sample of the rows tells; at
         borders and on lines none are known. To be asked before `radii`."""
         self._listed.write(sample)
-        for _ in self._round(self._grid, self._visits(self._grid), self._listed, ended=True):
+        for _ in self._round(self._grid, self._visits(self._grid), self._listed, {"FITTED": 0}, ended=True):
             pass
         reach = self._read(self._radii)
         known = (reach > 0) & (radii > 0)
         return bool((radii < reach)[known].mean() > _OPEN) if known.any() else False
 
-    def splats(self, *, trusted: bool) -> Generator[None, None, FittedSplats]:
-        """The splats of all rows. trusted: whether the scan stores normals."""
+    def splats(self, fit: Mapping[str, object]) -> Generator[None, None, FittedSplats]:
+        """The splats of all rows. fit: macros that say whether and how they are fitted to cells."""
         grid = self._grid
-        yield from self._round(grid, self._visits(grid), None, trusted=trusted)
+        yield from self._round(grid, self._visits(grid), None, fit)
         for _ in range(1, _ROUNDS):
             self._list_unknown()
             if len(self._listed) * _FEW <= self._count:
@@ -251,7 +256,7 @@ class _Search:
             grid = _Grid.of(_WIDER * grid.cell_size, self._extent, self._lists)
             visits = self._visits(grid, thinned=True)
             self._bins.count(visits)
-            yield from self._round(grid, visits, self._listed, trusted=trusted)
+            yield from self._round(grid, visits, self._listed, fit)
         axes, cells = (self._read(texels).reshape(-1, 4) for texels in (self._axes, self._cells))
         return FittedSplats(_SPARE * self._read(self._radii), axes, cells)
 
@@ -293,12 +298,12 @@ class _Search:
         grid: _Grid,
         visits: Visits,
         listed: IndexList | None,
+        fit: Mapping[str, object],
         *,
         ended: bool = False,
-        trusted: bool = True,
     ) -> Generator[None, None, None]:
         """Search with one grid, whose visits are counted: for the points that are listed, or for all. ended:
-        for radii of those alone whose cell has an end on all sides. trusted: as `splats` has it."""
+        for those alone whose cell has an end on all sides. fit: as `splats` has it."""
         gpu = self._gpu
         bins, length = self._bins, self._bins.length()
         bins.fill(visits, length)
@@ -312,7 +317,7 @@ class _Search:
                 if first:
                     yield
                 defines = {"LISTED": int(listed is not None), "ENDED": int(ended), **_CELL}
-                defines |= {"FITTED": int(not ended), "TRUSTED": int(trusted), **_FIT}
+                defines |= fit
                 program = gpu.compute("surfels/gaps/radii.comp", defines, params=grid)
                 for texels, unit in (
                     (self._positions, Texture.POSITIONS),
@@ -332,6 +337,11 @@ class _Search:
                         listed.run(program)
         finally:
             gpu.discard(slots)
+
+
+def _fit_defines(pose: GpuPose) -> dict[str, object]:
+    """Macros of surfels/gaps/fit.glsl for a pose."""
+    return {"FITTED": 1, "TRUSTED": int(pose.stored.normals is not None), **_FIT}
 
 
 @contextmanager

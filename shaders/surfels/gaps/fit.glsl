@@ -47,19 +47,25 @@ Ellipse ellipse_round(vec2 corners[CORNERS], int rounds) {
 vec2 turned_by(float angle) { return vec2(cos(angle), sin(angle)); }
 
 void corners_of(vec4 forth, vec4 back, vec2 lengths, out vec2 corners[CORNERS]) {
-    for (int k = 0; k < CORNERS; ++k) {
-        float reach = k < 4 ? forth[k] : back[k - 4];
-        corners[k] = reach * lengths * turned_by(TURN / float(CORNERS) * float(k));
+    for (int k = 0; k < 4; ++k) {
+        vec2 to = lengths * turned_by(TURN / float(CORNERS) * float(k));
+        corners[k] = forth[k] * to;
+        corners[k + 4] = -back[k] * to;
     }
 }
 
-// Frame of the plane that the cell is looked at in again, and what is known of the planes of neighbours: the one of each
-// sector that cuts off most.
+// Frame of the plane that the cell is looked at in again. Of each sector, the neighbour whose plane may cut off most, which its
+// place alone tells as on an arc: Mesa runs through both sides of a branch, so that few normals are read. Then what their planes
+// do cut off. Loops have constant bounds and no other way out, as Mesa keeps arrays in registers then.
 Ellipse rough;
 vec3 rough_u, rough_v;
-float fit_radius;            // of the disc
-float cut_off[SECTORS];      // by the plane, in height over it
-vec3 cut_by[SECTORS];        // direction, tilt, distance
+float fit_radius;         // of the disc
+float guess[SECTORS];     // how high the splat would rise over the plane
+float guess_to[SECTORS];  // cosine of the direction, which tells equal ones apart
+int guess_at[SECTORS];    // slot
+float cut_off[SECTORS];   // as the guess
+vec2 cut_to[SECTORS];     // direction, a unit vector
+vec2 cut_by[SECTORS];     // tilt between both normals, distance
 
 // forth, back: how far the cell counts in eight directions.
 void begin_fit(vec4 forth, vec4 back, float radius, vec3 u, vec3 v) {
@@ -73,28 +79,46 @@ void begin_fit(vec4 forth, vec4 back, float radius, vec3 u, vec3 v) {
     rough.middle = vec2(dot(rough.middle, along), dot(rough.middle, vec2(-along.y, along.x)));
     fit_radius = radius;
     for (int k = 0; k < SECTORS; ++k) {
-        cut_off[k] = LEAST_CUT * radius;
-        cut_by[k] = vec3(0.0);
+        guess[k] = 0.0;
+        guess_to[k] = -2.0;
+        guess_at[k] = 0;
     }
     clear_cell();
 }
 
-// d: from the point to another one; other: the normal there.
-void take_plane(vec3 d, vec3 n, vec3 other) {
-    float height = dot(d, other);  // of the neighbour's plane over the point
-    vec2 parts = vec2(dot(other, rough_u), dot(other, rough_v));
-    float slope = length(parts);
-    if (height < 0.0 || !(slope > 1e-3)) return;
-    vec2 to = parts / slope;
-    float reach = dot(rough.middle, to) + SPARE_FIT * length(rough.lengths * to), room = height + SLACK * fit_radius;
-    float cut = slope * reach - room, turn = atan(to.y, to.x);
-    int sector = int(min(fract(turn / TURN) * float(SECTORS), float(SECTORS - 1)));
-    vec3 plane = vec3(turn, acos(clamp(dot(other, n), -1.0, 1.0)), room / slope);
+// A neighbour at d, in any order. at: its slot.
+void take_neighbor(vec3 d, float squared, vec3 n, int at) {
+    float below = -dot(d, n), scale = inversesqrt(max(squared, 1e-30));
+    float rise = below * (2.0 * fit_radius * scale - 1.0);
+    rise = squared <= NEAR * NEAR * fit_radius * fit_radius && below * scale > BELOW ? rise : 0.0;
+    // Sectors of a sixth of a turn: the upper three, and the lower ones.
+    vec2 to = vec2(dot(d, rough_u), dot(d, rough_v));
+    to *= inversesqrt(max(dot(to, to), 1e-30));
+    float x = to.y < 0.0 ? -to.x : to.x;
+    int sector = (x > 0.5 ? 0 : x > -0.5 ? 1 : 2) + (to.y < 0.0 ? 3 : 0);
     for (int k = 0; k < SECTORS; ++k) {
-        bool better = cut > cut_off[k] || (cut == cut_off[k] && plane.z > cut_by[k].z);
-        if (sector != k || !better) continue;
-        cut_off[k] = cut;
-        cut_by[k] = plane;
+        bool better = sector == k && (rise > guess[k] || (rise == guess[k] && rise > 0.0 && to.x > guess_to[k]));
+        guess[k] = better ? rise : guess[k];
+        guess_to[k] = better ? to.x : guess_to[k];
+        guess_at[k] = better ? at : guess_at[k];
+    }
+}
+
+// What the planes of the neighbours that were found cut off.
+void find_cuts(vec3 place, vec3 n) {
+    for (int k = 0; k < SECTORS; ++k) {
+        vec4 slot = texelFetch(slots, guess_at[k]);
+        vec3 d = (slot.xyz - place) / cell_size, other = texelFetch(normals, floatBitsToInt(slot.w)).xyz;
+        float len = length(other);
+        bool is_known = guess[k] > 0.0 && len > 0.0 && len < UNKNOWN;
+        other = is_known ? other / len : n;
+        float height = dot(d, other), tilt = clamp(dot(other, n), -1.0, 1.0), slope = sqrt(max(1.0 - tilt * tilt, 1e-6));
+        vec2 to = vec2(dot(other, rough_u), dot(other, rough_v)) / slope;
+        float room = height + SLACK * fit_radius;
+        float cut = slope * (dot(rough.middle, to) + SPARE_FIT * length(rough.lengths * to)) - room;
+        cut_off[k] = is_known && height >= 0.0 && cut > LEAST_CUT * fit_radius ? cut : 0.0;
+        cut_to[k] = to;
+        cut_by[k] = vec2(acos(tilt), room / slope);
     }
 }
 
@@ -106,12 +130,18 @@ void take_corner(vec3 d, float squared) {
 vec3 packed_planes(float turn, float longer) {
     vec3 words = vec3(0.0);
     for (int i = 0; i < CELL_PLANES; ++i) {
-        int best = 0;
-        for (int k = 1; k < SECTORS; ++k) best = cut_off[k] > cut_off[best] ? k : best;
-        vec3 plane = cut_by[best];
-        float direction = fract((plane.x - turn) / TURN) * TURN;
-        words[i] = plane.z > 0.0 ? packed_plane(direction, plane.y, plane.z / longer) : 0.0;
-        cut_off[best] = -1.0;
+        float most = 0.0;
+        vec2 to = vec2(1.0, 0.0), by = vec2(0.0);
+        for (int k = 0; k < SECTORS; ++k) {
+            bool better = cut_off[k] > most;
+            most = better ? cut_off[k] : most;
+            to = better ? cut_to[k] : to;
+            by = better ? cut_by[k] : by;
+        }
+        for (int k = 0; k < SECTORS; ++k) cut_off[k] = cut_off[k] == most ? 0.0 : cut_off[k];
+        float direction = fract((atan(to.y, to.x) - turn) / TURN) * TURN;
+        float word = packed_plane(direction, by.x, by.y / longer);
+        words[i] = most > 0.0 ? word : 0.0;
     }
     return words;
 }
@@ -119,7 +149,8 @@ vec3 packed_planes(float turn, float longer) {
 // A side that does not end near the rough ellipse counts as that does.
 vec4 ended(vec4 reaches) { return mix(reaches, vec4(1.0), greaterThan(reaches, vec4(OPEN))); }
 
-void store_fit(uint row) {
+void store_fit(uint row, vec3 place, vec3 n) {
+    find_cuts(place, n);
     vec2 corners[CORNERS];
     vec4 forth = ended(0.5 / max(highest[0], 1e-30)), back = ended(0.5 / max(-lowest[0], 1e-30));
     corners_of(SPARE_FIT * forth, SPARE_FIT * back, rough.lengths, corners);

@@ -112,7 +112,6 @@ void main() {
     // Where points lie in rows, the nearest ones do not tell a normal, and a disc covers more of what lies beside.
     if (rough.lengths.x > ROW * rough.lengths.y) return;
 #endif
-    float farthest = min(NEAR * fit_radius, 1.0);
     for (int z = -1; z <= 1; ++z)
         for (int y = -1; y <= 1; ++y) {
             int run = int(list_of(cell + ivec3(-1, y, z))), last = int(texelFetch(starts, run + 3).r);
@@ -121,12 +120,9 @@ void main() {
                 vec3 d = (other.xyz - place) / cell_size;
                 float squared = dot(d, d);
                 take_corner(d, squared);
-                if (squared == 0.0 || squared > farthest * farthest) continue;
-                vec3 other_n = texelFetch(normals, floatBitsToInt(other.w)).xyz;
-                float other_len = length(other_n);
-                if (other_len > 0.0 && other_len < UNKNOWN) take_plane(d, n, other_n / other_len);
+                take_neighbor(d, squared, n, j);
             }
         }
-    store_fit(row);
+    store_fit(row, place, n);
 #endif
 }
