@@ -92,7 +92,7 @@ class GapRadii:
 
     @property
     def buffers(self) -> dict[str, gl.BufferTexture]:
-        """What `Points.buffers` takes of them; empty where there are none."""
+        """Buffers of radii, and of ellipses and planes, for `Points.buffers`; empty without radii."""
         return {} if self.texels is None else {"radii": self.texels, **self.fitted}
 
     def release(self) -> None:
@@ -316,7 +316,7 @@ class _Search:
             for first in range(0, length if listed is None else 1, _AT_ONCE):
                 if first:
                     yield
-                defines = {"LISTED": int(listed is not None), "ENDED": int(ended), **_CELL}
+                defines: dict[str, object] = {"LISTED": int(listed is not None), "ENDED": int(ended), **_CELL}
                 defines |= fit
                 program = gpu.compute("surfels/gaps/radii.comp", defines, params=grid)
                 for texels, unit in (
