@@ -12,6 +12,7 @@
 layout(binding = TEXTURE_SUMS) uniform isamplerBuffer sums;  // as hpr/circulation.glsl adds them
 layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;  // as hpr/sizes.glsl has them; NO_DEPTH: no candidate
 layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
+layout(binding = TEXTURE_SPACINGS) uniform samplerBuffer apart;  // distance between points around each, in space
 #if HAS_COLORS
 layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #endif
@@ -22,6 +23,10 @@ layout(std430, binding = STORAGE_SPACINGS) writeonly buffer Spacings { float spa
 const float steps[] = STEPS;
 const float LEANING = 1.0;  // spacings that a splat reaches, since it may lean, but not far beyond its sectors
 const float LEAST_FACING = 0.5;  // cosine, below which leaning adds no more to a splat: normals at outlines are uncertain
+// In distances between points in space: from which reach on a point is one of an outline, whose sectors lie outside; what
+// its splat reaches at most; and what other splats reach at least, so that none leaves a gap.
+const float OUTLINE = 1.6, AT_OUTLINE = 1.2, CLOSED = 1.0;
+const float FEW = 3.0;  // distances between neighbors in sectors that this is at most: few points tell none in space
 const float OUTSIDE = 1.5;   // spacings that it reaches at most: candidates at outlines have sectors far outside
 
 void main() {
@@ -43,6 +48,9 @@ void main() {
     normal = normal == vec3(0.0) ? to_eye : normalize(normal);
     float leaning = reach / max(dot(normal, to_eye), LEAST_FACING);
     float radius = min(max(leaning, min(LEANING * spacing, 3.0 * reach)), OUTSIDE * spacing);
+    float around = texelFetch(apart, int(row)).r;
+    float least = min(CLOSED * around, FEW * spacing);
+    radius = reach > OUTLINE * around ? min(radius, AT_OUTLINE * around) : max(radius, least);
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = key == NO_DEPTH ? 0u : floatBitsToUint(radius);
     splats[3u * row + 2u] = ROUND << 16;

@@ -17,7 +17,7 @@ from ...picture.surface import Surface
 from ...visibility.calibration import EyeCalibration, body_of
 from ...visibility.candidates import Candidates
 from ...visibility.covering import Covering
-from ...visibility.spacing import is_steadied, steady_points
+from ...visibility.spacing import Spacings, is_steadied, steady_points
 
 _INFINITE = 1e12  # weight, from which on nearness alone counts but for ties
 _MOST_SECTORS = 1 << 22  # of which 24 bytes are kept
@@ -118,6 +118,7 @@ class SectorSplats:
             if has_colors:
                 pose.array("colors").bind(Texture.COLORS)
             texels.bind(Texture.SUMS)
+            pose.cached(Spacings).texels.bind(Texture.SPACINGS)
             self["keys"].bind(Texture.KEYS)
             for name in ("splats", "looks", "spacings"):
                 self[name].buffer.bind_to_storage_buffer(Storage[name.upper()])
