@@ -131,15 +131,15 @@ def test_a_window_has_points_merged_by_a_worker(scan: Path, renderer: Renderer) 
     own.release()
 
 
-def test_more_points_than_the_driver_takes_are_not_even_merged(
+def test_more_points_than_a_renderer_takes_are_not_even_merged(
     scan: Path, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with open_scan(scan) as timeline:
         pose = timeline.pose(2)
     monkeypatch.setattr(renderer.gpu, "max_points", 100)
-    with pytest.raises(InputError, match="points in one pose, but this driver can handle only 100"):
+    with pytest.raises(InputError, match="points in one pose, but Discs can draw only 100 on this driver"):
         render_frame(
-            renderer, Request(pose, Camera.orbit(pose.bounds), "points"), Surface(renderer.gpu, (64, 48))
+            renderer, Request(pose, Camera.orbit(pose.bounds), "surfels"), Surface(renderer.gpu, (64, 48))
         )
     assert not pose.is_merged
 

@@ -1,6 +1,7 @@
 // A point's cells are the pixels of its square, its key is its depth. SAMPLED: a list says which points.
 // CHUNKED: a list says which chunks, in whose order positions are, and with SAMPLED a list of rows.
 // KEPT: a list has rows. STRIDED: one of each `stride` rows in a run, whose turn it is.
+// PART: positions are those of a run of all points, from row `first` on.
 // FILTERED: those that are not visible are left out. SINGLE: squares are of one pixel.
 #include "common/view.glsl"
 #if CHUNKED || KEPT
@@ -38,6 +39,9 @@ void scatter(uint i) {
 #endif
 #if FILTERED
     if (texelFetch(visible, int(i)).r == 0u) return;
+#endif
+#if PART
+    i += uint(first);
 #endif
     vec3 view = to_view(position);
     float depth = -view.z;

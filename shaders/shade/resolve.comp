@@ -1,5 +1,6 @@
 // Gives each covered pixel, as its own, what its row has. CHANNEL 0 colour, 1 normal, 2 value. HAS_ROWS: whether rows have
 // any; SAMPLES: which are samples of range views. IS_DEPTH: whether the value is the depth. What a pixel without a row gets is what shading takes for it: plain, none, NaN.
+// PART: the texels are those of a run of all rows, and other pixels wait for their own run.
 // SAMPLED: gives some pixels alone, covered or not, one after another.
 #include "common/view.glsl"
 #include "common/item.glsl"
@@ -17,6 +18,9 @@ uniform vec3 plain;  // sRGB
 layout(std430, binding = STORAGE_NORMAL) writeonly buffer Normal { float own[]; };
 #else
 layout(std430, binding = STORAGE_VALUE) writeonly buffer Value { float own[]; };
+#endif
+#if PART
+uniform uint first, part_count;
 #endif
 #if SAMPLED
 uniform int stride;  // one in so many of each line, and of the lines
@@ -36,6 +40,10 @@ void main() {
     own[to] = uintBitsToFloat(texelFetch(depths, index).r);
 #else
     uint row = texelFetch(rows, index).r;
+#if PART
+    row -= first;
+    if (row >= part_count) return;
+#endif
     bool known = HAS_ROWS != 0 && row != NOTHING;
     vec4 value = vec4(0.0);
 #if SAMPLES && CHANNEL == 0

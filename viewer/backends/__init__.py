@@ -126,6 +126,7 @@ class Backend(ABC):
     blends: bool = False  # a pixel may show several points
     fills: bool = False  # it may fill pixels that no point gave
     finds_normals: bool = False  # it writes its own normals, so looks need none of the pose
+    takes_parts: bool = False  # it draws poses in runs of points that a driver takes, see `GpuPose.parts`
     accumulates: bool = False  # moving pictures of a share of the points continue the one before
     derives: Derives = Derives.NEVER  # where `derive` runs
     derived_by_camera: bool = False  # `derive` runs for each view; the last few results are kept

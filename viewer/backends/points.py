@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..errors import InputError
 from ..gpu.pose import GpuPose
 from ..params import param
 from ..picture.surface import Surface
@@ -50,6 +51,7 @@ class PointSquares(Backend):
     good_for = "Fastest, with exact positions"
     params_class = Params
     accumulates = True
+    takes_parts = True
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
         """Nothing but positions."""
@@ -66,6 +68,12 @@ class PointSquares(Backend):
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Scatter the points; complete where all shall be drawn."""
         params: Params = frame.params
+        if params.hide_hidden and pose.is_split:
+            raise InputError(
+                f"cannot hide points behind others among more than {pose.gpu.max_points:,} points",
+                "hide_hidden",
+                "Switch hide_hidden off, or thin out the scan",
+            )
         shown = mark_visible(pose, frame, surface) if params.hide_hidden and len(pose.cloud) else None
         stays = "pose" not in frame.changed
         return draw_squares(pose, surface, params.point_size, frame.share, shown, stays, frame.before)

@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 
 from ..backends import Derived, missing_source
-from ..errors import Scan4DError
+from ..errors import InputError, Scan4DError
 from ..gpu.pose import GpuPose
 from ..view import View
 from .jobs import Preparation, Stage
@@ -105,7 +105,7 @@ def _plan(
     if may_begin:
         renderer.gpu.timers.start_frame()
     resident = renderer.draw(request.pose) if may_begin else renderer.find(request.pose)
-    _check(request)
+    _check(request, resident.gpu_pose)
     view = None if size is None else view_of(request, size)
     resolved = (request, resident.gpu_pose, view, start)
     key = derived_key(request, view)
@@ -131,8 +131,15 @@ def _plan(
     return Waiting(*resolved, step.stage, step.name)
 
 
-def _check(request: Request) -> None:
-    """Raise InputError for layers that do not fit the pose, or colours by a number that nothing has."""
+def _check(request: Request, pose: GpuPose) -> None:
+    """Raise InputError for layers that do not fit the pose, colours by a number that nothing has, or more
+    points than the backend takes."""
+    if pose.is_split and not (request.draws_samples or request.backend.takes_parts):
+        raise InputError(
+            f"has {request.pose.count:,} points in one pose, but {request.backend.title} can draw only "
+            f"{pose.gpu.max_points:,} on this driver",
+            hint="Choose the renderer Points, split the scan, or thin it out",
+        )
     request.layers.check(request.pose)
     if colorable(request) is not request:
         names = request.layers.names(request.pose.overview.scalars)

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,20 @@ class Spent:
     nbytes: int = 0
     shared: tuple[str, ...] = ()
 
+    def add(self, other: Spent) -> None:
+        """Add other work."""
+        self.upload_ms += other.upload_ms
+        self.derive_ms += other.derive_ms
+        self.nbytes += other.nbytes
+        self.shared += other.shared
+
+
+class PosePart(NamedTuple):
+    """A run of a pose's points. first: the row that it begins with."""
+
+    first: int
+    pose: GpuPose
+
 
 class GpuPose:
     """The arrays of a pose's points as buffer textures, indexed by row, and the samples of its range views.
@@ -75,18 +89,34 @@ class GpuPose:
         self._uploads: dict[str, GpuArray] = {}  # arrays that are not complete yet
         self._samples: RangeSamples | None = None
         self._estimated: PointCloud | None = None
+        self._parts: tuple[PosePart, ...] = ()
         self._made: dict[Callable[..., Any], Workspace] = {}
 
     @cached_property
     def stored(self) -> PointCloud:
-        """The points as the scan has them. Raises InputError for more than the driver takes."""
-        if self.pose.count > self.gpu.max_points:
-            raise InputError(
-                f"has {self.pose.count:,} points in one pose, but this driver can handle only "
-                f"{self.gpu.max_points:,}",
-                hint="Split the scan or thin it out",
-            )
+        """The points as the scan has them."""
         return self.pose.cloud
+
+    @property
+    def is_split(self) -> bool:
+        """Whether it has more points than a buffer texture has texels: then only its `parts` have arrays."""
+        return self.pose.count > self.gpu.max_points
+
+    @property
+    def parts(self) -> tuple[PosePart, ...]:
+        """Runs of the points, each a pose of its own with as many as a buffer texture takes."""
+        if not self._parts:
+            self._parts = tuple(
+                PosePart(
+                    first,
+                    GpuPose(self.gpu, replace(self.pose, points=self.cloud.between(first, first + most))),
+                )
+                for most in (self.gpu.max_points,)
+                for first in range(0, len(self.cloud), most)
+            )
+            for part in self._parts:
+                part.pose.center(self.origin)
+        return self._parts
 
     @property
     def cloud(self) -> PointCloud:
@@ -104,6 +134,7 @@ class GpuPose:
 
     def add_estimates(self, arrays: Mapping[str, Any]) -> None:
         """Add attributes that the scan lacks, by name."""
+        self._parts = ()
         self._estimated = replace(self.cloud, **arrays)
 
     @property
@@ -147,6 +178,8 @@ class GpuPose:
         if (origin == self.origin).all():
             return
         self.origin = origin
+        for part in self._parts:
+            part.pose.center(origin)
         self._uploads.pop("positions", None)
         self._arrays.pop("positions", None)
         self._packed.clear()
@@ -171,6 +204,7 @@ class GpuPose:
     def _bytes_of(self, nbytes: Callable[[GpuArray], int]) -> int:
         samples = self._samples.nbytes if self._samples is not None and self._samples.complete else 0
         made = sum(each.nbytes for each in self._made.values())
+        made += sum(part.pose._bytes_of(nbytes) for part in self._parts)
         return samples + made + sum(map(nbytes, chain(self._arrays.values(), self._packed.values())))
 
     @contextmanager
@@ -184,6 +218,8 @@ class GpuPose:
     def take_spent(self) -> Spent:
         """The work since the last call."""
         taken, self.spent = self.spent, Spent()
+        for part in self._parts:
+            taken.add(part.pose.take_spent())
         return taken
 
     # --- arrays -----------------------------------------------------------------------
@@ -213,6 +249,11 @@ class GpuPose:
 
     def upload(self, names: Iterable[str], budget_ms: float = np.inf) -> bool:
         """Upload what is missing of these arrays, in slices until the time is over; whether all is there."""
+        if self.is_split and _RANGES not in (names := list(names)):
+            end = time.perf_counter() + budget_ms / 1e3
+            return all(
+                part.pose.upload(names, max(1e3 * (end - time.perf_counter()), 0.0)) for part in self.parts
+            )
         missing = [name for name in names if name not in self._arrays]
         if self._samples is not None and self._samples.complete:
             missing = [name for name in missing if name != _RANGES]

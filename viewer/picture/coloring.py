@@ -97,8 +97,11 @@ class Coloring:
 
     def scalar_texels(self, name: str) -> gl.BufferTexture:
         """The numbers of each row, of a layer or the scan, relative to `value_zero`."""
+        return self._scalar_by_row(name, self.kind)
+
+    def _scalar_by_row(self, name: str, rows: PointRows) -> gl.BufferTexture:
         layer, zero = self.layers.scalars.get(name), self.scalar_range(name, self.kind.pose)[0]
-        return self.kind.scalar_texels(name, zero) if layer is None else self.kind.layer_texels(layer, zero)
+        return rows.scalar_texels(name, zero) if layer is None else rows.layer_texels(layer, zero)
 
     @property
     def height_axis(self) -> tuple[float, float, float]:
@@ -111,12 +114,16 @@ class Coloring:
     def row_values(self) -> gl.BufferTexture | None:
         """The number of each row that the look colours by, a float relative to `value_zero`, for a backend
         that blends it into its own `value`. None where it colours by none, or by depth, which pixels have."""
+        return self._values_by_row(self.kind)
+
+    def _values_by_row(self, rows: PointRows) -> gl.BufferTexture | None:
+        """The number of each of some rows that the look colours by; see `row_values`."""
         source = self.value_source
         if source in (None, "depth"):
             return None
         if source == "height":
-            return self.kind.heights(self.height_axis)
-        return self._found_texels(source) if source in self.finds else self.scalar_texels(source)
+            return rows.heights(self.height_axis)
+        return self._found_texels(source) if source in self.finds else self._scalar_by_row(source, rows)
 
     def _found_texels(self, name: str) -> gl.BufferTexture:
         if self._given is None or self._given[0] != name:

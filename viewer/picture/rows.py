@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..gpu import gl
 from ..gpu.arrays import as_float32
 from ..gpu.chunks import Chunks
-from ..gpu.pose import GpuPose
+from ..gpu.pose import GpuPose, PosePart
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
 from ..scan.rays import Ray, rows_along
@@ -36,6 +36,12 @@ class PointRows:
 
     def __init__(self, pose: GpuPose) -> None:
         self.pose = self.scanned = pose
+
+    @property
+    def parts(self) -> tuple[PartRows, ...]:
+        """Runs of the rows, where the arrays of the pose are in parts; empty where they are whole."""
+        parts = self.pose.parts if self.pose.is_split else ()
+        return tuple(PartRows(part) for part in parts)
 
     @property
     def octants(self) -> NDArray[np.uint32] | None:
@@ -154,6 +160,17 @@ class PointRows:
         scan = self.measured
         ids = points if scan.ids is None else scan.ids[points]
         return ids.astype(np.intp), scan.world(points) - view.origin
+
+
+class PartRows(PointRows):
+    """A run of the rows of a pose. first: the row that it begins with."""
+
+    def __init__(self, part: PosePart) -> None:
+        super().__init__(part.pose)
+        self.first = part.first
+
+    def _by_row(self, values: NDArray, zero: float) -> NDArray[np.float32]:
+        return as_float32(values[self.first : self.first + self.count], zero)
 
 
 class Octants(Protocol):

@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from ..errors import InputError
 from ..gpu import gl
 from ..gpu.bindings import Storage, Texture
 from ..gpu.context import Gpu
@@ -17,7 +18,7 @@ from ..scan.ranges import robust_range
 from ..view import View
 from .buffers import PictureBuffers
 from .coloring import Coloring
-from .rows import OctantRows, Octants, PointRows, SampleRows
+from .rows import OctantRows, Octants, PartRows, PointRows, SampleRows
 from .sample import is_sampled, row_list, sample_of
 from .stats import Stats
 
@@ -166,17 +167,38 @@ class RenderTarget(PictureBuffers, Coloring):
         self._resolve(name, own)
         return own
 
+    def resolve_shaded(self) -> None:
+        """Resolve what shading reads of the rows, for poses whose arrays are in parts."""
+        pose = self.pose
+        if self.look.color_by == "id" and pose.has("ids"):
+            raise InputError(
+                "points that were left out of a scan this large have no colours by number",
+                hint="Choose other colours",
+            )
+        if pose.has("colors"):
+            self.resolve("color")
+        if wants_normals(self.look) or (is_lit(self.look) and pose.overview.normals is not None):
+            self.resolve("normal")
+        if self.value_source not in (None, "depth"):
+            self.resolve("value")
+
     def _resolve(self, name: str, target: gl.BufferTexture, stride: int | None = None) -> None:
         """Write what the rows have of a channel to a texel for each covered pixel. stride: to one for each
         of some pixels, covered or not: one in so many of each line, and of the lines."""
-        kind, is_value = self.kind, name == "value"
-        texels = self.row_values if is_value else kind.texels(name)
+        for rows in self.kind.parts or (self.kind,):
+            self._resolve_rows(rows, name, target, stride)
+
+    def _resolve_rows(self, kind: PointRows, name: str, target: gl.BufferTexture, stride: int | None) -> None:
+        """Write a channel of the pixels that show some of the rows."""
+        is_value = name == "value"
+        texels = self._values_by_row(kind) if is_value else kind.texels(name)
         is_fetched = not is_value and kind.fetches(name)
         defines = {
             "CHANNEL": _RESOLVED[name],
             "HAS_ROWS": int(texels is not None or is_fetched),
             "IS_DEPTH": int(is_value and self.value_source == "depth"),
             "SAMPLED": int(stride is not None),
+            "PART": int(isinstance(kind, PartRows)),
             **kind.defines(not is_value),
         }
         program = self.gpu.compute("shade/resolve.comp", defines)
@@ -190,6 +212,8 @@ class RenderTarget(PictureBuffers, Coloring):
             self.gpu.set(program, plain=tuple(c / 255 for c in rgba(self.look.plain)[:3]))
             if stride is not None:
                 self.gpu.set(program, stride=stride)
+            if isinstance(kind, PartRows):
+                self.gpu.set(program, first=kind.first, part_count=kind.count)
             self.gpu.dispatch(program, self._count(stride or 1))
 
     def found_range(self) -> tuple[float, float]:

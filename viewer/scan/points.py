@@ -236,6 +236,15 @@ class PointCloud:
         scalars = {name: values[rows] for name, values in self.scalars.items()}
         return replace(self, **retained, scalars=scalars, ids=ids)
 
+    def between(self, start: int, stop: int) -> PointCloud:
+        """A run of the points, which shares the memory of all. They keep their ids; what is known of the scan
+        as a whole is not known of them."""
+        run = slice(start, min(stop, len(self)))
+        names = (*_ARRAYS, "remainders")
+        arrays = {name: values[run] for name in names if (values := getattr(self, name)) is not None}
+        scalars = {name: values[run] for name, values in self.scalars.items()}
+        return replace(self, **arrays, scalars=scalars, dropped=0, dropped_by={}, topology=None)
+
     def splat_reach(self) -> NDArray[np.float32]:
         """How far each splat reaches from its point, (N,): its radius, or its longer half-axis."""
         assert self.radii is not None

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -39,12 +40,13 @@ _STEP = 4.0  # squares that touch, by which depths of a closed surface differ at
 @dataclass(frozen=True)
 class _Squares:
     """Numbers that points/cells.glsl reads. point_size: edge, pixels. point_count: of all. stride, turn: of
-    how many rows in a run one is drawn, and which."""
+    how many rows in a run one is drawn, and which. first: row of the first point, where these are a part."""
 
     point_size: int
     point_count: int
     stride: int = 1
     turn: int = 0
+    first: int = 0
 
 
 def draw_squares(
@@ -64,6 +66,8 @@ def draw_squares(
     not all are drawn, and none is left out.
     """
     size = point_size or math.ceil(_touching(pose, surface.view))
+    if pose.is_split:
+        return _draw_parts(pose, surface, size, share)
     few = _few(surface, size)
     chunks = culled_chunks(pose) if stays and share >= 1 and len(pose.cloud) > few else None
     if chunks is not None:
@@ -91,6 +95,30 @@ def draw_squares(
     else:
         scatter(pose.gpu, visits, surface.depths, surface.rows)
     return surface.stats.is_sample
+
+
+def _draw_parts(pose: GpuPose, surface: Surface, size: int, share: float) -> bool:
+    """Write the points of a pose that has its arrays in parts: all, or one of some in a run."""
+    stats, stride = surface.stats, 1
+    if share < 1:
+        stride = stride_of(share)
+        stats.share = stats.known = share
+        stats.left_out = pose.count - sum(-(-part.pose.count // stride) for part in pose.parts)
+        size = _enlarged(size, pose, surface)
+    defines = {**_defines(size, None), "STRIDED": int(stride > 1), "PART": 1}
+    with keeping_nearest(pose.gpu, surface.depths, surface.rows) as nearest:
+        for part in pose.parts:
+            given = _Squares(size, part.pose.count, stride, first=part.first)
+            count = -(-part.pose.count // stride)
+            nearest.take(
+                Visits("points/cells.glsl", count, partial(_bind_positions, part.pose), defines, given)
+            )
+    surface.resolve_shaded()
+    return stats.is_sample
+
+
+def _bind_positions(pose: GpuPose, _: Program) -> None:
+    pose.array("positions").bind(Texture.POSITIONS)
 
 
 def _few(surface: Surface, size: int) -> float:
@@ -188,6 +216,7 @@ def _defines(
         "CHUNKED": False,
         "KEPT": False,
         "STRIDED": False,
+        "PART": False,
     }
     return {name: int(value) for name, value in given.items()}
 
