@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -22,13 +23,14 @@ if TYPE_CHECKING:
     from viewer.drawing.renderer import Renderer
 
 AMOUNT = Amount(points=10_000, views=1, size=(240, 160))
+REAL = ("horse-gallop", "crane")  # scenes of the data folder
 QUICK = ("blue noise", "stretched grid, with normals")
 LEAST, LEAST_SLITS = 0.02, 0.05  # percent of the subject: a pixel or two more are not worse
 Draw = Callable[[dict[str, Any]], Errors]
 
 
-def drawn(renderer: Renderer, condition: ScanCondition) -> Draw:
-    subject = catalog.subject(condition.scene or "torus", None)
+def drawn(renderer: Renderer, condition: ScanCondition, data: Path | None) -> Draw:
+    subject = catalog.subject(condition.scene or "torus", data)
     moment = subject.moment(0)
     cloud, _ = condition.scan(moment, AMOUNT.points, (0, 0))
     (camera,) = _cameras(moment, subject.up, condition, AMOUNT, 0)
@@ -59,8 +61,11 @@ def faults(errors: Errors) -> float:
     ],
 )
 @pytest.mark.slow
-def test_automatic_radii_and_passes_are_never_worse(renderer: Renderer, condition: ScanCondition) -> None:
-    errors = drawn(renderer, condition)
+def test_automatic_radii_and_passes_are_never_worse(
+    renderer: Renderer, condition: ScanCondition, request: pytest.FixtureRequest
+) -> None:
+    data = request.getfixturevalue("data_dir") if condition.scene in REAL else None
+    errors = drawn(renderer, condition, data)
     auto = errors({})
     for chosen in ({"radius": "own"}, {"passes": "two"}, {"radius": "own", "passes": "two"}):
         other = errors(chosen)

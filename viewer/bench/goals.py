@@ -64,7 +64,10 @@ GOALS = (
     SurfaceGoal("held_percent", "true within ±", "%", 98.0, (*_EVEN, *_THINNED, *_NOISY), low=93.0),
     SurfaceGoal("off_percent", "picks off without a warning", "%", 0.5, (*_EVEN, *_THINNED, *_NOISY)),
     SurfaceGoal("refused_percent", "picks refused", "%", 5.0, _EVEN),
-    SurfaceGoal("flipped_percent", "flipped normals", "%", 0.2, ("even", "random", "thinned 1:10")),
+    SurfaceGoal(
+        "flipped_percent", "flipped normals", "%", 0.2, ("even", "random", "thinned 1:10", "moving body")
+    ),
+    SurfaceGoal("flipped_percent", "flipped normals", "%", 1.0, ("thin legs",)),
     SurfaceGoal("wander_depth", "static: depth, standard deviation", "spacings", 0.04, _STATIC),
     SurfaceGoal("wander_normal", "static: normals wander", "°", 1.2, _STATIC),
     SurfaceGoal("wander_shading", "static: change of shading", "levels", 1.5, _STATIC),

@@ -133,6 +133,8 @@ CONDITIONS = (
     ScanCondition("stretched grid", _grid, _BARE, scene="torus"),
     ScanCondition("stretched grid, with normals", _grid, scene="torus"),
     ScanCondition("two sheets", _own, _BARE, scene="sheets"),
+    ScanCondition("thin legs", _own, _BARE, scene="horse-gallop"),
+    ScanCondition("moving body", _own, _BARE, scene="crane"),
     ScanCondition("face", _own, scene="demo", front=True),
 )
 

@@ -17,7 +17,7 @@ from .planes import AROUND, NeighborSearch, plane_normals
 from .points import PointCloud, checked_viewpoint
 from .pose import Pose
 from .range_view import merged_normals
-from .sides import LINKED, facing, facing_out
+from .sides import Orientation, facing, facing_out
 
 Vectors = NDArray[np.float64]  # (N, 3)
 
@@ -35,14 +35,17 @@ def _normals(pose: Pose) -> NDArray[np.float32]:
     return merged_normals(pose.views, pose.cloud) if pose.views else cloud_normals(pose.cloud)
 
 
-def cloud_normals(cloud: PointCloud, viewpoint: ArrayLike | None = None) -> NDArray[np.float32]:
+def cloud_normals(
+    cloud: PointCloud, viewpoint: ArrayLike | None = None, orientation: Orientation = "auto"
+) -> NDArray[np.float32]:
     """Unit normals of the planes through each point's nearest neighbours, (N, 3) float32.
 
     As many neighbours as the noise around asks for, 7 to 96, see `planes`.
 
     viewpoint: (3,), where the scanner stood, in absolute scan units: normals face it; None: the cloud's.
-    Where nothing tells it, normals face outwards, those of a sheet that can be seen from both sides the front
-    (+z), see `sides`. Where all neighbours lie in a line, to rounding, nothing tells a normal: zero, which
+    orientation: "quick", "fine" or "auto", how Scan4D finds the side without a viewpoint, see `facing_out`.
+    Without one, normals face outwards, those of a sheet that can be seen from both sides the front (+z), see
+    `sides`. Where all neighbours lie in a line, to rounding, nothing tells a normal: zero, which
     stands for none. Raises InputError where the viewpoint is not finite.
     """
     eye = cloud.viewpoint if viewpoint is None else checked_viewpoint(viewpoint)
@@ -56,7 +59,7 @@ def cloud_normals(cloud: PointCloud, viewpoint: ArrayLike | None = None) -> NDAr
     normals = plane_normals(search, near)
     checkpoint(0.7)
     if eye is None:
-        normals = facing_out(points, normals, near[:, :LINKED])
+        normals = facing_out(points, normals, near, orientation)
     else:
         normals = facing(normals, eye - cloud.origin - points)
     normals[_in_lines(points, near)] = 0

@@ -11,13 +11,16 @@ makes the sum higher.
 from __future__ import annotations
 
 import heapq
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..task import checkpoint
+from .patches import joined_things, summed
 
 Vectors = NDArray[np.float64]  # (N, 3)
+Orientation = Literal["auto", "quick", "fine"]
 
 LINKED = 9  # neighbours that are linked, the point itself included
 # The outside of a surface is the side that more views see, from both ends of each axis.
@@ -29,28 +32,37 @@ _GRID = 1024  # cells along an axis at most
 # Points at most of patches, of patches of these, ...: small enough at first that a wrong link spoils little;
 # and in other sizes again, since what must turn as a whole may not be one patch.
 _PATCHES = ((10, 40, 160), (10, 40, 160, 640), (5, 20, 80, 320))
-_FIRM = 0.3  # weight of links within patches, at least
-_LEVELS = 255  # of weights that differ
 _SEEN = 0.1  # that a view from outside weighs in links
 _TURNS = 20  # rounds in which points or patches turn, one by one
 _OFTEN = 1 << 12  # steps between checkpoints
 
 
-def facing_out(points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32]) -> NDArray[np.float32]:
+def facing_out(
+    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32], orientation: Orientation = "auto"
+) -> NDArray[np.float32]:
     """The normals, turned round where they point into the surface or away from the front, (N, 3).
 
-    points: (N, 3), distinct. near: (N, K), each point and its nearest others, nearest first.
+    points: (N, 3), distinct. near: (N, K), each point and its nearest others, nearest first. orientation:
+    "quick" uses links and the view from outside; "fine" also uses the winding number, see `fine_sides`;
+    "auto" does so if many links contradict each other.
     """
-    from . import side_kernels
+    from . import fine_sides, side_kernels
 
-    reach = float(np.median(np.linalg.norm(points[near[:, -1]] - points, axis=1)))
+    linked = np.ascontiguousarray(near[:, :LINKED])
+    reach = float(np.median(np.linalg.norm(points[linked[:, -1]] - points, axis=1)))
     normals = facing(normals, np.array([[1e-6, 1e-3, 1.0]]))  # whichever sign they came with
     seen = _SEEN * np.einsum("ij,ij->i", normals, _seen_from(points, reach))
-    most = len(near) * (near.shape[1] - 1)
+    most = len(linked) * (linked.shape[1] - 1)
     links, weights = np.empty((most, 2), np.int32), np.empty(most, np.float32)
-    found = side_kernels.link(points, normals, near, links, weights)
+    found = side_kernels.link(points, normals, linked, links, weights)
     links, weights = links[:found], weights[:found]
-    return normals * _agreeing(links, weights, seen)[:, None]
+    signs = _agreeing(links, weights, seen)
+    oriented = normals * signs[:, None]
+    held = weights * signs[links].prod(axis=1)
+    if orientation == "fine" or (orientation == "auto" and fine_sides.is_unsure(held)):
+        bonds = fine_sides.Bonds(links, held, seen * signs)
+        oriented *= fine_sides.better_sides(points, oriented, near, bonds)[:, None]
+    return oriented
 
 
 def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -90,14 +102,9 @@ def _in_patches(
 
     checkpoint()
     if patches:
-        strength = np.abs(weights) if anew else weights
-        firm = np.flatnonzero(strength >= _FIRM)
-        levels = (_LEVELS * (1 - strength[firm] / strength.max(initial=1))).astype(np.uint8)
-        order = firm[np.argsort(levels, kind="stable")]
-        joined, agreeing = np.empty(len(sizes), np.int32), np.empty(len(sizes), np.int8)
-        side_kernels.join(links, weights, order, patches[0], sizes.copy(), joined, agreeing)
+        joined, agreeing = joined_things(links, weights, sizes, patches[0], anew)
         larger = np.bincount(joined, sizes).astype(np.int32)
-        bonds = _summed(joined[links], weights * agreeing[links].prod(axis=1), len(larger))
+        bonds = summed(joined[links], weights * agreeing[links].prod(axis=1), len(larger))
         seen_of = np.bincount(joined, seen * agreeing).astype(np.float64)
         of_patches = _in_patches(*bonds, seen_of, larger, patches[1:], anew)
         signs = agreeing * of_patches[joined]
@@ -110,17 +117,6 @@ def _in_patches(
         signs = np.ones(len(sizes), np.int8)
     side_kernels.settle(links, weights, seen, _TURNS, signs)
     return signs
-
-
-def _summed(
-    links: NDArray[np.int32], weights: NDArray[np.floating], count: int
-) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Links (L, 2) between different ones of `count` things, each pair once, (P, 2), and their sums, (P,)."""
-    across = np.flatnonzero(links[:, 0] != links[:, 1])
-    keys = np.sort(links[across], axis=1).astype(np.int64) @ np.array([count, 1])
-    pairs, pair_of = np.unique(keys, return_inverse=True)
-    summed = np.bincount(pair_of, weights[across], len(pairs)).astype(np.float64)
-    return np.column_stack(np.divmod(pairs, count)).astype(np.int32), summed
 
 
 def _agreement(pairs: NDArray[np.intp], bonds: NDArray[np.float64]) -> NDArray[np.int8]:

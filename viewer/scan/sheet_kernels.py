@@ -1,0 +1,133 @@
+"""The inner loops of telling the two sides of a thin sheet apart, compiled by numba; see `fine_sides`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled import compiled
+
+_TERMS = 7  # of a quadric, and the distance between two sheets
+_LEAST = 4  # points of a sheet
+_ROUNDS = 4  # in which points move from sheet to sheet
+_RIDGE = 1e-9
+
+
+@compiled
+def _tangents(normal: NDArray[np.float64], u: NDArray[np.float64], v: NDArray[np.float64]) -> None:
+    """Two unit vectors, (3,), across a normal, (3,), and each other."""
+    least = 0
+    for axis in range(1, 3):
+        if abs(normal[axis]) < abs(normal[least]):
+            least = axis
+    one, other = (least + 1) % 3, (least + 2) % 3
+    length = np.sqrt(normal[one] ** 2 + normal[other] ** 2)
+    u[least], u[one], u[other] = 0.0, -normal[other] / length, normal[one] / length
+    for axis in range(3):
+        after, last = (axis + 1) % 3, (axis + 2) % 3
+        v[axis] = normal[after] * u[last] - normal[last] * u[after]
+
+
+@compiled
+def _split(off: NDArray[np.float64], side: NDArray[np.float64]) -> None:
+    """Fill the sides, (K,), 1 and -1, of offsets (K,), so that their means lie as far apart as can be."""
+    order, count = np.argsort(off), len(off)
+    total, below, best, cut = off.sum(), 0.0, -1.0, _LEAST
+    for n in range(1, count - _LEAST + 1):
+        below += off[order[n - 1]]
+        if n < _LEAST:
+            continue
+        apart = below / n - (total - below) / (count - n)
+        if apart * apart * n * (count - n) > best:
+            best, cut = apart * apart * n * (count - n), n
+    for n in range(count):
+        side[order[n]] = -1.0 if n < cut else 1.0
+
+
+@compiled
+def _fit(
+    terms: NDArray[np.float64], heights: NDArray[np.float64], off: NDArray[np.float64]
+) -> NDArray[np.floating]:
+    """The coefficients, (C,), of terms (K, C) that fit heights (K,) best. Gets their errors, off, (K,)."""
+    products = terms.T @ terms
+    for term in range(len(products)):
+        products[term, term] += _RIDGE
+    found = np.linalg.solve(products, terms.T @ heights)
+    off[:] = heights - terms @ found
+    return found
+
+
+@compiled
+def split_in_sheets(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    near: NDArray[np.int32],
+    rows: tuple[int, int],
+    explained: NDArray[np.float64],
+    sides: NDArray[np.int8],
+) -> None:
+    """Fit two parallel sheets to the neighbours of points: quadrics that differ by a distance.
+
+    points, normals: (N, 3). near: (N, K), K above 8. rows: first and last + 1 of the points. Gets explained,
+    (N,), the share of the variance around one quadric that two explain, and sides, (N, K), 1 or -1, the sheet
+    of each neighbour.
+    """
+    count = near.shape[1]
+    u, v, offset = np.empty(3), np.empty(3), np.empty(3)
+    terms, heights, off, side = np.ones((count, _TERMS)), np.empty(count), np.empty(count), np.empty(count)
+    for i in range(rows[0], rows[1]):
+        _tangents(normals[i], u, v)
+        farthest = points[near[i, count - 1]] - points[i]
+        scale = 1.0 / np.sqrt((farthest * farthest).sum())
+        for k in range(count):
+            offset[:] = (points[near[i, k]] - points[i]) * scale
+            x, y = (offset * u).sum(), (offset * v).sum()
+            heights[k] = (offset * normals[i]).sum()
+            terms[k, 1], terms[k, 2], terms[k, 3], terms[k, 4], terms[k, 5] = x, y, x * x, x * y, y * y
+        _fit(np.ascontiguousarray(terms[:, : _TERMS - 1]), heights, off)
+        one, two = (off * off).sum(), 0.0
+        for _ in range(_ROUNDS):
+            _split(off, side)
+            terms[:, _TERMS - 1] = side
+            apart = _fit(terms, heights, off)[_TERMS - 1]
+            two = (off * off).sum()
+            off += apart * side
+            if apart <= 0.0:
+                break
+        is_flat = one <= _RIDGE * count
+        explained[i] = 0.0 if is_flat else 1.0 - two / (count - _TERMS) / (one / (count - _TERMS + 1))
+        for k in range(count):
+            sides[i, k] = np.int8(side[k])
+
+
+@compiled
+def count_votes(
+    near: NDArray[np.int32],
+    trust: NDArray[np.float64],
+    sides: NDArray[np.int8],
+    links: NDArray[np.int32],
+    votes: NDArray[np.float64],
+    trusted: NDArray[np.float64],
+) -> None:
+    """Ask the fits of all points around two linked ones whether these lie on one sheet.
+
+    near, sides: (N, K). trust: (N,), in the fit of each point, 0 to 1. links: (L, 2). Gets votes, (L,), from
+    -1, on two sheets, to 1, on one, and trusted, (L,), the mean trust.
+    """
+    count = near.shape[1]
+    for n in range(len(links)):
+        one, other = links[n, 0], links[n, 1]
+        both, total, weight = 0, 0.0, 0.0
+        for k in range(count):
+            fit, at_one, at_other = near[one, k], -1, -1
+            for m in range(count):
+                if near[fit, m] == one:
+                    at_one = m
+                if near[fit, m] == other:
+                    at_other = m
+            if at_one >= 0 and at_other >= 0:
+                both += 1
+                weight += trust[fit]
+                total += trust[fit] * sides[fit, at_one] * sides[fit, at_other]
+        votes[n] = total / weight if weight > 0.0 else 0.0
+        trusted[n] = weight / both if both else 0.0
