@@ -68,7 +68,7 @@ print(*heard, task.name, sep="|")
 @pytest.mark.slow
 def test_what_has_to_be_compiled_is_announced_and_what_is_kept_is_not(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
-    once = "Compiling code for this machine, which happens only once"
+    once = "Compiling code for this computer, which happens only once"
     assert announced(folder, cache) == [once, once, "Reading"]
     assert announced(folder, cache) == ["Reading"]
     assert announced(folder, None, NOWHERE) == ["Preparing", "Preparing", "Reading"]

@@ -99,7 +99,7 @@ def test_doctor_shows_where_each_comes_from_and_what_cannot_be_used(target: Path
         f"{sys.executable} -m pip uninstall broken-pack",
         "The backend 'two' of broken-pack 0.1 is not used: empty defines 0 subclasses of Backend",
         "The reader 'stops' of broken-pack 0.1 cannot be imported (SystemExit: 3)",
-        "The reader 'formless' of broken-pack 0.1 is not used: the module has neither SUFFIXES nor find",
+        "The reader 'formless' of broken-pack 0.1 is not used: the module defines neither SUFFIXES nor find",
         "The measure 'missing' of broken-pack 0.1 cannot be imported (ModuleNotFoundError: No module named "
         "'not_there_at_all')",
         "The backend 'points' of taking-pack 3.0 is not used: Scan4D already has this name. Rename its entry",
@@ -172,9 +172,17 @@ def test_a_backend_with_faulty_declarations_is_left_out(
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("'.wrong'", "'wrong'", "the suffix 'wrong' is not lower case with a dot in front. Write '.wrong'"),
-        ("'.wrong'", "'.WRONG'", "the suffix '.WRONG' is not lower case with a dot in front. Write '.wrong'"),
-        ("def read", "def load", "the module has SUFFIXES, but no read"),
+        (
+            "'.wrong'",
+            "'wrong'",
+            "the suffix 'wrong' must begin with a dot and be in lower case. Write '.wrong'",
+        ),
+        (
+            "'.wrong'",
+            "'.WRONG'",
+            "the suffix '.WRONG' must begin with a dot and be in lower case. Write '.wrong'",
+        ),
+        ("def read", "def load", "the module defines SUFFIXES, but no read"),
     ],
 )
 def test_a_reader_with_faulty_declarations_is_left_out(

@@ -59,7 +59,7 @@ class Camera:
         fov_y = _number(self.fov_y)
         if fov_y is None or not _NARROWEST <= fov_y <= _WIDEST:
             what = f"the camera's fov_y is {shortened(self.fov_y)}"
-            raise InputError(f"{what}, expected {_NARROWEST:g} to {_WIDEST:g} degrees")
+            raise InputError(f"{what}, but must be {_NARROWEST:g} to {_WIDEST:g} degrees")
         object.__setattr__(self, "fov_y", fov_y)
         for name in ("height", "near", "far"):
             if getattr(self, name) is not None:

@@ -74,7 +74,7 @@ class _DiskCache(FunctionCache):
                 self.flush()
             found = None
         if found is None:
-            announce("Compiling code for this machine, which happens only once")
+            announce("Compiling code for this computer, which happens only once")
         return found
 
     def save_overload(self, *args: Any) -> None:

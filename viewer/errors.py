@@ -79,7 +79,7 @@ _SYSTEM = {
     errno.EPERM: _PERMISSION,
     errno.ENOSPC: _FULL,
     getattr(errno, "EDQUOT", errno.ENOSPC): _FULL,  # a share of it
-    errno.EFBIG: ("the file would be larger than this disk allows", "Use another disk"),
+    errno.EFBIG: ("the file would be larger than this disk can store", "Use another disk"),
     errno.EROFS: ("the file system is read-only", "Use another folder"),
     errno.ENAMETOOLONG: ("the name of the file is too long", "Use a shorter name"),
     errno.ENOENT: ("no such file or folder", "Check its name"),
@@ -89,7 +89,7 @@ _SYSTEM = {
     errno.EMFILE: ("too many files are open", "Close other programs, or raise 'ulimit -n'"),
     errno.ENFILE: ("too many files are open", "Close other programs"),
     errno.ENOMEM: ("not enough memory", "Close other programs"),
-    errno.EIO: ("the disk fails to read or write the file", "Copy the file to another disk"),
+    errno.EIO: ("the disk failed to read or write the file", "Copy the file to another disk"),
 }
 _CUT_SHORT = re.compile(r"[0-9]+ requested and [0-9]+ written")  # all that numpy tells of a full disk
 

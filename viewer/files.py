@@ -136,7 +136,7 @@ def named_inside(folder: Path, name: str, where: object) -> Path:
     path = Path(name)
     leads_out = path.is_absolute() or path.drive or path.root or ".." in re.split(r"[\\/]", name)
     if leads_out or not path.name or not name.isprintable() or not 0 < len(name) <= _LONGEST_NAME:
-        hint = "Put that file into this folder, and give its name without a path"
+        hint = "Put the named file into this folder, and write its name without a path"
         raise InputError(f"names '{shortened(name)}', which is not a file in its folder", where, hint)
     return folder / path
 

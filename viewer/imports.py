@@ -61,7 +61,9 @@ def missing_packages(*names: str) -> MissingPackageError:
 
     what = f"Scan4D needs packages that are not installed: {', '.join(names)}"
     packages = " ".join(PACKAGES[name] for name in names)
-    error = MissingPackageError(what, hint=f"Install it: {sys.executable} -m pip install {packages}")
+    error = MissingPackageError(
+        what, hint=f"Install the missing packages: {sys.executable} -m pip install {packages}"
+    )
     error.name = names[0]
     return error
 

@@ -64,8 +64,8 @@ class Look:
 
     quality: str = param(
         "balanced",
-        "Anti-aliasing of still pictures. fast: one sample per pixel; balanced: the mean of 5; fine: the "
-        "mean of 17",
+        "Anti-aliasing of still pictures. fast: one sample per pixel; balanced: the mean of 5 samples; "
+        "fine: the mean of 17 samples",
         choices=tuple(SAMPLES), words=QUALITY_WORDS, title="Anti-aliasing", basic=True,
     )  # fmt: skip
     color_by: str = param(
@@ -93,11 +93,11 @@ class Look:
         choices=tuple(RANGE_WORDS), words=RANGE_WORDS, group="Colour", unless=_UNRANGED, basic=True,
     )  # fmt: skip
     low: float | None = param(
-        None, "Value at the start of the colour map; auto: from the data",
+        None, "Value at the start of the colour map; auto: computed from the data",
         type=float, group="Colour", unless=_UNMAPPED, basic=True,
     )  # fmt: skip
     high: float | None = param(
-        None, "Value at the end of the colour map; auto: from the data",
+        None, "Value at the end of the colour map; auto: computed from the data",
         type=float, group="Colour", unless=_UNMAPPED, basic=True,
     )  # fmt: skip
     up: str = param(
@@ -112,14 +112,17 @@ class Look:
     background: str = param("#1a1c20", "Background colour, #rrggbb or #rrggbbaa", group="Colour", basic=True)
     holes: bool = param(
         False,
-        f"Paint holes red: empty areas of up to {2 * HOLE_REACH} pixels inside the subject",
+        f"Show holes in red. Holes are empty areas of up to {2 * HOLE_REACH} pixels inside the subject",
         title="Show holes",
         group="Colour",
         key="G",
         basic=True,
     )
     light: str = param(
-        "auto", "flat: no light; head: light from the viewer; fixed: light from an azimuth and an elevation",
+        "auto", 
+            "Direction of the light. flat: no light; head: from the viewer; fixed: from an azimuth and an "
+            "elevation"
+        ,
         choices=("auto", "flat", "head", "fixed"), words=LIGHT_WORDS, group="Light", basic=True,
     )  # fmt: skip
     azimuth: float = param(
@@ -141,7 +144,7 @@ class Look:
         24.0, "Sharpness of the highlights (Phong exponent)", low=1, high=200, group="Light", unless=_FLAT
     )
     eye_dome: bool | None = param(
-        None, "Darken the edges at depth steps; auto: if the picture has no other light",
+        None, "Darken edges where the depth changes suddenly; auto: only if the picture has no other light",
         type=bool, title="Edge shading (eye-dome)", group="Light", basic=True,
     )  # fmt: skip
     eye_dome_strength: float = param(

@@ -182,11 +182,14 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
         return f"has the key '{parameter.key}', which another parameter also has"
     for old in parameter.deprecated:
         if old in by_name or any(old in other.deprecated for other in others.values()):
-            return f"has the former name '{old}', which another parameter has or had"
+            return f"has the former name '{old}', which is also a name or former name of another parameter"
     for condition in parameter.when:
         if condition.parameter not in others:
             known = ", ".join(others)
-            return f"depends on '{condition.parameter}', which is not another parameter. Known: {known}"
+            return (
+                f"depends on '{condition.parameter}', which is not the name of another parameter. Known: "
+                f"{known}"
+            )
     try:
         parameter.parse(parameter.default)
         for word in parameter.words:

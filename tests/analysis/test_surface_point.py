@@ -119,7 +119,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     y, x = np.argwhere(surface.level == 2)[0].tolist()
     picked, pose = pick(surface, x, y), Pose(0, 0.0, "", cloud)
     assert picked is not None
-    with pytest.raises(InputError, match="filled by the renderer"):
+    with pytest.raises(InputError, match="renderer has filled a hole"):
         SurfacePoint.of(picked, pose)
     made = SurfacePoint.of(picked, pose, filled=True)
     assert (made.id, made.level) == (None, 2)

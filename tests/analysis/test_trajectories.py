@@ -106,7 +106,7 @@ def test_gaps_of_landmarks_and_of_anchors_are_gaps() -> None:
 
 def test_what_cannot_hold_a_scan_still_is_told() -> None:
     tracks = heads(between=moved(np.array([0.0, 0, 0])))
-    with pytest.raises(InputError, match="needs three rigid references"):
+    with pytest.raises(InputError, match="needs at least three rigid references"):
         stabilising(tracks, ["left", "right", "left"])
     with pytest.raises(InputError, match="'chin' is not placed"):
         stabilising(tracks, ["left", "right", "chin"])

@@ -189,7 +189,7 @@ def test_a_recording_that_cannot_be_saved_is_kept_and_that_is_told(
     with monkeypatch.context() as patched:
         patched.setattr(Recording, "save", full)
         capture.toggle_recording()
-    assert "saves this part at the next start" in app.told[-1]
+    assert "saves the recording at the next start" in app.told[-1]
     (journal,) = journals()
     path = saved(journal)
     assert path is not None

@@ -86,7 +86,7 @@ def test_files_that_come_to_a_sequence_are_offered_and_others_are_not(tmp_path: 
         np.save(tmp_path / f"{number}.npy", np.zeros((5, 3)))
     for _ in range(4):
         watch.look()
-    assert watch.told == ["The scan has 2 more files on disk."]
+    assert watch.told == ["The scan has 2 new files on disk."]
 
 
 def test_a_file_beside_a_scan_of_one_file_is_not_of_it(tmp_path: Path) -> None:

@@ -136,7 +136,7 @@ def test_what_is_dropped_is_opened_or_told(screen: Screen, tmp_path: Path, study
         app.drop(study / "worse 1%.ply")
         app.told("Cannot open: .*worse 1%.ply")
         app.drop(study / "one", study / "wrong.json")
-        app.told(r"Not opened: wrong\.json")
+        app.told(r"Scan4D did not open wrong\.json")
         app.see(scan=str(study / "one"))
         screen.do("key", "r")
         app.see(is_recording=True)

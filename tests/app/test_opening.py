@@ -252,6 +252,6 @@ def test_a_scan_opens_without_corrections_that_it_cannot_be_read_with(tmp_path: 
     opened = begin(way, read_from)
     opened.timeline.close()
     assert opened.reading == {}
-    assert "reads it without them" in str(opened.problem)
+    assert "ignores the corrections" in str(opened.problem)
     with pytest.raises(InputError):
         begin(way._replace(must_correct=True), read_from)

@@ -87,7 +87,7 @@ def test_a_refused_table_shows_its_columns_and_opens_with_roles(tmp_path: Path) 
     path = tmp_path / "odd.csv"
     path.write_text("u,v,w\n" + "".join(f"{i % 9},{i // 9},{i % 4}\n" for i in range(80)))
     choices = read(TableChoices(path, {}))
-    assert "names with x, y, z" in choices.problem
+    assert "neither numbers nor the names x, y and z" in choices.problem
     assert choices.problem.endswith("Choose a column for x, y and z.")
     assert choices.roles == ["-", "-", "-"]
     for column, role in enumerate("xyz"):
@@ -194,7 +194,7 @@ def test_a_table_of_times_that_is_broken_is_shown_as_a_problem(takes: Path) -> N
 
 def test_too_many_lines_to_skip_are_a_problem(table: Path) -> None:
     choices = read(TableChoices(table, {"skip": "99999999"}))
-    assert "not a value of skip" in choices.problem
+    assert "not a possible value of skip" in choices.problem
     assert not choices.can_open
     choices.state("skip", "500")
     assert not read(choices).can_open

@@ -41,7 +41,7 @@ def test_what_is_kept_is_found_by_the_content_of_a_renamed_folder(tmp_path: Path
     used: list[SavedSession] = []
     offer = offer_of_stored(str(new), found(fingerprint(find_source(new).files)), used.append)
     assert isinstance(offer, Offer)
-    assert f"{old} (bookmarks), which is no longer there" in offer
+    assert f"{old} (bookmarks), which no longer exists" in offer
     ((title, use),) = offer.choices.items()
     assert title == "Use bookmarks of doe"
     use()
@@ -81,7 +81,7 @@ def test_other_files_under_the_same_name_are_told_and_what_was_made_is_put_aside
     assert isinstance(offer, Offer)
     assert "may show another subject" in offer
     keeps, begins = offer.choices
-    assert (keeps, begins) == ("Keep the bookmarks", "Begin without the bookmarks")
+    assert (keeps, begins) == ("Keep the bookmarks", "Start without the bookmarks")
     offer.choices[begins]()
     assert began == ["anew"]
     store(SavedSession("/scans/current", OTHER, 0, Document()))  # of the other subject

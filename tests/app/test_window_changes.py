@@ -38,7 +38,7 @@ def test_new_frames_come_in_by_the_button_that_reloads(screen: Screen, tmp_path:
         assert app.settle().frame == 2
         app.see(knows_files=True)
         np.save(scan / "3.npy", points(3))
-        app.told("The scan has 1 more file on disk")
+        app.told("The scan has 1 new file on disk")
         app.settle()
         app.do(("mousemove", *lowest_button(app)), ("click", 1))
         app.see(lambda state: state.is_opening)

@@ -176,7 +176,7 @@ def test_what_was_done_a_moment_before_a_kill_comes_back(screen: Screen, tmp_pat
     for number in range(3):
         formats.write(scan / f"{number}.npz", PointCloud.from_arrays(np.eye(3) + number))
     with running_app(screen, tmp_path, scan) as app:
-        app.told("The files of the scan have changed since Scan4D saved your changes")
+        app.told("The files of the scan have changed since Scan4D saved your work")
 
 
 def saved_session(app: RunningApp, name: str) -> Path:
@@ -192,7 +192,7 @@ def saved_session(app: RunningApp, name: str) -> Path:
 def open_and_find(app: RunningApp, session: Path, scan: Path, document: object) -> None:
     """Drop a session whose scan is missing, and name the folder where it is now."""
     app.drop(session)
-    app.told("its scan 'scans/wall' is missing")
+    app.told("cannot find the scan 'scans/wall' of this session")
     app.settle()
     app.act("problems", ("item_click", "$$0/Locate scan..."))
     app.see(is_browser_open=True)
@@ -269,7 +269,7 @@ def test_a_session_of_which_a_part_cannot_be_read_and_whose_renderer_is_not_ther
         path.write_text(json.dumps(data))
         hands.press("ctrl+Home", "ctrl+4")
         app.drop(path)
-        app.told("cannot read some of the saved changes: parts.landmarks")
+        app.told("cannot read some of your saved work on this scan: parts.landmarks")
         app.told("This version of Scan4D has no renderer 'cubist'. .* draws the scan instead")
         state = app.see(frame=1)
         assert state.document["backend"] == "cubist"
@@ -315,11 +315,12 @@ def test_the_command_line_opens_a_session_and_tells_what_is_wrong(
         return ended.stderr
 
     scan.rename(scan.parent / "gone")
-    assert f"its scan 'scans/wall' is missing. Give the path of the scan: scan4d view SCAN {path}" in refused(
-        path
+    assert (
+        f"'scans/wall', a scan that Scan4D cannot find. Give the path of the scan: scan4d view SCAN {path}"
+        in refused(path)
     )
     data: dict[str, Any] = json.loads(path.read_text())
     path.write_text(json.dumps(data | {"document": 3}))
-    assert f"{path}, document: is not an object with named values but 3" in refused(path)
+    assert f"{path}, document: must be an object with named values, not 3" in refused(path)
     path.write_text("{")
     assert "is not JSON" in refused("demo", path)

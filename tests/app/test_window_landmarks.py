@@ -270,7 +270,7 @@ def test_files_are_read_and_saved_and_those_of_another_scan_told(
         write_landmarks(tmp_path / f"{name}.mrk.json", found)
     with running_app(screen, tmp_path, scan) as app:
         app.drop(tmp_path / "elsewhere.mrk.json")
-        app.told("landmarks lie off the scan")
+        app.told("no landmark lies on the scan")
         app.drop(tmp_path / "here.mrk.json")
         app.told("Imported 2 landmarks from here.mrk.json")
         state = app.see(lambda state: "B" in state.landmarks)

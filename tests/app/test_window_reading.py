@@ -22,7 +22,7 @@ def test_an_assumption_is_explained_with_its_alternatives() -> None:
     assert lines[0] == "not known"
     assert "Source: assumed" in lines
     assert "The file states none" in lines
-    assert [line for line in lines if "what you measure may be wrong" in line]
+    assert [line for line in lines if "your measurements may be wrong" in line]
     assert lines[-1].endswith("for example: mm, m")
     assert len(explanation(Decision("format", "PLY"))) == 2
 
@@ -229,7 +229,7 @@ def test_the_work_on_a_scan_survives_corrections_and_their_undo(
             assert state.document["bookmarks"] == work.document["bookmarks"]
             assert state.document["parts"] == work.document["parts"]
         type_into(app, "frames", "gone.txt")
-        app.told("with this correction, and removes it: no file matches")
+        app.told("with this correction, and removes the correction: no file matches")
         state = app.settle()
         assert state.document["reading"] == {"columns": "- x y z", "frames": "f0.txt;f1.txt"}
         assert state.document["parts"] == work.document["parts"]

@@ -172,7 +172,7 @@ def test_files_left_aside_are_chosen_from_their_message(screen: Screen, tmp_path
     for name in ("f001", "f002", "f003", "f002 - Copy"):
         np.save(folder / f"{name}.npy", np.random.default_rng(1).random((50, 3)))
     with running_app(screen, tmp_path, folder) as app:
-        assert not re.search("--read", app.told("leaves aside f002 - Copy.npy")[0])
+        assert not re.search("--read", app.told("does not play f002 - Copy.npy")[0])
         app.act("problems", ("item_click", "$$0/Choose frames..."))
         app.see(lists=1)
         app.settle()
@@ -227,7 +227,7 @@ def test_a_recording_whose_scan_has_moved_asks_where_it_is(
     shutil.move(takes, tmp_path / "moved")
     with running_app(screen, tmp_path, "demo") as app:
         app.drop(picture)
-        app.told(r"its scan .\S*takes. is missing")
+        app.told(r"cannot find the scan .\S*takes. of this")
         app.settle()
         app.act("problems", ("item_click", "$$0/Locate scan..."))
         app.see(is_browser_open=True)
@@ -275,7 +275,7 @@ def test_a_missing_scan_with_bookmarks_is_located(screen: Screen, tmp_path: Path
         app.screen.do("type", "--delay", 15, takes)
         app.settle()
         app.press("Return")
-        app.told("The scan .* is missing")
+        app.told("cannot find the scan")
         app.settle()
         app.act("problems", ("item_click", "$$0/Locate scan..."))
         app.see(is_browser_open=True)

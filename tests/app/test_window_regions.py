@@ -98,7 +98,7 @@ def test_a_region_is_drawn_and_its_area_is_known_in_all_frames(
         app.act(PANEL, ("item_click", "###region"))
         left, top, *_ = app.view()
         app.drag((left + 4, top + 40), (left + 20, top + 60))
-        app.told("No surface inside that outline")
+        app.told("There is no surface inside this outline")
         assert app.settle().clicking == "plotting"
         screen.do("key", "Escape")
         assert app.settle().clicking is None

@@ -23,7 +23,7 @@ def test_what_was_made_comes_back_under_another_name(screen: Screen, tmp_path: P
     old.rename(new)
     with running_app(screen, tmp_path, new) as app:
         app.told(
-            "Scan4D has seen the files of this scan under another name: .*doe .bookmarks., which is no longer"
+            "Scan4D has seen the files of this scan under another name: .*doe .bookmarks., which no longer"
         )
         assert not app.settle().document["bookmarks"]
         app.do(("mousemove", *lowest_button(app)), ("click", 1))

@@ -142,7 +142,7 @@ class Tool:
 """
 UNBALANCED = {
     "push_id() and pop_id()": "imgui.push_id('begun')",
-    "begin() or begin_child() and its end": "imgui.begin_child('begun')",
+    "begin() and end(), or begin_child() and end_child()": "imgui.begin_child('begun')",
     "push_style_color() and pop_style_color()": "imgui.push_style_color(imgui.Col_.text, 0xFFFFFFFF)",
     "begin_disabled() and end_disabled()": "imgui.begin_disabled()",
 }
@@ -390,11 +390,11 @@ def test_what_a_tool_lays_over_the_scan_is_shown_picked_and_replayed(
         height, number = pointed(app)
         assert number == pytest.approx(5 * height[1], abs=0.05)
         app.press("r")
-        app.told("Cannot record: Scan4D computed the colours 'rising'")
+        app.told("Cannot record: the picture shows the colours 'rising'")
         app.press("ctrl+e")
-        app.told("Cannot export: Scan4D computed the colours 'rising'")
+        app.told("Cannot export: the picture shows the colours 'rising'")
         app.press("p")
-        app.told("cannot be replayed: Scan4D computed the colours 'rising'")
+        app.told("cannot replay this picture: the picture shows the colours 'rising'")
         colored = Path(app.told(r"Saved (.+\.png)")[1])
         assert len(np.unique(pixels(colored).reshape(-1, 3), axis=0)) > 50
         with pytest.raises(InputError):

@@ -11,7 +11,7 @@ from virtual_screen import PATIENCE, RunningApp, running_app, stored_of, virtual
 
 from viewer.document.saved_session import SavedSession
 
-CHANGED = "something else, perhaps another window, has saved changes of this scan"
+CHANGED = "another program, perhaps a second window of Scan4D, has saved work on this scan"
 
 
 def add_bookmark(app: RunningApp, count: int, right: int) -> None:

@@ -93,7 +93,7 @@ def test_a_unit_that_is_no_word_ends_nothing(screen: Screen, tmp_path: Path) -> 
     file.write_text(json.dumps(kept))
     with running_app(screen, tmp_path, scan) as app:
         app.act(PANEL, ("mouse_move", "##noise"))
-        app.told("cannot read some of the saved changes: (goal, unit|unit, goal)")
+        app.told("cannot read some of your saved work on this scan: (goal, unit|unit, goal)")
         state = app.settle()
         assert (state.unit, len(state.landmarks)) == ("units", 2)
         assert "Traceback" not in app.log()

@@ -56,7 +56,7 @@ def test_each_scan_stands_upright_by_itself_and_keeps_what_its_user_said(
 ) -> None:
     assert camera_of(app).up == up_vector("+y")
     app.screen.do("key", "Next")
-    words = app.told(r"guesses that (\S+) is up: (.*?)\. Change it below the cube").groups()
+    words = app.told(r"assumes that (\S+) points up, because (.*?)\. You can change").groups()
     assert words == ("+z", "the scan stands stably with this axis up")
     assert camera_of(app).up == up_vector("+z")
     app.choose(PANEL, "##up", "###-x")

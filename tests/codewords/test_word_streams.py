@@ -93,7 +93,7 @@ def test_other_files_are_refused(small: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
         read_stream(small.parent)
     small.write_bytes(small.read_bytes() + b"\0")
-    with pytest.raises(InputError, match="is longer than its header says"):
+    with pytest.raises(InputError, match="is longer than its header states"):
         read_stream(small)
 
 
@@ -144,16 +144,16 @@ def test_streams_that_an_engine_cannot_draw(small: Path) -> None:
     steep = np.full((len(stream), 3), (1 << 26) + 1, np.int32)
     for changes, words in (
         ({"line_starts": lines}, "begins before"),
-        ({"line_starts": stream.line_starts[:-1]}, "does not match the lines"),
-        ({"line_starts": stream.line_starts + 1}, "does not match the lines"),
+        ({"line_starts": stream.line_starts[:-1]}, "is not the sum over the lines"),
+        ({"line_starts": stream.line_starts + 1}, "is not the sum over the lines"),
         ({"words": beyond}, "columns of its strip"),
-        ({"words": material}, "beyond the 2 in the table"),
+        ({"words": material}, "the table of 2 materials does not contain"),
         ({"ids": ids}, "sorted by their ids"),
         ({"ids": stream.ids[1:]}, "must store an id for each code word"),
-        ({"finer": steep}, "finer depths"),
+        ({"finer": steep}, "exact depths"),
         ({"finer": steep[1:]}, "must store an id for each code word"),
         ({"stride": 513}, "1 to 512 columns, not 513"),
-        ({"size": (600, 1 << 15)}, "does not match the lines"),
+        ({"size": (600, 1 << 15)}, "is not the sum over the lines"),
         ({"size": (1 << 14, 1 << 14)}, "16384 x 16384"),
     ):
         with pytest.raises(InputError, match=words):

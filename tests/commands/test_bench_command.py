@@ -180,7 +180,7 @@ def test_rows_of_a_run_that_was_stopped_before_its_report_make_one_later(
         done = run("bench", "--suite", "numerics", "--backend", "points", "-o", tmp_path)
     assert done.code == 1
     kept, stopped = done.err.splitlines()
-    assert "holds the results" in kept
+    assert "contains the results" in kept
     assert stopped == "scan4d: stopped"
     assert not (tmp_path / "report.html").exists()
 

@@ -104,7 +104,7 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     message = refused("rendre", "x")
     assert all(name in message for name in ("'rendre'. Did you mean 'render'?", *command_names()))
     assert "'scan4d --help'" in refused("--bogus")
-    assert "Write it after 'info'" in refused("-q", "info", scans / "ball.npz")
+    assert "Write '-q' after 'info'" in refused("-q", "info", scans / "ball.npz")
     assert "-o" in refused("render", scans / "ball.npz")
     assert "'--outptu'. Did you mean '--output'" in refused("render", "demo", "--outptu", "x.png")
     for words in (["--set", "a=1", scans / "ball.npz"], [scans / "ball.npz"]):
@@ -114,10 +114,12 @@ def test_missing_and_unknown_commands(refused: Callable[..., str], run: Run, sca
     assert "a command is missing before '--set'" in refused("--set", "a=1", "nowhere.ply")
     for command in ("doctor", "backends"):
         message = refused(command, "extra")
-        assert f"'extra': unexpected, because 'scan4d {command}' takes only options" in message
+        assert f"'extra': not expected here, because 'scan4d {command}' takes only options" in message
         assert "quote" not in message
-    assert "'c': unexpected, because 'scan4d convert' takes SCAN OUT" in refused("convert", "a", "b", "c")
-    assert "the name after 'scan4d info' is empty" in refused("info", "")
+    assert "'c': not expected here, because 'scan4d convert' takes SCAN OUT" in refused(
+        "convert", "a", "b", "c"
+    )
+    assert "the word after 'scan4d info' is empty" in refused("info", "")
     assert "SCAN" in refused("info")
     done = run()
     assert (done.code, done.err) == (0, "")
@@ -134,7 +136,9 @@ def test_an_unexpected_error_is_one_message(
     ball = ["render", str(scans / "ball.npz"), "-o", str(tmp_path / "a.png")]
     done = run(*ball)
     assert done.code == 1
-    assert done.err == "scan4d: internal error (ZeroDivisionError: by nought). Run it again with --debug\n"
+    assert done.err == (
+        "scan4d: internal error (ZeroDivisionError: by nought). Run the command again with --debug\n"
+    )
     assert cli.main([*ball, "--debug"]) == 1
     err = capsys.readouterr().err
     assert err.startswith("Traceback")

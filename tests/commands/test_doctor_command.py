@@ -41,9 +41,9 @@ def test_an_older_opengl_is_named(tmp_path: Path) -> None:
     older = {"MESA_GL_VERSION_OVERRIDE": "3.3", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
     done = finish(process("render", "demo", "-o", tmp_path / "a.png", **older))
     assert done.code == 3
-    assert re.fullmatch(r"scan4d: OpenGL 3\.3 on [^\n]* is too old\. [^\n]* 4\.3 [^\n]*\n", done.err), (
-        done.err
-    )
+    assert re.fullmatch(
+        r"scan4d: OpenGL 3\.3 on [^\n]* is too old for Scan4D\. [^\n]* 4\.3 [^\n]*\n", done.err
+    ), done.err
     done = finish(process("doctor", **older))
     assert done.code == 3
     assert "OpenGL 3.3 on " in done.out

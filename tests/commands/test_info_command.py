@@ -125,12 +125,14 @@ def test_info_tries_few_of_many_broken_poses(kind: str, run: Run, tmp_path: Path
             (tmp_path / "rgbd.match").write_text("".join(f"depth/{n}.png {n}.png\n" for n in numbers))
     with open_scan(tmp_path) as timeline:
         assert len(timeline) == FRAMES
-        with pytest.raises(InputError, match=f"^{tmp_path.name}: Scan4D tried 100 of {FRAMES} frames"):
+        with pytest.raises(
+            InputError, match=f"^{tmp_path.name}: Scan4D tried to read 100 of {FRAMES} frames"
+        ):
             first_readable(timeline, range(FRAMES))
         assert len(timeline.broken) == 100
     done = run("info", tmp_path)
     assert done.code == 2
-    assert f"Scan4D tried 100 of {FRAMES} frames and cannot read any of them. The first: " in done.err
+    assert f"Scan4D tried to read 100 of {FRAMES} frames, and all of them failed. The first: " in done.err
 
 
 @pytest.mark.parametrize(("readable", "broken"), [((0, 7), 0), ((7, 40), 7), ((49, 50), 49), ((999,), 99)])
@@ -143,7 +145,7 @@ def test_info_says_how_many_poses_it_tried(
         formats.write(tmp_path / f"f{n}.npz", cloud_at(0))
     facts = json.loads(run("info", tmp_path, "--json").out)
     assert (facts["pose"], facts["unreadable"]) == (readable[0], broken)
-    told = f"unreadable  {broken} of {broken + 1} poses that Scan4D tried\n"
+    told = f"unreadable  {broken} of the {broken + 1} poses that Scan4D tried to read\n"
     assert (told in run("info", tmp_path).out) == (broken > 0)
 
 
@@ -185,7 +187,9 @@ def test_info_of_code_words(run: Run, scans: Path, tmp_path: Path, quality: str)
         assert facts["fields"][name] == [values.min(), values.max()]
     assert facts["tiles"] == decode_words(stream.words)["mode"].sum()
     text = run("info", path).out
-    assert f"{len(stream):,}, {facts['tiles']:,} of them tiles" in text
+    assert (
+        f"{len(stream):,} for {facts['elements']:,} discs; {facts['tiles']:,} of the words are tiles" in text
+    )
     low, high = facts["fields"]["z"]
     assert f"z           9 bits, {low:g} to {high:g}" in text
 

@@ -175,7 +175,7 @@ def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
     assert {row["measure"] for row in table("repeats.csv")} == {"way", "still"}
     still = run(*WORDS, "--repeats", "repeats.csv", "--aligned", "still", "--force")
     assert still.code == 0
-    assert "'still' has no peak as high as 50 % of its range, so there are no repeats" in still.err
+    assert "'still' has no peak of at least 50 % of its range, so Scan4D finds no repeats" in still.err
     assert table("repeats.csv") == []
 
 
@@ -243,15 +243,19 @@ def test_the_only_measure_goes_against_nothing(run: Run) -> None:
     [
         (("--against", "weg", "--plot", "a.svg"), "unknown measure 'weg'. Known: still, way"),
         (("--plot", "plot.pdf"), "plot.pdf: cannot write '.pdf' files. Known: .csv, .png, .svg"),
-        (("--plot", "seq/../out.csv"), "is already the file of another table. Write --plot to another file"),
+        (("--plot", "seq/../out.csv"), "is already the name of another output. Write --plot to another file"),
         (("--numbers", "numbers.txt"), "numbers.txt: cannot write '.txt' files. Known: .csv, .json"),
         (("--numbers", "no/numbers.csv"), "there is no folder 'no'"),
-        (("--numbers", "seq/../out.csv"), "is already the file of another table"),
-        (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is already the file of another table"),
+        (("--numbers", "seq/../out.csv"), "is already the name of another output"),
+        (("--numbers", "a.csv", "--repeats", "seq/../a.csv"), "is already the name of another output"),
         (("--repeats", "a.csv", "--aligned", "weg"), "unknown measure 'weg'. Known: still, way"),
         (("--repeats", "a.csv", "--least", "1.5"), "'1.5' is not a share above 0, up to 1"),
-        (("--aligned", "way"), "--aligned: needs repeats, but the curve has none. Add --repeats FILE"),
-        (("--numbers", "measures.json"), "is an input of this command: Scan4D does not replace it"),
+        (
+            ("--aligned", "way"),
+            "--aligned: applies only to repeats of a movement, but the command asks for no repeats. Add "
+            "--repeats FILE",
+        ),
+        (("--numbers", "measures.json"), "is an input of this command, and Scan4D does not replace inputs"),
         (("--order", "jerk"), "jerk"),
         (("--smoothing", "0", "--order", "speed"), "'0' is not a time above 0, in seconds"),
         (("--smoothing", "nan", "--order", "speed"), "'nan' is not a time above 0, in seconds"),
@@ -272,7 +276,7 @@ def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str,
 def test_movements_without_measures_are_told(run: Run, words: tuple[str, ...]) -> None:
     done = run("measure", "seq", "--landmarks", "landmarks.csv", "-o", "out.csv", *words)
     assert done.code == 2
-    assert f"{words[0]}: needs measures, but the command has none. Name them with --measures" in done.err
+    assert f"{words[0]}: needs measures, but the command names none. Name them with --measures" in done.err
     assert not Path("out.csv").exists()
 
 

@@ -114,10 +114,13 @@ def test_chosen_frames_are_the_trajectory_and_too_few_are_told(run: Run) -> None
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("--anchors", "left,left,nose"), "--anchors: removing head motion needs three landmarks"),
+        (("--anchors", "left,left,nose"), "--anchors: removing head motion needs at least three landmarks"),
         (("--anchors", "left,right,nase"), "unknown landmark 'nase'. Did you mean 'nose'? Known: chin, left"),
         (("--order", "speed", "--traced", "kinn"), "unknown landmark 'kinn'. Known: chin, left, nose, right"),
-        (("--traced", "chin"), "--traced: needs speeds, but the command computes none. Add --order speed"),
+        (
+            ("--traced", "chin"),
+            "--traced: needs speeds, but this command computes no speeds. Add --order speed",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_told_before_any_work(run: Run, words: tuple[str, ...], told: str) -> None:

@@ -44,7 +44,7 @@ def test_views_are_merged_and_a_wrong_calibration_is_told(run: Run, views: tuple
     done = run("merge", "pods.exr", "-o", "out.exr", "--report", "report.json")
     assert done.code == 0
     assert "calibration of pod0 and pod1 is wrong by" in done.err
-    assert "--refine corrects it" in done.err
+    assert "--refine corrects the error" in done.err
     assert "drifted" in done.out
     assert done.out.endswith("out.exr\n")
     (pose,) = json.loads(Path("report.json").read_text())["poses"]
@@ -97,7 +97,10 @@ def test_points_are_those_that_are_kept(run: Run) -> None:
     ("words", "message"),
     [
         (("points.ply", "-o", "out.exr"), "points.ply: has points, but no range views to merge"),
-        (("alone.exr", "-o", "out.exr"), "alone.exr: has only one range view to merge"),
+        (
+            ("alone.exr", "-o", "out.exr"),
+            "alone.exr: has only one range view, but merging needs at least two",
+        ),
         (("pods.exr", "-o", "pods.exr"), "pods.exr: is an input of this command"),
         (("pods.exr", "-o", "points.ply"), "points.ply: exists already"),
         (("pods.exr", "-o", "nowhere/out.exr"), "there is no folder 'nowhere'"),
@@ -105,9 +108,9 @@ def test_points_are_those_that_are_kept(run: Run) -> None:
         (("pods.exr", "-o", "out.exr", "--report", "out.txt"), "out.txt: "),
         (
             ("pods.exr", "-o", "out.exr", "--ties", "-1"),
-            "the difference up to which weights are tied must be 0 or more",
+            "the largest difference of tied weights must be 0 or more",
         ),
-        (("seq", "-o", "out.exr"), "out.exr: is one file, but there are several results"),
+        (("seq", "-o", "out.exr"), "out.exr: is the name of one file, but this command writes several files"),
     ],
 )
 def test_what_cannot_be_is_told_in_one_line(

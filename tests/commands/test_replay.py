@@ -242,7 +242,7 @@ def test_an_anonymous_picture_is_drawn_again_when_its_scan_is_named(
     message = refused("render", "--replay", "a.png", "-o", "again.png")
     assert "render SCAN --replay a.png -o again.png" in message
     message = refused("render", "sequence", "--replay", "a.png", "-o", "again.png")
-    assert all(word in message for word in ("sequence", "not the scan of a.png", "hash")), message
+    assert all(word in message for word in ("sequence", "not the scan that a.png shows", "hash")), message
     assert not Path("again.png").exists()
     Path("ball.npz").rename("moved.npz")
     assert run("render", "moved.npz", "--replay", "a.png", "--anonymous", "-o", "again.png").code == 0
@@ -315,13 +315,13 @@ def test_a_scan_that_has_changed_is_reported(run: Run) -> None:
     formats.write(Path("ball.npz"), sphere(2000, radius=1.5))
     done = run("render", "--replay", "a.png", "-o", "again.png")
     assert done.code == 0
-    assert done.err == "scan4d: ball.npz: has changed since a.png was made; pictures may differ\n"
+    assert done.err == "scan4d: ball.npz: has changed since Scan4D saved a.png, so the pictures may differ\n"
 
 
 @pytest.mark.parametrize(
     ("shown", "words"),
     [
-        (entry(scan="gone.ply"), ["a.json", "'gone.ply'", "missing", "working directory"]),
+        (entry(scan="gone.ply"), ["a.json", "'gone.ply'", "cannot find", "working directory"]),
         (entry(scan="/nowhere/gone.ply"), ["/nowhere/gone.ply", "no such file"]),
         (entry(pose=9), ["no pose 9", "0 to 2"]),
         (entry(size=(0, 64)), ["0x64"]),

@@ -121,7 +121,7 @@ def test_view_opens_a_session_with_its_scan(
     assert run("view", path).code == 0
     ball.rename(tmp_path / "moved.npz")
     missing = run("view", path)
-    words = f"its scan 'ball.npz' is missing. Give the path of the scan: scan4d view SCAN {path}"
+    words = f"'ball.npz', a scan that Scan4D cannot find. Give the path of the scan: scan4d view SCAN {path}"
     assert words in missing.err
     assert words in str(refusals.pop()), "the window over the demo says so"
     assert calls.pop() == (["demo"], None)

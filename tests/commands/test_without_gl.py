@@ -62,7 +62,7 @@ def test_normals_that_cannot_be_estimated(
     done = finish(process(*arguments, **without_opengl))
     why = "the discs face the viewer and all discs have the same size"
     assert done.code == 0
-    assert done.err == f"scan4d: Scan4D cannot estimate normals or radii here: {why}\n"
+    assert done.err == f"scan4d: Scan4D cannot estimate normals or radii on this computer, so {why}\n"
     assert len(np.unique(picture(tmp_path / "a.png").reshape(-1, 4), axis=0)) > 10  # by depth
 
 
@@ -112,8 +112,11 @@ def test_a_picture_lies_behind(run: Run, scans: Path, tmp_path: Path) -> None:
     assert (drawn[covered][:, :3] != behind[covered]).any(axis=1).mean() > 0.9
     for arguments, told in (
         ((scan, "--no-gl", "-o", "c.png", "--size", "50x40", *over), "has 96 x 64 pixels, but the picture"),
-        ((scan, "-o", "c.cw", *SMALL, *over), "--behind: is not stored in '.cw' files"),
-        ((scan, "-o", "c.png", *SMALL, *over), "--behind: applies only to pictures without OpenGL"),
+        ((scan, "-o", "c.cw", *SMALL, *over), "--behind: has no effect on '.cw' files"),
+        (
+            (scan, "-o", "c.png", *SMALL, *over),
+            "--behind: applies only to pictures that Scan4D draws without OpenGL",
+        ),
         ((scan, "--no-gl", "-o", "c.png", *SMALL, "--behind", scan), "is not a valid PNG or JPEG or TIFF"),
         ((scan, "--no-gl", "-o", over[1], *SMALL, "--force", *over), "behind.png"),
     ):
@@ -130,13 +133,13 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         ((scan, "-o", "a.png", "--no-gl", "--backend", "surfels"), "'surfels' needs OpenGL"),
         (
             (scan, "-o", "a.png", "--no-gl", "--marks", "stamp"),
-            "--marks: applies only to pictures that OpenGL draws",
+            "--marks: applies only to pictures that Scan4D draws with OpenGL, without --no-gl",
         ),
         ((scan, "-o", "a.png", "--no-gl", "--quality", "fine"), "--quality: applies only to"),
         ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
         (
             (scan, "-o", "a.png", "--no-gl", "--set", "normals=60"),
-            "60 values of n'x in the table have no middle value",
+            "60 of values of n'x in the table must be odd",
         ),
         ((scan, "-o", "a.png", "--no-gl", "--set", "sises=3"), "Did you mean 'sizes'"),
         ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),

@@ -99,7 +99,7 @@ def test_colours_by_numbers_that_are_in_no_file_are_refused() -> None:
     for color_by, over in (
         ("deviation", layers), ("#2", layers), ("heat", Layers({"heat": np.arange(3.0)})),
     ):  # fmt: skip
-        with pytest.raises(InputError, match="which the scan's files do not store"):
+        with pytest.raises(InputError, match="which Scan4D computes"):
             entry(color_by, over)
 
 
@@ -297,7 +297,7 @@ def test_pictures_without_a_description_and_damaged_ones_are_refused(suffix: str
         import OpenEXR
 
         OpenEXR.File({}, {"Z": np.zeros((4, 4), np.float32)}).write(str(path))
-    with pytest.raises(InputError, match="does not store how the picture was made"):
+    with pytest.raises(InputError, match="does not contain the view and scan of the picture"):
         Recording.load(path)
 
 

@@ -141,10 +141,10 @@ def changed(*path: Any, to: Any) -> Callable[[dict[str, Any]], None]:
         (lambda data: data.pop("document"), "is not a session"),
         (lambda data: data.pop("scan"), "has no 'scan'"),
         (changed("scan", to="a\0b"), "'scan' is not the name of a scan"),
-        (changed("hash", to=7), "'hash' is not a hash but 7"),
-        (changed("pose", to=-1), "'pose' is not the index of a frame but -1"),
-        (changed("document", to=[1]), ", document: is not an object with named values but [1]"),
-        (changed("document", "unread", to=[1]), ", document: is not an object with named values but"),
+        (changed("hash", to=7), "'hash' must be a hash, not 7"),
+        (changed("pose", to=-1), "'pose' must be the index of a frame, not -1"),
+        (changed("document", to=[1]), ", document: must be an object with named values, not [1]"),
+        (changed("document", "unread", to=[1]), ", document: must be an object with named values, not"),
     ],
 )
 def test_a_wrong_session_is_one_message(damage: Any, words: str, tmp_path: Path) -> None:
@@ -305,7 +305,9 @@ def test_what_is_damaged_is_put_aside_and_told_once() -> None:
     file.write_text(file.read_text()[:-40])
     with pytest.raises(InputError) as caught:
         stored(SESSION.scan)
-    assert str(caught.value).startswith("/scans/knot: Scan4D cannot read the saved changes (is not JSON")
+    assert str(caught.value).startswith(
+        "/scans/knot: Scan4D cannot read your saved work on this scan (is not JSON"
+    )
     aside = file.with_name(f"{file.stem}.old-1.scan4d.json")
     assert str(aside) in str(caught.value)
     assert stored(SESSION.scan) is None
@@ -340,7 +342,7 @@ def test_what_another_window_made_is_put_aside_once_and_told() -> None:
     told = store(mine)
     (aside,) = stored_file(SESSION.scan).parent.glob("*.old-*")
     assert told is not None
-    assert told.startswith("/scans/knot: something else, perhaps another window, has saved changes")
+    assert told.startswith("/scans/knot: another program, perhaps a second window of Scan4D, has saved work")
     assert str(aside) in told
     assert asides() == [theirs]
     assert stored(SESSION.scan) == mine
@@ -384,7 +386,7 @@ def test_another_window_that_made_nothing_costs_nothing() -> None:
 def test_a_document_that_was_damaged_meanwhile_is_put_aside_and_told() -> None:
     store(SESSION)
     stored_file(SESSION.scan).write_text("{")
-    assert "moved the other changes to" in str(store(SESSION))
+    assert "moved that work to" in str(store(SESSION))
     assert stored(SESSION.scan) == SESSION
 
 
@@ -394,7 +396,7 @@ def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> No
     text = json.dumps(json.loads(file.read_text()) | {"format": 2})
     file.write_text(text)
     for _ in range(2):
-        with pytest.raises(InputError, match=r"has the format 2.* The changes stay unchanged in"):
+        with pytest.raises(InputError, match=r"has the format 2.* The work stays in"):
             stored(SESSION.scan)
         with pytest.raises(InputError, match="has the format 2"):
             store(replace(SESSION, pose=1))
@@ -404,7 +406,7 @@ def test_a_document_of_a_later_version_is_neither_moved_nor_written_over() -> No
 def test_a_document_that_the_system_refuses_to_read_is_neither_moved_nor_written_over() -> None:
     file = stored_file(SESSION.scan)
     file.mkdir(parents=True)  # which root cannot read either
-    with pytest.raises(InputError, match="The changes stay unchanged in"):
+    with pytest.raises(InputError, match="The work stays in"):
         stored(SESSION.scan)
     with pytest.raises(InputError, match="cannot be read"):
         store(SESSION)

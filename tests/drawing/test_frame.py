@@ -83,7 +83,7 @@ def test_the_window_gets_points_until_what_it_asked_for_is_ready(renderer: Rende
     assert render_frame(own, request, surface, wait=False), "more is to come"
     assert surface.stats.backend == "points"
     assert surface.stats.skipped == {
-        "surfels": "Scan4D is still preparing data that this picture needs",
+        "surfels": "Scan4D is still preparing data for this picture",
         **_points_skips(surface),
     }
     while render_frame(own, request, surface, wait=False):
@@ -327,7 +327,7 @@ def test_a_backend_of_range_views_is_refused_for_points(renderer: Renderer) -> N
             return ("views",)
 
     request = Request(_of(BARE), Camera.orbit(BARE.bounds()), Ranging())
-    with pytest.raises(InputError, match="Ranging draws range views, but this scan has none"):
+    with pytest.raises(InputError, match="Ranging draws only range views, but this scan has none"):
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))
 
 

@@ -94,7 +94,7 @@ def test_a_plan_says_what_is_missing_and_why(renderer: Renderer) -> None:
 
 def test_a_plan_of_what_cannot_be_drawn_fails_with_the_reason(renderer: Renderer) -> None:
     for request, reason in (
-        (Request(POSE, CAMERA, "laplacian"), "draws range views, but this scan has none"),
+        (Request(POSE, CAMERA, "laplacian"), "draws only range views, but this scan has none"),
         (Request(POSE, CAMERA, "points", look=Look(color_by="missing")), "missing"),
     ):
         failed = make_plan(renderer, request, SIZE)

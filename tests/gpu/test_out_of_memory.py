@@ -49,7 +49,7 @@ def test_a_buffer_without_memory_is_an_error(renderer: Renderer) -> None:
     gpu = renderer.gpu
     if not gpu.software:
         pytest.skip("drivers of graphics cards may reserve memory only when a buffer is used")
-    with pytest.raises(Scan4DError, match=r"not enough memory.*Make the picture smaller"):
+    with pytest.raises(Scan4DError, match=r"not enough memory.*Use a smaller picture"):
         gpu.buffer(reserve=1 << 42)
     assert gpu.ctx.error == "GL_NO_ERROR"
     values = np.arange(4, dtype="u4")
@@ -67,7 +67,7 @@ def test_a_picture_without_memory_is_an_error_and_the_next_is_whole(backend: str
     said, same = done.stdout.splitlines()
     assert re.fullmatch(
         r"not enough memory( on the graphics card)? for this picture\. "
-        "Make the picture smaller, or close other programs",
+        "Use a smaller picture, or close other programs",
         said,
     )
     assert same == "True"

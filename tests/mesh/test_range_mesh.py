@@ -61,7 +61,7 @@ def test_of_a_corner_that_steps_away_the_other_three_stay() -> None:
 
 
 def test_pixels_without_neighbours_are_no_mesh() -> None:
-    with pytest.raises(InputError, match="no neighbouring samples"):
+    with pytest.raises(InputError, match="neighbouring samples of the range views do not"):
         triangulated([view_of([[1, NAN], [NAN, 1]])])
 
 

@@ -133,7 +133,7 @@ with export.pictures(export.Path({str(tmp_path / ("a" + suffix))!r}), (640, 480)
     )
     assert done.stderr.splitlines()[-1].startswith("viewer.errors.InputError: "), done.stderr
     assert (
-        f"a{suffix}: cannot be written: the file would be larger than this disk allows"
+        f"a{suffix}: cannot be written: the file would be larger than this disk can store"
         in done.stderr.splitlines()[-1]
     )
     assert list(tmp_path.iterdir()) == []

@@ -128,7 +128,7 @@ def test_another_number_than_was_found_is_refused(draw: Draw) -> None:
     surface = drawn(draw, "slope")
     shown = surface.image(replace(FLAT, color_by="slope", color_map="vik"))
     assert (shown != surface.image(replace(FLAT, color_by="depth"))).any()
-    with pytest.raises(InputError, match="'gap' was not computed for this picture"):
+    with pytest.raises(InputError, match="did not compute 'gap' for this picture"):
         surface.image(replace(FLAT, color_by="gap"))
 
 

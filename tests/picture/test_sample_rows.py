@@ -323,5 +323,5 @@ def test_points_alone_have_no_samples(renderer: Renderer) -> None:
     with pytest.raises(InputError, match="the scan has no range views"):
         _ = pose.pose.range_points
     request = Request(pose.pose, Camera.orbit(cloud.bounds()), sampling.BACKEND)
-    with pytest.raises(InputError, match="Sampling draws range views, but this scan has none"):
+    with pytest.raises(InputError, match="Sampling draws only range views, but this scan has none"):
         render_frame(renderer, request, Surface(renderer.gpu, SIZE))

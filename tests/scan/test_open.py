@@ -169,7 +169,7 @@ def test_glob_patterns(tmp_path: Path) -> None:
     assert "h*.npy: matches no file. Check the folder" in message(tmp_path / "h*.npy")
     assert "f%03d.npy: matches no file" in message(tmp_path / "f%03d.npy")
     put(tmp_path, "a.jpg")
-    assert "*.jpg: matches no scan file, but 1 .jpg file" in message(tmp_path / "*.jpg")
+    assert "*.jpg: matches no file that Scan4D can read, but 1 .jpg file" in message(tmp_path / "*.jpg")
 
 
 def test_one_file_is_one_pose_at_time_zero(tmp_path: Path) -> None:

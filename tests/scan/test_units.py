@@ -62,14 +62,19 @@ def test_names_that_can_be_shown(name: str) -> None:
     ],
 )
 def test_names_that_cannot_be_shown(name: str) -> None:
-    with pytest.raises(InputError, match=r"is not a unit of length\. Use a short name such as mm") as caught:
+    with pytest.raises(
+        InputError, match=r"is not a usable name of a unit\. Use a short name such as mm"
+    ) as caught:
         checked_unit(name)
     assert len(str(caught.value)) < 200
     assert usable_unit(name) is None
 
 
 def test_a_user_gives_a_unit_that_can_be_shown() -> None:
-    with pytest.raises(InputError, match="is not a unit of length"), open_scan("demo", unit="x" * 5000):
+    with (
+        pytest.raises(InputError, match="is not a usable name of a unit"),
+        open_scan("demo", unit="x" * 5000),
+    ):
         pass
 
 
@@ -98,7 +103,7 @@ def test_frames_in_another_unit_are_converted_and_told_once(tmp_path: Path) -> N
             radii = np.linalg.norm(pose.cloud.world(), axis=1)
             np.testing.assert_allclose(radii, 1000, rtol=0, atol=1)
         assert [(notice.kind, notice.index) for notice in scan.messages] == [("unit", 1)]
-        assert scan.messages[0].text == "f1.exr is in m, the scan in mm: other units are converted"
+        assert scan.messages[0].text == "f1.exr is in m, but the scan is in mm: Scan4D converts the lengths"
 
 
 def test_parts_of_one_file_in_two_units(tmp_path: Path) -> None:
@@ -119,7 +124,7 @@ def test_units_that_are_no_lengths_are_told_and_taken_as_they_are(tmp_path: Path
         radii = np.linalg.norm(scan.pose(1).cloud.world(), axis=1)
         np.testing.assert_allclose(radii, 1, rtol=0, atol=1e-3)
         assert scan.messages[0].text == (
-            "f1.exr is in ells, the scan in mm: other units are used without conversion"
+            "f1.exr is in ells, but the scan is in mm: Scan4D does not convert the lengths"
         )
 
 

@@ -169,5 +169,5 @@ def test_memory_is_what_it_says(find: Find) -> None:
 def test_more_sectors_than_the_driver_takes_are_refused(renderer: Renderer) -> None:
     edge = int(np.sqrt(renderer.gpu.max_storage_bytes / 4)) + 1
     sectors = Sectors.around(ZERO, 1.0, np.array([0.0, 0.0, 3.0]), ZERO, edge)
-    with pytest.raises(InputError, match="more than this driver can handle"):
+    with pytest.raises(InputError, match="more than this graphics driver can handle"):
         Candidates(renderer.gpu, sectors, 10)

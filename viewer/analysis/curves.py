@@ -74,7 +74,9 @@ def _fit(run: bytes, smoothing: Smoothing, order: int) -> tuple[NDArray[np.intp]
     """Find for each time of a run the points in its window, (T, W), and weights that give the derivative of
     the polynomial through them, (T, W), NaN where there are too few. run: the times, (T,) float64."""
     if order > smoothing.degree:
-        raise ValueError(f"a polynomial of degree {smoothing.degree} has no derivative of order {order}")
+        raise ValueError(
+            f"smoothing with a polynomial of degree {smoothing.degree} gives no derivative of order {order}"
+        )
     times = np.frombuffer(run)
     half, count = smoothing.seconds / 2, len(times)
     reach = half * (1 + _EDGE) + _EDGE * _step(times)
@@ -274,7 +276,7 @@ def repeats_of(
     interpolated linearly, and not known where one of the two frames is not.
     """
     if not len(events):
-        raise ValueError("there is no peak to align the curves by")
+        raise ValueError("the curve has no peak by which to align the repeats")
     apart = float(np.diff(np.sort(events)).min()) / 2 if len(events) > 1 else float(times[-1] - times[0])
     before, after, step = before or apart, after or apart, _step(times)
     steps = range(-_steps_in(before / step), _steps_in(after / step) + 1)

@@ -62,7 +62,9 @@ class SurfacePoint:
         """
         if not (picked.measured or picked.between or filled):
             hint = "Zoom in, or tick 'Allow clicks on filled holes'"
-            raise InputError("no data here (filled by the renderer)", hint=hint)
+            raise InputError(
+                "there are no measured points here, because the renderer has filled a hole", hint=hint
+            )
         spacing, neighbors = picked.spacing, picked.neighbors
         if picked.point is None:
             unmoved = place.inverse.points(picked.position)

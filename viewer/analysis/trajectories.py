@@ -87,7 +87,7 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
             "Choose landmarks that keep their distances from each other, such as the inner corners of "
             "the eyes"
         )
-        raise InputError("removing head motion needs three rigid references", hint=hint)
+        raise InputError("removing head motion needs at least three rigid references", hint=hint)
     places = np.stack([tracks[name].positions for name in dict.fromkeys(anchors)], axis=1)  # (T, A, 3)
     known = np.logical_and.reduce(np.isfinite(places), axis=2)
     reference = int(np.argmax(known.sum(axis=1)))
@@ -98,7 +98,7 @@ def stabilising(tracks: Mapping[str, Track], anchors: Sequence[str]) -> tuple[Ri
     if motions[reference] is None:
         raise InputError(
             "no frame has three rigid references that do not lie on one line",
-            hint="Place the rigid references, or choose others as rigid references",
+            hint="Place the rigid references, or choose other landmarks as rigid references",
         )
     return motions
 

@@ -72,7 +72,9 @@ class NormalSearch:
         if not 3 <= self.k <= MOST_NEIGHBORS:
             raise InputError(f"a neighbourhood must have 3 to {MOST_NEIGHBORS} points, not {self.k}")
         if not self.growth >= 1:
-            raise InputError(f"the growth of a neighbourhood must be at least 1, not {self.growth:g}")
+            raise InputError(
+                f"the factor 'growth' of a neighbourhood must be at least 1, not {self.growth:g}"
+            )
 
 
 def estimate_normals(

@@ -15,7 +15,9 @@ from .toolbox import Toolbox
 from .ui import Ui
 
 LOWEST, HIGHEST, USUAL = 7.0, 60.0, 15.0  # in heights of the font
-DrawerHeight = Annotated[float, Kind("a height of the plot area", lambda height: LOWEST <= height <= HIGHEST)]
+DrawerHeight = Annotated[
+    float, Kind("a height that the plot area can have", lambda height: LOWEST <= height <= HIGHEST)
+]
 
 
 @dataclass(eq=False)

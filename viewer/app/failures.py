@@ -18,10 +18,10 @@ from .notices import Problem
 log = logging.getLogger(__name__)
 _PAUSE = 10.0  # seconds without it, after which the same is reported again
 _PAIRS = {  # the stacks of ImGui, outermost first -> the calls that come in pairs
-    "window": "begin() or begin_child() and its end",
+    "window": "begin() and end(), or begin_child() and end_child()",
     "begin_popup": "begin_popup() and end_popup()",
     "group": "begin_group() and end_group()",
-    "tree": "tree_push() or tree_node() and tree_pop()",
+    "tree": "tree_push() and tree_pop(), or tree_node() and tree_pop()",
     "id": "push_id() and pop_id()",
     "color": "push_style_color() and pop_style_color()",
     "style_var": "push_style_var() and pop_style_var()",

@@ -33,7 +33,7 @@ def named_file(text: str, suffix: str, *others: str) -> Path:
     if not typed or os.path.isdir(path):
         raise InputError("is a folder", path, "Name a file in it")
     if not os.path.isdir(path.parent):
-        hint = "Create the folder first, or choose another one"
+        hint = "Create this folder first, or choose another folder"
         raise InputError("this folder does not exist", path.parent, hint)
     return path if path.name.lower().endswith((suffix, *others)) else path.with_name(f"{path.name}{suffix}")
 
@@ -187,7 +187,7 @@ class FileDialog:
             imgui.set_keyboard_focus_here()
             self._takes_keyboard = False
         changed, self._name = widgets.edit_path("##name", self._name)
-        widgets.tooltip("Name of the file, or a path. Up and Down move through the rows")
+        widgets.tooltip("Name or path of the file. The arrow keys select a row of the list")
         if changed:
             self._view.refusal = ""
         if imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter):

@@ -110,7 +110,7 @@ def load_keys(path: Path, commands: CommandTable) -> tuple[Keys, list[str]]:
         for problem in problems[:_MOST_SHOWN]
     ]
     if len(problems) > _MOST_SHOWN:
-        shown.append(f"{path}: {len(problems) - _MOST_SHOWN} more lines cannot be used")
+        shown.append(f"{path}: {len(problems) - _MOST_SHOWN} more lines have errors")
     return Keys(commands, changes), shown
 
 
@@ -164,13 +164,13 @@ def _without_clashes(
                 what = f"{text} is set for both '{other}' and '{name}'"
                 guilty = next((n for n in reversed(changes) if n in (name, other)), None)
                 if guilty:
-                    hint = f"Give one of the two commands other keys. '{guilty}' keeps its default keys"
+                    hint = f"Set different keys for the two commands. '{guilty}' keeps its default keys"
                     problems.append(InputError(what, hint=hint))
                     del changes[guilty]
                 else:
                     tool = commands.tool_of.get(name)
                     where = f"The tool '{tool}'" if tool else "The default keys"
-                    hint = f"'{name}' has no keys now. Give it other keys in {FILE}; F1 lists the keys in use"
+                    hint = f"'{name}' has no keys now. Set other keys in {FILE}. F1 lists the keys in use"
                     problems.append(InputError(what, where, hint))
                     usual[name] = ""
                 break

@@ -145,7 +145,7 @@ class Tasks(WindowPart):
         room = width - imgui.calc_text_size(end).x - cross - 2 * padding
         if imgui.small_button(widgets.labelled(widgets.fitted(task.name, room) + end, "work")):
             imgui.open_popup("list of work")
-        widgets.tooltip(f"{task.name}. Click to see all running work")
+        widgets.tooltip(f"{task.name}. Click to see all running tasks")
         low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
         line = ImVec2(low.x, high.y - _LINE * imgui.get_font_size())
         full = high.x - low.x

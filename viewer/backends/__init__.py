@@ -62,14 +62,16 @@ class Limit:
 
 # Reasons of limits that several backends have.
 AROUND_ALL = (
-    "octants divide the upright cube around all points, and sectors divide the directions to them: added "
-    "or turned points change both"
+    "octants divide the upright cube around all points, and sectors divide all directions to points: "
+    "adding or turning points changes both"
 )
 NO_SPACING = (
-    "each point is drawn as large as the spacing of the points, which is unknown for a single point "
-    "or a line of points that is viewed along the line"
+    "the size of a drawn point is the spacing of the points, which is unknown for a single point, or if "
+    "the view looks along a line of points"
 )
-NO_DETAIL = "octants and sectors divide the whole scan: a tiny detail lies in only a few of them"
+NO_DETAIL = (
+    "octants and sectors divide the whole scan, so a tiny detail lies in only a few octants or sectors"
+)
 
 
 def share_param(default: float | None = 1.0, auto: str = "", group: str = "") -> Any:

@@ -34,8 +34,8 @@ class Params:
     )
     hide_hidden: bool = param(
         False,
-        "Leave out points behind a surface that other points form. Scan4D estimates this from the "
-        "points alone",
+        "Leave out hidden points, which lie behind a surface of other points. Scan4D estimates this "
+        "surface from the points alone",
         key="Shift+V",
         title="Hide what lies behind",
         sweep=(False, True),

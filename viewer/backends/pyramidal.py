@@ -15,8 +15,8 @@ from ..scan.pose import Pose
 from . import NO_SPACING, Backend, FrameView, Limit, Suited
 
 _BY_CELLS = (
-    "each pixel takes its values from whole cells; at the edges of cells, rounding decides which cell a "
-    "pixel takes"
+    "each pixel takes its values from one cell; at the edge between two cells, rounding decides which "
+    "cell that is"
 )
 
 

@@ -36,8 +36,8 @@ from . import Backend, FrameView, Limit, Suited, share_param, with_levels
 
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
-    "pixels show a mean of splats that lie over each other; their radii, the number of copies and "
-    "rounding decide how much each of them counts"
+    "each pixel shows a mean of overlapping splats; radii, the number of copies and rounding decide the "
+    "weight of each splat"
 )
 
 _VARIANTS = ("tiles", *FEEDS)
@@ -56,11 +56,10 @@ class Params:
 
     passes: str = param(
         "auto",
-        "How Scan4D blends overlapping splats into one surface. one: show the nearest splat; two: blend the "
-        "nearest splat with the splats close behind it; auto: two with enlarge=1, or one if two is "
-        "too slow in motion. The other values reproduce the pictures of Slomp 2014, Fig. 3, for comparison: "
-        "one_blended (a), one_no_depth "
-        "(b), visibility (c), two_large (e), and sorted, blended from back to front",
+        "How Scan4D draws overlapping splats. one: show the nearest splat; two: blend the nearest splat "
+        "with the splats close behind it; auto: two with enlarge=1, or one if two is too slow in motion. "
+        "For comparison, the other values reproduce the pictures of Slomp 2014, Fig. 3: one_blended (a), "
+        "one_no_depth (b), visibility (c), two_large (e), and sorted (blended from back to front)",
         choices=("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
         sweep=("auto", "one", "two"),
         group="Surface",
@@ -75,8 +74,8 @@ class Params:
     )
     epsilon: float = param(
         1.0,
-        "How far behind the nearest splat another one may lie and still be blended with it, in radii "
-        "of the nearest",
+        "Largest distance behind the nearest splat at which Scan4D still blends another splat with it, "
+        "in radii of the nearest splat",
         low=0.0,
         high=100.0,
         group="Surface",
@@ -85,8 +84,9 @@ class Params:
     surface: str = surface_param("local", "Surface", when={"passes": ("auto", "one", "two", "two_large")})
     radius: str = param(
         "auto",
-        "auto: the scan's own radii, enlarged if they leave gaps; without any, the size of the gaps around "
-        "each point; own: the scan's own, estimated if missing; uniform: one radius for all",
+        "Radii of splats. auto: the radii of the scan, enlarged if they leave gaps, or the size of the "
+        "gaps around each point; own: the radii of the scan, or estimated radii; uniform: one radius for "
+        "all points",
         choices=("auto", "own", "uniform"),
         group="Splats",
     )
@@ -115,14 +115,13 @@ class Params:
     )
     cull_back: bool = param(False, "Leave out splats that face away from the viewer", group="Splats")
     share: float | None = share_param(
-        None, "all points, or as many as fit into the lists of a software driver", "Splats"
+        None, "all points, or with a software driver, as many points as its lists can hold", "Splats"
     )
     instancing: str = param(
         "auto",
-        "Method by which the GPU draws splats. auto: the fastest method on this device; tiles: in a "
-        "compute shader; the "
-        "others draw quads, from a geometry shader, uniform blocks, buffer textures, vertex attributes or"
-        " pulled vertices",
+        "Method by which the GPU draws splats. auto: the fastest method on this device; tiles: a compute "
+        "shader. The other methods draw quads from a geometry shader, uniform blocks, buffer textures, "
+        "vertex attributes or pulled vertices",
         choices=("auto", *_VARIANTS),
         affects="speed",
         group="Speed",
@@ -156,9 +155,10 @@ class Surfels(Backend):
         "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
     }
     default_reasons = {
-        "cull_back": "the camera can see the inside of an open scan: without splats that face "
-        "away, 2.2 % of the pixels of the bunny, which has no base, would show the background. We "
-        "found no test for closed scans that is both safe and faster (docs/how-it-works/surfels.md)"
+        "cull_back": "the camera can see the inside of an open scan: without splats that face away, 2.2 % "
+        "of the "
+        "pixels of the bunny would show the background, because the bunny has no base. We found no "
+        "test for closed scans that is both safe and faster (docs/how-it-works/surfels.md)"
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
@@ -226,7 +226,7 @@ def _as_many(
     stats, share = surface.stats, most / points.count
     stats.asked, stats.left_out = share, 0
     stats.chosen["share"] = (
-        f"{share:.2f}, because only {most:,} of the {points.count:,} splats in view can be listed at once"
+        f"{share:.2f}, because the lists can hold only {most:,} of the {points.count:,} splats in view"
     )
     return Points.of(pose, surface, share * frame.share, points.use_radii, *margins)
 
@@ -252,7 +252,10 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
         gaps = pose.cached(GapRadii)
         if frame.moving and gaps.presumes_none(pose):
             surface.stats.simplified = True
-            surface.stats.skipped["gaps"] = "playback runs, and the radii of the last pose left no gaps"
+            surface.stats.skipped["gaps"] = (
+                "during playback, Scan4D does not search for gaps again if the radii of the last pose left "
+                "none"
+            )
         else:
             in_haste = frame.moving and surface.gpu.software
             known = gaps.find(pose, wait=frame.budget_ms is None, fits=not in_haste)
@@ -261,7 +264,7 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
         if gaps.texels is not None:
             if own:
                 surface.stats.chosen["radius"] = (
-                    "radii as large as the gaps between points, because the scan's own radii leave gaps open"
+                    "the size of the gaps between points, because the scan's own radii leave gaps"
                 )
             return _Sizes(True, gaps.usual, gaps.largest, gaps.buffers), True
     # The spacing takes longer to find than many a pose takes to draw.
@@ -326,11 +329,13 @@ def _draw_subpixel(points: Points, surface: Surface, params: Params, instancing:
     """Splats of about a pixel: those of a pixel are averaged, in place of any second pass; the larger they
     are, the less, so that nothing changes at once while one comes nearer."""
     if params.passes in _TWO:
-        surface.stats.skipped["second pass"] = "splats are smaller than a pixel, so they are averaged"
+        surface.stats.skipped["second pass"] = (
+            "splats are smaller than a pixel, so each pixel shows the mean of its splats"
+        )
     if params.instancing == "auto":
         surface.stats.chosen["instancing"] = "scatter"
         surface.stats.skipped["tiles"] = (
-            "splats are smaller than a pixel, so each one is written to its pixel"
+            "splats are smaller than a pixel, so Scan4D writes each splat to a single pixel"
         )
         splat_subpixel(points, surface, splats)
     else:
@@ -356,7 +361,9 @@ def _draw_two(points: Points, surface: Surface, params: Params, instancing: str,
     if params.passes == "two_large":
         points, splats = splats.larger(points), replace(splats, enlarge=1.0)
     if splats.enlarge == 1 and splats.epsilon == splats.layer == 0:
-        surface.stats.skipped["second pass"] = "no splat is enlarged or blended"
+        surface.stats.skipped["second pass"] = (
+            "Scan4D neither enlarges nor blends splats with these parameters"
+        )
         _draw_nearest(points, surface, instancing, splats)
     elif instancing == "tiles":
         passes.tiled_two_passes(points, surface, splats)

@@ -152,7 +152,9 @@ def configuration_of(row: Row) -> Configuration:
 def laws_of(rows: Sequence[Row]) -> dict[str, Law]:
     """A law for each configuration in rows, whatever its scale. Raises InputError where there is none."""
     if not rows:
-        raise InputError("there are no measured pictures from which to predict drawing times")
+        raise InputError(
+            "the results contain no measured pictures, which Scan4D needs to predict drawing times"
+        )
     by_key: dict[str, list[Any]] = {}
     for row in rows:
         by_key.setdefault(row["key"], []).append(measured_of(row))

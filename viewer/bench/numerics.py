@@ -319,7 +319,10 @@ def _spoilt() -> Iterator[Row]:
             matt,
             partial(PointView.filled, name="normals", value=value),
             # 2 px aside, 228 px from the eye: cos 0.009 is 0.006 levels less.
-            Tolerance(1e-4, "one picture turns normals towards the eye per point, the other per pixel"),
+            Tolerance(
+                1e-4,
+                "one of the pictures turns normals towards the camera per point, and the other per pixel",
+            ),
         )
 
     def closed() -> PointView:

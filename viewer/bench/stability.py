@@ -82,7 +82,7 @@ class Tolerance:
         more = _ROUNDINGS * (driver.roundings - 1) + rasterised * driver.corner / 3**0.5
         if not self.error or not more:
             return self
-        return Tolerance(self.error + more, f"{self.reason}, and the driver's rounding")
+        return Tolerance(self.error + more, f"{self.reason}, and the rounding of the graphics driver")
 
     def holds(self, found: Difference) -> bool:
         """Whether a difference is within it."""

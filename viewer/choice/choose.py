@@ -49,7 +49,7 @@ class Choice:
         return Automatic(goal.kind, goal.bound, goal.unit, round(expected.ms, 2), round(expected.error, 4))
 
     def __str__(self) -> str:
-        return f"expected {self.expected.ms:.0f} ms, with an error of {self.expected.error:.2g} px"
+        return f"expected time {self.expected.ms:.0f} ms, with an error of {self.expected.error:.2g} px"
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,8 @@ def _parts(text: str, name: str, example: str) -> tuple[float, str]:
         number = math.nan
     if found is None or not (0 < number < math.inf):
         raise InputError(
-            f"'{shortened(text)}' is not a limit of time or error", name, f"Use more than 0, {example}"
+            f"'{shortened(text)}' is neither a limit of time nor of error",
+            name,
+            f"Use more than 0, {example}",
         )
     return number, found[2]

@@ -201,7 +201,7 @@ def emit_words(
     starts = np.concatenate([[0], np.cumsum(counts)])
     if (total := int(starts[-1])) > MOST_WORDS:
         raise InputError(
-            f"one picture would need {total:,} code words",
+            f"one picture would need {total:,} code words, which is too many",
             hint="Move the camera away, or draw smaller splats with radius_scale",
         )
     out = emitted(starts[:-1].copy(), total)

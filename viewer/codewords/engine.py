@@ -145,7 +145,7 @@ def begun(stream: WordStream, window: int, background: NDArray[np.uint8] | None)
     width, height = stream.size
     if window < BITMAP:
         raise InputError(
-            f"a window of {window} lines is too low",
+            f"a window with a height of {window} lines is too small",
             hint=f"Use at least {BITMAP} lines, the height of a bitmap",
         )
     if background is not None and background.shape != (height, width, 4):

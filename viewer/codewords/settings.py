@@ -33,9 +33,8 @@ class Params:
 
     quality: str = param(
         "table",
-        "table: shapes, positions and depths, rounded to the steps of Maršík 2010; exact: exact "
-        "outlines, and depths "
-        "along the disc",
+        "Accuracy of discs. table: shapes, positions and depths are rounded to the steps of Maršík 2010; "
+        "exact: outlines and depths are exact",
         choices=("table", "exact"),
         title="Code table",
         sweep=("table", "exact"),
@@ -52,7 +51,7 @@ class Params:
     )
     size_parts: int = param(
         2,
-        "Number of disc radii in the table of shapes for each pixel that the radius grows",
+        "Number of disc radii in the table of shapes per pixel of radius",
         low=1,
         high=8,
         group="Words",
@@ -60,7 +59,8 @@ class Params:
     )
     normals: int = param(
         61,
-        "Number of values (odd) in the table of shapes for each slope of a normal, n'x and n'y",
+        "Number of values, which must be odd, in the table of shapes for each slope of a normal (n'x and "
+        "n'y)",
         low=3,
         high=121,
         group="Words",
@@ -68,8 +68,8 @@ class Params:
     )
     normal_parts: int = param(
         5,
-        "How many values the table has for slopes of a normal (n'x or n'y) from 0 to 1, where 1 is a "
-        "tilt of 45 degrees",
+        "Number of values in the table for slopes of a normal (n'x or n'y) from 0 to 1. A slope of 1 is "
+        "a tilt of 45 degrees",
         low=1,
         high=20,
         group="Words",
@@ -93,7 +93,7 @@ class Params:
     cull_back: bool = param(False, "Leave out discs that face away from the viewer", group="Splats")
     window: int = param(
         16,
-        "Number of lines of the picture that each step of drawing covers",
+        "Number of lines of the picture that Scan4D draws in one step",
         low=8,
         high=64,
         affects="speed",

@@ -90,7 +90,7 @@ class WordStream:
         count = len(self.words)
         starts = self.line_starts
         if len(starts) != self.strips * self.size[1] + 1 or starts[0] != 0 or starts[-1] != count:
-            raise InputError("the number of code words does not match the lines")
+            raise InputError("the number of code words is not the sum over the lines")
         if (np.diff(starts) < 0).any():
             raise InputError("a line of code words begins before the one above it")
         if len(self.ids) != count or (self.finer is not None and self.finer.shape != (count, 3)):
@@ -106,7 +106,7 @@ class WordStream:
         limits = np.array([1 << 30, STEEPEST_DEPTHS, STEEPEST_DEPTHS])
         if self.finer is not None and (np.abs(self.finer.astype(np.int64)) > limits).any():
             raise InputError(
-                "finer depths of code words are larger than 2^30, or grow by more than 2^26 per pixel"
+                "exact depths of code words are larger than 2^30, or change by more than 2^26 per pixel"
             )
 
     def _check_words(self) -> None:
@@ -114,12 +114,15 @@ class WordStream:
         if len(self.words) == 0:
             return
         if int((self.words >> np.uint64(at) & np.uint64((1 << bits) - 1)).max()) >= len(self.materials):
-            raise InputError(f"a code word uses a material beyond the {len(self.materials)} in the table")
+            raise InputError(
+                f"a code word uses a material that the table of {len(self.materials)} materials does not "
+                "contain"
+            )
         strip = np.repeat(np.arange(self.strips), np.diff(self.line_starts[:: self.size[1]]))
         at, bits = FIELDS["x"]
         x = (self.words >> np.uint64(at) & np.uint64((1 << bits) - 1)).astype(np.int64)
         if (x >= np.minimum(self.stride, self.size[0] - strip * self.stride)).any():
-            raise InputError("a code word lies outside the columns of its strip")
+            raise InputError("a code word is outside the columns of its strip")
         falls = np.flatnonzero(self.ids[1:] < self.ids[:-1]) + 1
         if not np.isin(falls, self.line_starts).all():
             raise InputError("the words of a line must be sorted by their ids")
@@ -201,7 +204,7 @@ def read_stream(path: Path | str) -> WordStream:
             header = file.read(_HEADER.size)
             needed, held = _file_size(header), os.fstat(file.fileno()).st_size
             if held != needed:
-                what = "is cut short" if held < needed else "is longer than its header says"
+                what = "is cut short" if held < needed else "is longer than its header states"
                 raise InputError(what, hint="Write the file again")
             data = header + file.read()
     except OSError as error:

@@ -52,7 +52,8 @@ class Steps:
             raise InputError("steps of code words must be at least 1")
         if self.normals % 2 == 0:
             raise InputError(
-                f"{self.normals} values of n'x in the table have no middle value", hint="Use an odd number"
+                f"the number of values of n'x in the table must be odd, not {self.normals}",
+                hint="Use an odd number",
             )
         if (self.sizes - 1) / self.size_parts > _MOST_RADIUS:
             raise InputError(f"radii in a table of code words must not exceed {_MOST_RADIUS} pixels")

@@ -44,5 +44,5 @@ def given(args: Namespace, names: Iterable[str]) -> list[str]:
 def seed(text: str) -> int:
     """A whole number of at least 0."""
     if not (text.isascii() and text.isdecimal() and len(text) < 20):
-        raise ArgumentTypeError(f"'{text}' is not a seed. Give a number such as 7")
+        raise ArgumentTypeError(f"'{text}' is not a usable seed. Give a whole number such as 7")
     return int(text)

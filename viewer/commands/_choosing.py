@@ -17,7 +17,7 @@ from ._console import warn
 AUTO = "auto"
 _OTHERS = {
     "set": "needs a named renderer",
-    "quality": "needs several pictures, but the limit is for one picture",
+    "quality": "draws several samples per pixel, but a limit of time or error applies to one sample",
 }
 
 
@@ -26,11 +26,11 @@ def add_goal_arguments(parser: ArgumentParser | _ArgumentGroup) -> None:
     parser.add_argument(
         "--budget",
         metavar="TIME",
-        help="choose the most accurate renderer that takes at most this time, such as 50ms",
+        help="choose the most accurate renderer that draws a picture in at most this time, such as 50ms",
     )
     parser.add_argument(
         "--error", metavar="LENGTH",
-        help="choose the fastest renderer with an error below this, such as 0.5px or 0.1mm",
+        help="choose the fastest renderer whose error is at most this length, such as 0.5px or 0.1mm",
     )  # fmt: skip
 
 
@@ -42,13 +42,14 @@ def goal_of(args: Namespace) -> Goal | None:
         return None
     if len(given) > 1:
         raise InputError(
-            "are two limits, and Scan4D can apply only one", "--budget, --error", "Leave out one"
+            "are two limits, but Scan4D can apply only one limit", "--budget, --error", "Leave out one"
         )
     (name,) = given
     if args.backend not in (None, AUTO):
         hint = f"Use --backend {AUTO}, or leave out --{name}"
         raise InputError(
-            f"a limit chooses the renderer, but the command already names one: {args.backend}",
+            "a limit lets Scan4D choose the renderer, but the command already names the renderer "
+            f"{args.backend}",
             f"--{name}",
             hint,
         )
@@ -68,8 +69,11 @@ def choice_of(
     choice = choose_configuration(pose, view, in_unit(goal, unit), model)
     if choice is None:
         raise InputError(
-            "no renderer can be chosen automatically for this scan", hint="Name one with --backend"
+            "Scan4D cannot choose a renderer automatically for this scan", hint="Name one with --backend"
         )
     if not choice.meets_limit:
-        warn(f"no renderer is expected to meet {goal}; Scan4D uses the one that comes closest: {choice}")
+        warn(
+            f"no renderer is likely to stay within the limit of {goal}. Scan4D uses the renderer that comes "
+            f"closest: {choice}"
+        )
     return choice

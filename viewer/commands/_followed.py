@@ -35,8 +35,7 @@ def check_on_scan(path: Path, found: LandmarkSet, timeline: Timeline) -> None:
     apart = why_apart(found, framing(timeline, range(len(timeline))))
     if apart is not None:
         hint = (
-            "Use landmarks that belong to this scan. Check that --axes and --unit state the axes and the "
-            "unit of the scan"
+            "Use landmarks of this scan, and check that --axes and --unit state the axes and unit of the scan"
         )
         raise InputError(apart, path, hint)
 
@@ -61,13 +60,13 @@ def put_on_surface(found: LandmarkSet, timeline: Timeline, frame: int) -> Landma
     if max(moves) > 0:
         mean = np.mean(moves[1:])
         tell(
-            f"Scan4D moves landmarks onto the surface, by up to {max(moves):.3g} {unit}, {mean:.3g} on "
-            "average"
+            f"Scan4D moves landmarks onto the surface, by {mean:.3g} {unit} on average and by at most "
+            f"{max(moves):.3g} {unit}"
         )
     if astray:
         few = ", ".join(f"'{name}'" for name in list(dict.fromkeys(astray))[:_NAMED])
         what = f"Scan4D finds no surface near {len(astray)} positions of landmarks, such as {few}"
-        warn(f"{what}, and does not move them")
+        warn(f"{what}. These landmarks stay where they are")
     return replace(found, positions=positions)
 
 

@@ -94,7 +94,7 @@ def _message(error: BaseException) -> str:
     elif isinstance(error, MemoryError):
         text = "not enough memory. Close other programs, or ask for fewer frames or a smaller picture"
     else:
-        text = f"internal error ({type(error).__name__}: {error}). Run it again with --debug"
+        text = f"internal error ({type(error).__name__}: {error}). Run the command again with --debug"
     if len(text) > _MOST_SHOWN:
         text = f"{text[: _MOST_SHOWN // 2]} ... {text[-_MOST_SHOWN // 2 :]}"
     return escaped(text) if isinstance(error, InputError) else text  # what drivers say has several lines

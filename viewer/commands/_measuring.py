@@ -46,7 +46,9 @@ def add_measuring_arguments(parser: ArgumentParser) -> None:
         help="quick run with few scenes, few views and small pictures, about two minutes",
     )
     parser.add_argument(
-        "--report", action="store_true", help="measure nothing; make the report from the results in DIR"
+        "--report",
+        action="store_true",
+        help="measure nothing, but write the report of the results that DIR already contains",
     )
     parser.add_argument(
         "--data", type=Path, metavar="DIR",
@@ -70,7 +72,7 @@ def data_folder(given: Path | None = None) -> Path | None:
     """
     data = given or os.environ.get("SCAN4D_DATA") or (_BESIDE if _BESIDE.is_dir() else None)
     if data is not None and not Path(data).is_dir():
-        raise InputError("is not a folder of real scans", data, "Name one with --data")
+        raise InputError("is not a folder", data, "Name the folder of real scans with --data")
     return data and Path(data)
 
 
@@ -143,16 +145,13 @@ class MeasuringPlan(NamedTuple):
             if not any(measured):
                 if bench.stopped:
                     raise KeyboardInterrupt
-                raise InputError("; ".join(bench.notes) or "the options leave nothing to measure")
+                raise InputError("; ".join(bench.notes) or "these options select nothing to measure")
             stopped = ["Stopped before the end."] if bench.stopped else []
             write_notes(out, [*self.notes, *bench.notes, *stopped])
             report()
         except KeyboardInterrupt:
             if any(measured):
-                warn(
-                    f"{out} holds the results. Run the same command with --report to make the page from "
-                    "these results"
-                )
+                warn(f"{out} contains the results. To write the report, run the same command with --report")
             raise
 
     def _foretell(self, bench: Bench) -> None:
@@ -162,9 +161,12 @@ class MeasuringPlan(NamedTuple):
             rows = sum(len(group.contenders) for group in self.groups)
             minutes = f"{seconds / 60:.0f} minutes" if seconds >= _MINUTES else f"{seconds:.0f} seconds"
             scenes = len({group.scene for group in self.groups})
-            tell(f"{rows} combinations of renderer and parameters on {scenes} scenes: about {minutes}")
+            tell(
+                f"Measuring {rows} combinations of renderer and parameters on {scenes} scenes takes about "
+                f"{minutes}"
+            )
         if self.others:
-            tell(f"After that, {', '.join(self.others)} will take some more minutes")
+            tell(f"After that, measuring {', '.join(self.others)} takes some more minutes")
 
 
 def _drawn(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:

@@ -32,7 +32,7 @@ def claim(outputs: Sequence[Path], inputs: Iterable[Path], force: bool) -> None:
     """
     for path in found_among(outputs, inputs):
         raise InputError(
-            "is an input of this command: Scan4D does not replace it", path, "Write to another file"
+            "is an input of this command, and Scan4D does not replace inputs", path, "Write to another file"
         )
     there = [path for path in outputs if _is_there(path)]
     if there and not force and not _agreed(there):

@@ -77,8 +77,8 @@ class _Parser(ArgumentParser):
                 raise InputError(f"unknown option '{shortened(name)}'", hint=hint + self.see)
         for before, word in zip([self.prog, *words], words, strict=False):
             if not word or (word[-1] == "=" and word[:-1] in options):
-                hint = f"A variable of the shell may be unset. {self.see}"
-                raise InputError(f"the name after '{word or shortened(before)}' is empty", hint=hint)
+                hint = f"A variable in the command may be empty. {self.see}"
+                raise InputError(f"the word after '{word or shortened(before)}' is empty", hint=hint)
 
     def said_singly(self, words: Sequence[str]) -> list[str]:
         """--set a=1 b=2 SCAN as --set=a=1 --set=b=2 SCAN, as argparse would take SCAN for a value as well.
@@ -150,10 +150,10 @@ def _common_arguments() -> _Parser:
         "--device",
         type=int,
         metavar="N",
-        help="GPU to draw with, if there are several; 'scan4d doctor' lists them",
+        help="number of the GPU to use, if there are several; 'scan4d doctor' lists all GPUs",
     )
     group.add_argument(
-        "--unit", type=_unit, metavar="U", help="name of the scan's unit of length, for example mm"
+        "--unit", type=_unit, metavar="U", help="unit of length of the scan's coordinates, for example mm"
     )
     group.add_argument(
         "--fps", type=float, metavar="F", help="frame rate of the scan, and of a film, in frames per second"
@@ -165,14 +165,19 @@ def _common_arguments() -> _Parser:
         nargs="+",
         default={},
         metavar="KEY=VALUE",
-        help="correct how Scan4D reads the scan, for example decimal=, or unit=mm. 'scan4d info' lists "
-        "the decisions",
+        help="correct a decision about how Scan4D reads the scan, for example unit=mm. 'scan4d info' lists "
+        "all decisions",
     )
     group.add_argument(
-        "--take", metavar="NAME", help="which scan of a folder that holds several, or all as one scan"
+        "--take",
+        metavar="NAME",
+        help="name of one scan in a folder with several scans, or 'all' to open all of them as one scan",
     )
     group.add_argument(
-        "--up", type=_up, metavar="±x|±y|±z", help="up axis of the scan; default: estimated from the scan"
+        "--up",
+        type=_up,
+        metavar="±x|±y|±z",
+        help="axis of the scan that points up; default: estimated from the scan",
     )
     group.add_argument(
         "-q",
@@ -198,7 +203,7 @@ def _pair(text: str) -> tuple[str, str]:
     from ..scan.reading.corrections import parsed_pair
 
     if "=" not in text:
-        raise ArgumentTypeError(f"'{shortened(text)}' is not KEY=VALUE")
+        raise ArgumentTypeError(f"'{shortened(text)}' does not have the form KEY=VALUE")
     return parsed_pair(text)
 
 
@@ -229,8 +234,8 @@ def _no_command(words: Sequence[str], commands: Sequence[str]) -> InputError:
     see = f"Known: {', '.join(commands)}. See 'scan4d --help'"
     first = shortened(words[0])
     if later := [word for word in words if word in commands]:
-        hint = f"Write it after '{later[0]}'. See 'scan4d {later[0]} --help'"
-        return InputError(f"'{first}' comes before the command", hint=hint)
+        hint = f"Write '{first}' after '{later[0]}'. See 'scan4d {later[0]} --help'"
+        return InputError(f"'{first}' must come after the command", hint=hint)
     if files := [word for word in words if os.path.exists(word)]:
         name = shlex.quote(files[0])
         hint = f"'scan4d view {name}' shows the scan, 'scan4d render {name} -o picture.png' draws it. {see}"
@@ -244,7 +249,7 @@ def _too_many(words: Sequence[str], parser: _Parser) -> InputError:
     """The error for words that the command does not take."""
     more = ", ".join(f"'{shortened(word)}'" for word in words[:_MOST_NAMED])
     rest = ", ..." if len(words) > _MOST_NAMED else ""
-    what = f"{more}{rest}: unexpected, because '{parser.prog}' takes {parser.takes or 'only options'}"
+    what = f"{more}{rest}: not expected here, because '{parser.prog}' takes {parser.takes or 'only options'}"
     if not parser.takes:
         return InputError(what, hint=parser.see)
     hint = f"If the shell expanded a pattern, put it in quotes: 'frame*.ply'. {parser.see}"

@@ -74,7 +74,7 @@ def _scan_files(entries: Sequence[Entry], args: Namespace) -> Iterator[Path]:
 
 def _check_arguments(args: Namespace) -> None:
     if given := arguments.given(args, _OF_RECORDING):
-        hint = "Leave out these options, because the recording states what to draw"
+        hint = "Leave out these options: the recording already states what to draw"
         raise InputError(f"--replay cannot be combined with {', '.join(given)}", args.replay, hint)
 
 
@@ -180,9 +180,12 @@ def _scan_of(entry: Entry, args: Namespace, salt: str | None) -> _Opened:
     if None not in (hash, entry.hash) and hash != entry.hash:
         if args.scan is not None:
             timeline.close()
-            what = f"is not the scan of {args.replay.name}: its hash is {hash}, not {entry.hash}"
-            raise InputError(what, found, "Name the unchanged scan that you recorded")
-        warn(f"{found}: has changed since {args.replay.name} was made; pictures may differ")
+            what = (
+                f"is not the scan that {args.replay.name} shows: the hash of the file is {hash}, not "
+                f"{entry.hash}"
+            )
+            raise InputError(what, found, "Give the path of the unchanged scan that you recorded")
+        warn(f"{found}: has changed since Scan4D saved {args.replay.name}, so the pictures may differ")
     if salt is not None and not entry.anonymous:
         hash = fingerprint(timeline.files, salt)
     return _Opened(found, timeline, hash)
@@ -197,8 +200,8 @@ def _found(entry: Entry, args: Namespace) -> tuple[str, Timeline]:
     if args.scan is not None:
         return args.scan, open_scan(args.scan, read=read)
     if entry.scan is None:
-        hint = f"Name the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
-        raise InputError("does not contain the name of its scan", args.replay, hint)
+        hint = f"Give the path of the scan: scan4d render SCAN --replay {args.replay} -o {args.out}"
+        raise InputError("does not contain the name of the recorded scan", args.replay, hint)
     return _open(entry.scan, args.replay, read)
 
 
@@ -220,4 +223,4 @@ def _open(scan: str, path: Path, read: Mapping[str, str]) -> tuple[str, Timeline
         f"Scan4D looked in '{path.parent}' and in the working directory. Put the scan there, or "
         "correct the field 'scan' of the recording"
     )
-    raise InputError(f"its scan '{scan}' is missing", path, hint) from missing
+    raise InputError(f"shows '{scan}', a scan that Scan4D cannot find", path, hint) from missing

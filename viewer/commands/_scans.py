@@ -88,13 +88,13 @@ def _poses_between(text: str, timeline: Timeline) -> list[int]:
     match = re.fullmatch(r"(\d*):(\d*)(?::0*([1-9]\d*))?", text)
     if not match:
         raise InputError(
-            f"'{text}' is not a range of frames", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
+            f"'{text}' is not a valid range of frames", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
         )
     start, stop, step = (int(part) if part else None for part in match.groups())
     indices = list(range(len(timeline)))[start:stop:step]
     if not indices:
         raise InputError(
-            f"no frame is in the range {text}",
+            f"the scan has no frame in the range {text}",
             timeline.name,
             f"The scan has the frames 0 to {len(timeline) - 1}",
         )
@@ -173,7 +173,7 @@ def first_readable(timeline: Timeline, indices: Sequence[int]) -> Pose:
     error = timeline.broken[tried[0]]
     if len(indices) == 1:
         raise error
-    of_all = f"Scan4D tried {len(tried)} of {len(indices)} frames and cannot read any of them"
+    of_all = f"Scan4D tried to read {len(tried)} of {len(indices)} frames, and all of them failed"
     raise InputError(of_all, timeline.name, f"The first: {error}")
 
 
@@ -228,7 +228,7 @@ def _check_times_file(path: Path, names: set[str]) -> None:
     except (OSError, UnicodeDecodeError, csv.Error):
         listed = {"?"}
     if listed - names - {"file"}:
-        raise InputError("already holds the times of other files", path, "Write into a separate folder")
+        raise InputError("already contains the times of other files", path, "Write into a separate folder")
 
 
 def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
@@ -244,7 +244,10 @@ def _check_other_frames(out: Path, names: set[str], timeline: Timeline) -> None:
         found += [file for file in timeline.files if file.parent != folder]
     kinds = Counter(file.suffix.lower() for file in found)
     if kinds[out.suffix.lower()] or any(count > 1 for count in kinds.values()):
-        what = f"holds other frames, such as {found[0].name}, whose times the new {TIMES_FILE} would lack"
+        what = (
+            f"contains other frames, such as {found[0].name}, but the new {TIMES_FILE} would not contain "
+            "their times"
+        )
         raise InputError(what, folder, "Write into a separate folder")
 
 

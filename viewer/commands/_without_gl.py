@@ -53,12 +53,14 @@ def is_asked(args: Namespace) -> bool:
 def run(args: Namespace) -> int:
     """Draw what is asked for, on the CPU. Raises InputError."""
     if args.backend not in (None, BACKEND):
-        hint = f"Use --backend {BACKEND}, or leave it out"
+        hint = f"Use --backend {BACKEND}, or leave out --backend"
         raise InputError(f"'{args.backend}' needs OpenGL", "--no-gl", hint)
-    _refuse(args, _NEED_GL, "applies only to pictures that OpenGL draws")
+    _refuse(args, _NEED_GL, "applies only to pictures that Scan4D draws with OpenGL, without --no-gl")
     if args.behind and args.out.suffix.lower() == SUFFIX:
         raise InputError(
-            f"is not stored in '{SUFFIX}' files", "--behind", "Use this option when you draw the code words"
+            f"has no effect on '{SUFFIX}' files, which do not store a background picture",
+            "--behind",
+            "Use this option later, when you draw a picture from the file of code words",
         )
     if args.progress:
         say(device="CPU")
@@ -78,7 +80,7 @@ def _refuse(args: Namespace, names: tuple[str, ...], what: str) -> None:
 
 def _replay(args: Namespace, path: Path) -> None:
     """Draw a file of code words."""
-    _refuse(args, _SETTLED, f"has no effect: the code words in {path.name} hold a single picture")
+    _refuse(args, _SETTLED, f"has no effect: the code words in {path.name} contain a single picture")
     check_output(args.out, tuple(suffix for suffix in _SUFFIXES if suffix != SUFFIX), several=False)
     claim([numbered(args.out, 0)], [path, *_given(args.behind)], args.force)
     stream = read_stream(path)
@@ -169,7 +171,7 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
     except ImportError:  # the library that finds neighbours is linked to EGL
         effects = {"normals": "the discs face the viewer", "radii": "all discs have the same size"}
         effect = " and ".join(effects[name] for name in missing)
-        warn(f"Scan4D cannot estimate {' or '.join(missing)} here: {effect}")
+        warn(f"Scan4D cannot estimate {' or '.join(missing)} on this computer, so {effect}")
         return pose
 
 

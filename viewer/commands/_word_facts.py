@@ -41,7 +41,10 @@ def stream_as_text(facts: dict[str, Any]) -> str:
         ("code words", facts["name"]),
         ("picture", "{} x {} pixels".format(*facts["size"])),
         ("strips", f"{facts['strips']}"),
-        ("words", f"{facts['words']:,}, {facts['tiles']:,} of them tiles, of {facts['elements']:,} elements"),
+        (
+            "words",
+            f"{facts['words']:,} for {facts['elements']:,} discs; {facts['tiles']:,} of the words are tiles",
+        ),
         ("projection", facts["projection"]),
         ("depth", f"{depth['nearest']:g} to {depth['farthest']:g}, {text}"),
         ("materials", f"{facts['materials']}"),

@@ -89,7 +89,7 @@ def _as_text(backend: Backend) -> str:
         lines.append("  ".join(["", *(f"{c:{w}}" for c, w in zip(cells, widths, strict=True)), text]))
     if backend.values:
         width = max(map(len, backend.values))
-        lines.append("  Quantities to colour by (--look color_by=...)")
+        lines.append("  Quantities that colours can show (--look color_by=...)")
         lines += [f"  {name:{width}}  {kind.help}" for name, kind in backend.values.items()]
     return "\n".join(lines)
 

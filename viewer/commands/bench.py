@@ -60,16 +60,21 @@ def add_arguments(parser: ArgumentParser) -> None:
         metavar="NAME",
         help="measure only these renderers; gl-points and mesh are always included",
     )
-    parser.add_argument("--suite", choices=_SUITES, help="one suite; default: scenes and numerics")
+    parser.add_argument(
+        "--suite", choices=_SUITES, help="name of the suite to run; default: scenes and numerics"
+    )
     parser.add_argument(
         "--calibrate", action="store_true",
-        help="measure only what the automatic choice needs on this device, and store it for this user",
+        help=
+            "measure only what the automatic choice of a renderer needs on this device, and store the "
+            "results for this user"
+        ,
     )  # fmt: skip
     parser.add_argument(
         "--compare",
         type=Path,
         metavar="OLD",
-        help="compare with these earlier results, and list what got slower or worse",
+        help="compare with these earlier results, and list the measurements that got slower or worse",
     )
 
 
@@ -81,7 +86,7 @@ def run(args: Namespace) -> int:
     if args.report:
         if args.compare or args.backend or args.scene:
             hint = "Leave out --compare, --backend and --scene"
-            raise InputError("measures nothing: it reports all results in DIR", "--report", hint)
+            raise InputError("measures nothing, but reports all results in DIR", "--report", hint)
         claim(_report_files(args.out), [], args.force)
         tell(write_report(args.out))
         return 0
@@ -137,7 +142,7 @@ def _calibrate(args: Namespace) -> int:
     there, and store the model of them. 1 where Ctrl-C stopped it: nothing is stored then."""
     if args.suite or args.backend or args.compare:
         hint = "Leave out --suite, --backend and --compare"
-        raise InputError("the suite defines its own pictures and renderers", "--calibrate", hint)
+        raise InputError("defines its own pictures and renderers", "--calibrate", hint)
     settings = settings_of(args, replace(_CALIBRATION, views=2) if args.quick else _CALIBRATION)
     renderer = drawing.renderer(args.device)
     if not args.report:
@@ -149,7 +154,10 @@ def _calibrate(args: Namespace) -> int:
             write_rows(args.out / WAYS, bench, 0, bench.until_stopped(measure_ways(bench, scenes)))
         write_notes(args.out, bench.notes)
         if bench.stopped:
-            warn(f"{args.out} holds the results. 'scan4d bench --calibrate --report' uses these results")
+            warn(
+                f"{args.out} contains the results. To use these results, run 'scan4d bench --calibrate "
+                "--report'"
+            )
             return 1
     tell(keep_model(renderer.gpu, laws_of(read_rows(args.out / WAYS))))
     return 0
@@ -174,5 +182,5 @@ def _groups(
         groups = plan(scenes, names)
     called = Counter(settings.subject(group).name for group in groups if not group.sweep)
     if twice := [name for name, count in called.items() if count > 1]:
-        raise InputError(f"two scenes are called {twice[0]}", "--scene", "Rename one of the files")
+        raise InputError(f"two scenes have the name {twice[0]}", "--scene", "Rename one of the files")
     return groups, {} if args.scene else missing

@@ -64,7 +64,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--delta",
         type=float,
         metavar="D",
-        help="share of the positions that may share their octree leaf with others; default 0.05",
+        help="how many of the positions, as a fraction, may lie in an octree leaf with other positions; "
+        "default 0.05",
     )
     group.add_argument(
         "--depth",
@@ -154,7 +155,9 @@ def _stop(args: Namespace) -> Stop | None:
         stated = {"rule": "depth", "depth": args.depth}
     if stated and args.out.suffix.lower() not in formats.scan_suffixes():
         raise InputError(
-            f"--{stated['rule']} is for octrees", args.out, "Write a .svo file, or leave this option out"
+            f"--{stated['rule']} applies only to octrees",
+            args.out,
+            "Write a .svo file, or leave this option out",
         )
     return Stop(**stated) if stated else None
 
@@ -165,7 +168,11 @@ def _write_scan(
     out = args.out
     check_output(out, formats.scan_suffixes(), several=False)
     if is_pattern(out):
-        raise InputError("has a number in its name, but one file holds all frames", out, "Leave it out")
+        raise InputError(
+            "has a number field in its name, but the scan becomes a single file with all frames",
+            out,
+            "Leave it out",
+        )
     claim([out], scan_inputs(timeline), args.force)
     with progress(len(indices)) as tick:
 

@@ -39,7 +39,9 @@ _OPTIONAL_EXTENSIONS = (
     "GL_NV_shader_atomic_int64",
 )
 _MOST_DEVICES = 16
-_WITHOUT_GL = "Pictures need no OpenGL with 'scan4d render SCAN --backend codeword --no-gl -o picture.png'."
+_WITHOUT_GL = (
+    "Scan4D can draw pictures without OpenGL: 'scan4d render SCAN --backend codeword --no-gl -o picture.png'."
+)
 
 
 def add_arguments(parser: ArgumentParser) -> None:

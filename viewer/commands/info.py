@@ -154,13 +154,17 @@ def _as_text(facts: dict[str, Any], record: Reading, verbose: bool) -> str:
         poses += f", {times['first']:g} to {times['last']:g} s, {1 / times['median_step']:g} a second"
     points = f"{facts['points']:,}"
     if facts["dropped"]:
-        points += f" ({facts['dropped']:,} not finite or not measured left out)"
+        points += f" (Scan4D leaves out {facts['dropped']:,} that are not finite or not measured)"
     rows = [
         ("scan", facts["name"]),
         *([("read by", facts["package"])] if facts["package"] else []),
         ("poses", poses),
         ("pose", f"{facts['pose']}, {facts['label']}"),
-        *([("unreadable", f"{broken} of {broken + 1} poses that Scan4D tried")] if broken else []),
+        *(
+            [("unreadable", f"{broken} of the {broken + 1} poses that Scan4D tried to read")]
+            if broken
+            else []
+        ),
         ("points", points),
         *(("view", _shown_view(view)) for view in facts["views"]),
         *(("beside", text) for text in facts["beside"]),

@@ -95,7 +95,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--repeats", type=Path, metavar="FILE",
-        help=f"table of the measures around each peak of one measure, {' or '.join(_SUFFIXES)}",
+        help=f"table of all measures around each peak of one measure, {' or '.join(_SUFFIXES)}",
     )  # fmt: skip
     parser.add_argument(
         "--plot", type=Path, metavar="FILE",
@@ -139,8 +139,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     how.add_argument(
         "--least", type=_share, metavar="SHARE",
         help=(
-            "smallest height of a repeat's peak, as a share of the curve's range; "
-            f"default {_LEAST}"
+            f"smallest peak that counts as a repeat, as a share of the curve's range; default {_LEAST}"
         ),
     )  # fmt: skip
     how.add_argument(
@@ -271,27 +270,35 @@ def _outputs(args: Namespace) -> list[Path]:
     taken = {os.path.realpath(absolute(args.out))}
     for flag, path in asked.items():
         if (place := os.path.realpath(absolute(path))) in taken:
-            raise InputError("is already the file of another table", path, f"Write {flag} to another file")
+            raise InputError("is already the name of another output", path, f"Write {flag} to another file")
         taken.add(place)
     if args.plot:
         check_plot(args.plot)
     is_of_speeds = args.order != ORDERS[0]
     lacking = [flag for flag in asked if flag != "--plot" or not is_of_speeds]
     if lacking and args.measures is None:
-        raise InputError("needs measures, but the command has none", lacking[0], "Name them with --measures")
+        raise InputError(
+            "needs measures, but the command names none", lacking[0], "Name them with --measures"
+        )
     if args.traced is not None and not is_of_speeds:
-        raise InputError("needs speeds, but the command computes none", "--traced", "Add --order speed")
+        raise InputError("needs speeds, but this command computes no speeds", "--traced", "Add --order speed")
     if args.against is not None and args.measures is None:
-        raise InputError("needs measures, but the command has none", "--against", "Name them with --measures")
+        raise InputError(
+            "needs measures, but the command names none", "--against", "Name them with --measures"
+        )
     if args.anchors is not None and len(args.anchors) < _LEAST_ANCHORS:
         hint = "Name landmarks that move as one rigid body, separated by commas"
-        raise InputError("removing head motion needs three landmarks", "--anchors", hint)
+        raise InputError("removing head motion needs at least three landmarks", "--anchors", hint)
     if args.smoothing is not None and not (is_of_speeds or args.measures):
         hint = f"Use this option with --measures, or with --order {' or '.join(ORDERS[1:])}"
         raise InputError("has nothing to smooth", "--smoothing", hint)
     if not args.repeats and (args.aligned is not None or args.least is not None):
         flag = "--least" if args.aligned is None else "--aligned"
-        raise InputError("needs repeats, but the curve has none", flag, "Add --repeats FILE")
+        raise InputError(
+            "applies only to repeats of a movement, but the command asks for no repeats",
+            flag,
+            "Add --repeats FILE",
+        )
     return outputs
 
 
@@ -312,14 +319,14 @@ def _measures(args: Namespace, found: LandmarkSet) -> list[Measure]:
         more = ", ..." if len(found.names) > _NAMED else ""
         hint = f"The file has the landmarks {', '.join(found.names[:_NAMED])}{more}"
         raise InputError(
-            f"has the landmarks of none of the measures in {args.measures}", args.landmarks, hint
+            f"does not contain all landmarks of any measure in {args.measures}", args.landmarks, hint
         )
     names = [measure.name for measure in kept]
     for name in (args.aligned, args.against):
         if name is not None and name not in names:
             raise unknown_name("measure", name, names)
     if args.against is not None and len(kept) == 1:
-        raise InputError("there is only one measure", "--against", "Name more with --measures")
+        raise InputError("there is only one measure", "--against", "Name a file with more measures")
     return kept
 
 
@@ -372,11 +379,11 @@ def _repeats(args: Namespace, curves: Sequence[MeasureCurve], order: int) -> lis
     aligned = repeats_by_peaks(aligned_by, least)
     if aligned is None:
         warn(
-            f"'{aligned_by.name}' has no peak as high as {100 * least:g} % of its range, "
-            "so there are no repeats"
+            f"'{aligned_by.name}' has no peak of at least {100 * least:g} % of its range, so Scan4D finds "
+            "no repeats"
         )
         return []
-    tell(f"{len(aligned.events)} repeats, aligned by the peaks of '{aligned_by.name}'")
+    tell(f"Scan4D found {len(aligned.events)} repeats, and aligned them by the peaks of '{aligned_by.name}'")
     return repeat_rows(curves, aligned, order)
 
 
@@ -406,8 +413,8 @@ def _save_plot(
     for line in plot.lines:
         if line not in plot.drawn and path.suffix.lower() != ".csv":
             warn(
-                f"'{line.label}' is not plotted in {path}: the axes of the plot are in "
-                f"{', '.join(plot.units)}, not {line.unit}"
+                f"{path} does not show '{line.label}': the axes of the plot are in "
+                f"{', '.join(plot.units)}, not in {line.unit}"
             )
 
 

@@ -50,7 +50,7 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     how.add_argument(
         "--ties", type=float, default=Rules.ties, metavar="T",
-        help="keep pixels whose weight is at most T below the weight in the best view; default 0",
+        help="also keep pixels whose weight is at most T below the weight in the best view; default 0",
     )  # fmt: skip
     how.add_argument(
         "--smoothing", type=int, default=Rules.smoothing, metavar="PIXELS",
@@ -58,8 +58,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
     how.add_argument(
         "--tolerance", type=float, metavar="LENGTH",
-        help="largest distance between two measurements of one surface, scan units; default: from "
-        "noise and pixels",
+        help=
+            "largest distance between two measurements of the same surface, in scan units; default: "
+            "estimated from noise and pixel size"
+        ,
     )  # fmt: skip
 
 
@@ -90,7 +92,7 @@ def _views(pose: Pose) -> tuple[RangeView, ...]:
         hint = "Range views come from EXR files and folders of range images: docs/reference/formats.md"
         raise InputError("has points, but no range views to merge", pose.label, hint)
     if len(pose.views) < 2:
-        raise InputError("has only one range view to merge", pose.label)
+        raise InputError("has only one range view, but merging needs at least two", pose.label)
     return pose.views
 
 
@@ -101,10 +103,14 @@ def _warn_of_drift(merged: MergedViews, pose: str, unit: str) -> None:
     (i, j), worst = max(merged.drifted.items(), key=lambda item: item[1].shift)
     names = f"{merged.given[i].name} and {merged.given[j].name}"
     more = f", and {len(merged.drifted) - 1} more" if len(merged.drifted) > 1 else ""
-    hint = "--refine corrects it" if merged.refinement is None else "--refine could not correct it"
+    hint = (
+        "--refine corrects the error"
+        if merged.refinement is None
+        else ("--refine could not correct the error")
+    )
     warn(
-        f"{pose}: the calibration of {names}{more} is wrong by {worst.rotation:.2g}° and"
-        f" {worst.translation:.2g} {unit}, more than noise can explain; {hint}"
+        f"{pose}: the calibration of {names}{more} is wrong by {worst.rotation:.2g}° and "
+        f"{worst.translation:.2g} {unit}. Noise does not explain this error; {hint}"
     )
 
 
@@ -120,8 +126,8 @@ def _tell_facts(args: Namespace, timeline: Timeline, facts: Sequence[dict[str, A
         )
         tell(
             f"pose {pose['pose']}: several views show {pose['overlap_before']:.1%} of the area before "
-            f"merging, {pose['overlap_after']:.2%} after it, and {pose['ties']:.2%} because of tied "
-            f"weights; number of kept pixels: {kept}"
+            f"merging, and {pose['overlap_after']:.2%} after merging ({pose['ties']:.2%} because of tied "
+            f"weights); number of kept pixels: {kept}"
         )
     if args.report:
         save_json(args.report, {"scan": timeline.name, "unit": timeline.unit, "poses": facts})
@@ -141,7 +147,7 @@ def _rows(pose: dict[str, Any]) -> list[tuple[str, ...]]:
 
 def _of_drift(drift: dict[str, Any] | None) -> tuple[str, ...]:
     if drift is None:
-        return "", "", "", "too little overlap to measure"
+        return "", "", "", "the overlap is too small to measure"
     return (
         f"{drift['depth_rmse']:.3g}",
         f"{drift['rotation']:.3f} ± {drift['rotation_error']:.3f}°",

@@ -65,13 +65,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_output_argument(parser, ".png .exr .npz .mp4, or a pattern with %%04d; with --no-gl also .cw")
     parser.add_argument(
         "--replay", type=Path, metavar="FILE",
-        help="draw a recording (.json) or a picture (.png, .exr) again; SCAN replaces its scan",
+        help="draw a recording (.json) or a saved picture (.png, .exr) again, or draw it with the scan SCAN",
     )  # fmt: skip
     parser.add_argument(
         "--anonymous", action="store_true",
-        help="anonymise: store no name, folder or time of the scan",
+        help="store no name, folder or time of the scan in the output",
     )  # fmt: skip
-    parser.add_argument("--progress", action="store_true", help="print a line of JSON for each picture")
+    parser.add_argument(
+        "--progress", action="store_true", help="print the progress: a line of JSON for each picture"
+    )
     add_pose_arguments(parser)
     picture = parser.add_argument_group("picture")
     picture.add_argument(
@@ -83,7 +85,10 @@ def add_arguments(parser: ArgumentParser) -> None:
     add_goal_arguments(picture)
     picture.add_argument("--no-gl", action="store_true", help="draw without OpenGL, with --backend codeword")
     picture.add_argument(
-        "--behind", type=Path, metavar="FILE", help="background picture of the same size, for --no-gl"
+        "--behind",
+        type=Path,
+        metavar="FILE",
+        help="background picture of the same size as the output, for --no-gl",
     )
     picture.add_argument(
         "--set", type=_assignment, nargs="+", action="extend", default=[], metavar="key=value",
@@ -96,8 +101,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     picture.add_argument(
         "--quality", choices=tuple(SAMPLES),
         help=(
-            "anti-aliasing of .png and .mp4: the mean of 1, 5 or 17 samples a pixel; default: balanced, "
-            "or as in the recording"
+            "anti-aliasing of .png and .mp4: the mean of 1, 5 or 17 samples per pixel; default: "
+            "balanced, or as in the recording"
         ),
     )  # fmt: skip
     picture.add_argument(
@@ -108,13 +113,16 @@ def add_arguments(parser: ArgumentParser) -> None:
     camera.add_argument("--camera", type=Path, metavar="FILE.json", help="camera from a file")
     camera.add_argument(
         "--orbit", type=_orbit, metavar="AZIMUTH,ELEVATION[,DISTANCE]",
-        help="camera around the scan, degrees and scan units; without a distance, fitted to the scan",
+        help=
+            "camera that looks at the scan from these angles (degrees) and this distance (scan units); "
+            "without a distance, the scan fills the picture"
+        ,
     )  # fmt: skip
     camera.add_argument(
         "--turntable",
         type=arguments.count,
         metavar="N",
-        help="N pictures of one turn around the scan; a sequence plays during the turn",
+        help="draw N pictures of one full turn around the scan; a sequence plays during the turn",
     )
     add_average_argument(picture)
     measuring = parser.add_argument_group("statistics")
@@ -128,7 +136,8 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--repeat",
         type=arguments.count,
         metavar="N",
-        help="draw each picture twice without and N times with measuring; --stats writes the median times",
+        help="measure the times of N drawings of each picture, after two without measuring; --stats writes "
+        "the medians",
     )
 
 
@@ -137,14 +146,16 @@ def run(args: Namespace) -> int:
     if without_gl.is_asked(args):
         return without_gl.run(args)
     if args.behind:
-        raise InputError("applies only to pictures without OpenGL", "--behind", "Add --no-gl")
+        raise InputError(
+            "applies only to pictures that Scan4D draws without OpenGL", "--behind", "Add --no-gl"
+        )
     if args.repeat and not args.stats:
         raise InputError("--repeat needs --stats", hint="Add --stats FILE.json")
     if args.stats:
         check_output(args.stats, (".json",), several=False)
     if args.marks and args.out.suffix.lower() in UNMARKED_SUFFIXES:
-        hint = "Such files hold the surface, not a picture: use .png or .mp4"
-        raise InputError(f"are not drawn on '{args.out.suffix}' files", "--marks", hint)
+        hint = "Such files store the surface, not a picture. Use .png or .mp4"
+        raise InputError(f"Scan4D draws no overlays in '{args.out.suffix}' files", "--marks", hint)
     with (replay.planned if args.replay else _planned)(args) as plan:
         _draw(plan, args)
     tell(args.out)
@@ -262,7 +273,7 @@ def _requests(
 def _assignment(text: str) -> tuple[str, str]:
     name, equals, value = text.partition("=")
     if not (name and equals):
-        raise ArgumentTypeError(f"'{text}' is not key=value")
+        raise ArgumentTypeError(f"'{text}' does not have the form key=value")
     return name, value
 
 

@@ -38,7 +38,7 @@ from ._scans import (
     with_files,
 )
 
-_HINT = "Name a mesh that has the faces with --faces"
+_HINT = "Name a file that contains the faces with --faces"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -50,8 +50,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--faces", type=Path, metavar="FILE",
         help=(
-            f"mesh with the faces of every frame; default: each frame's own, or {FACES_FILE} beside the "
-            "frames"
+            f"file with the faces of all frames; default: the faces in each frame's file, or {FACES_FILE} "
+            "beside the frames"
         ),
     )  # fmt: skip
     add_pose_arguments(parser)
@@ -83,20 +83,24 @@ def add_arguments(parser: ArgumentParser) -> None:
     faults = parser.add_argument_group("faults")
     faults.add_argument(
         "--noise", type=_numbers, default=(0.0,), metavar="SIGMA[,SIGMA...]",
-        help="standard deviation of depth, scan units; for all pods or for each",
+        help="standard deviation of the depth noise, in scan units: one value for all pods, or one per pod",
     )  # fmt: skip
     faults.add_argument(
         "--disparity", type=float, default=0.0, metavar="STEP", help="step between disparities, pixels"
     )
     faults.add_argument(
-        "--dropouts", type=float, default=0.0, metavar="FRACTION", help="share of the pixels without depth"
+        "--dropouts",
+        type=float,
+        default=0.0,
+        metavar="FRACTION",
+        help="fraction of the pixels that get no depth",
     )
     faults.add_argument(
         "--outliers",
         type=float,
         default=0.0,
         metavar="FRACTION",
-        help="share of the pixels with a grossly wrong depth",
+        help="fraction of the pixels that get a grossly wrong depth",
     )
     faults.add_argument(
         "--grazing",
@@ -107,11 +111,14 @@ def add_arguments(parser: ArgumentParser) -> None:
     )
     faults.add_argument(
         "--gain", type=_factors, nargs="+", action="extend", metavar="G|R,G,B",
-        help="factor on the colour in linear light; for all pods or for each",
+        help="factor on the colour in linear light: one value for all pods, or one per pod",
     )  # fmt: skip
     faults.add_argument(
         "--calibration-error", type=_numbers, default=(0.0,), metavar="DEGREES[,DEGREES...]",
-        help="error of the stored calibration, as a turn to the left in degrees; for all pods or for each",
+        help=
+            "error of the stored calibration, as a turn to the left in degrees: one value for all pods, or "
+            "one per pod"
+        ,
     )  # fmt: skip
     faults.add_argument(
         "--seed", type=arguments.seed, default=0, metavar="N", help="seed of all random numbers; default 0"

@@ -54,7 +54,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--fallback",
         type=Path,
         metavar="DIR",
-        help="if no window can open, write pictures of the scan into this folder",
+        help="write pictures of the scan into this folder if Scan4D cannot open a window",
     )
     add_average_argument(parser)
     add_force_argument(parser)
@@ -113,7 +113,7 @@ def _named(names: list[str]) -> _Named:
         scan = Recording.load(path).entries[0].scan
         if scan is None:
             raise InputError(
-                "does not contain the name of its scan",
+                "does not contain the name of the recorded scan",
                 path,
                 "Open the scan, then drop this file onto the window",
             )
@@ -125,7 +125,9 @@ def _scan_of_session(session: SavedSession, path: Path) -> str:
     scan = scan_path(session.scan, path)
     if not is_there(scan):
         hint = f"Give the path of the scan: scan4d view SCAN {path}"
-        raise InputError(f"its scan '{printable(session.scan)}' is missing", path, hint)
+        raise InputError(
+            f"stores work on '{printable(session.scan)}', a scan that Scan4D cannot find", path, hint
+        )
     return scan
 
 

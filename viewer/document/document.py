@@ -74,7 +74,7 @@ def _read_known(data: Any, kinds: Mapping[str, type]) -> dict[str, Any]:
     """Values by name, each of its kind; what has a name that is not known here, or cannot be read, stays as
     it is."""
     if not is_object(data):
-        raise InputError(f"is not an object with named values but {shortened(data)}", hint=DAMAGED)
+        raise InputError(f"must be an object with named values, not {shortened(data)}", hint=DAMAGED)
     return {name: _read_or_raw(kinds.get(name), value) for name, value in data.items()}
 
 
@@ -96,7 +96,7 @@ def _read_goal(data: Any) -> Goal | None:
         goal.kind in ("time", "error") and 0 < goal.bound < math.inf and usable_unit(goal.unit)
     ):
         return goal
-    raise InputError(f"is not a limit on time or error but {shortened(data)}", hint=DAMAGED)
+    raise InputError(f"must be a limit of time or error, not {shortened(data)}", hint=DAMAGED)
 
 
 def _read_configuration(data: Any) -> Configuration | None:
@@ -166,7 +166,7 @@ class Document:
         Raises InputError where it is no object, or nested so deeply that it could not be written again.
         """
         if not is_object(data) or not is_object(data.get("unread", {})):
-            raise InputError(f"is not an object with named values but {shortened(data)}", hint=DAMAGED)
+            raise InputError(f"must be an object with named values, not {shortened(data)}", hint=DAMAGED)
         hints = get_type_hints(cls, include_extras=True)
         stated = {name: value for name, value in data.items() if name != "unread"}
         left = dict(unread(data.get("unread", {})))

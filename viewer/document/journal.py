@@ -106,7 +106,7 @@ def _saved(journal: Path) -> Path | None:
         return None
     folder = head.pop("folder", None)
     if not isinstance(folder, str):
-        raise _put_aside(journal, "does not name its folder")
+        raise _put_aside(journal, "does not contain the name of its folder")
     try:
         recording = Recording.from_json(head | {"entries": changes}, journal)
     except InputError as error:

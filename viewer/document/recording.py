@@ -164,7 +164,10 @@ class Entry:
         names = layers.names(request.pose.overview.scalars)
         source = value_source(drawable(request.look, names), names)
         if source in layers.scalars:
-            what = f"Scan4D computed the colours '{source}', which the scan's files do not store"
+            what = (
+                f"the picture shows the colours '{source}', which Scan4D computes and the files of the scan "
+                "do not contain"
+            )
             raise InputError(what, hint="Choose other colours and try again")
         return cls(
             scan, hash, request.pose.index, float(request.pose.time), size,
@@ -328,7 +331,7 @@ class Recording:
             raise InputError(
                 "is not a recording",
                 path,
-                "Use a .json file that the window has recorded, or a saved picture",
+                "Use a recording (.json) or a picture that you saved with Scan4D",
             )
         check_format(data, FORMAT, path)
         entries = data.get("entries")
@@ -444,7 +447,7 @@ def checked_scan_paths(scan: str, recording: Path) -> list[str]:
     where opening it would search through folders, or ask another machine, for whoever wrote the recording.
     """
     if where := remote_location(scan):
-        hint = "If this is the right scan, open it first, or name it: scan4d render SCAN --replay ..."
+        hint = "If this is the right scan, open the scan first, or name it: scan4d render SCAN --replay ..."
         raise InputError(f"names the scan '{shortened(scan)}', {where}", recording, hint)
     return scan_paths(scan, recording)
 
@@ -477,7 +480,9 @@ def _read_changes(changes: Iterable[Any], path: Path) -> tuple[Entry, ...]:
         entries.append(Entry.from_json(complete, where))
         if number and entries[-1].at < entries[-2].at:
             raise InputError(
-                "is earlier than the entry before it", where, "Sort the entries by their field 'at'"
+                "the time of this entry is earlier than the time of the entry before it",
+                where,
+                "Sort the entries by their field 'at'",
             )
     return tuple(entries)
 

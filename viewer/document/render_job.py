@@ -71,7 +71,7 @@ def make(
             text = text.replace(name, printable(str(out.parent)))
         lines = tuple(line.removeprefix(_SAID) for line in text.splitlines())
         if code:
-            what = f"the process that draws ended with code {code}"
+            what = f"the process that draws the pictures ended with code {code}"
             raise Scan4DError(lines[-1] if code > 0 and lines else what)
         files = _moved(made, out, numbers or range(len(recording.entries)), replaced)
     return Made(files, device, lines)

@@ -91,10 +91,10 @@ class SavedSession:
         """The note for the user about a session that was read; None where nothing is unreadable."""
         if not (names := ", ".join(self.document.unreadable)):
             return None
-        what = f"Scan4D cannot read some of the saved changes: {names}"
+        what = f"Scan4D cannot read some of your saved work on this scan: {names}"
         return str(
             InputError(
-                what, self.scan, ("The changes stay in the file for a version of Scan4D that can read them")
+                what, self.scan, ("This work stays in the file, for a version of Scan4D that can read it")
             )
         )
 
@@ -167,10 +167,10 @@ def store(session: SavedSession) -> str | None:
         _delete_oldest(path.parent)
     if aside is None:
         return None
-    what = "something else, perhaps another window, has saved changes of this scan"
+    what = "another program, perhaps a second window of Scan4D, has saved work on this scan"
     return str(
         InputError(
-            what, session.scan, (f"Scan4D moved the other changes to {aside}. Open this file to see them")
+            what, session.scan, (f"Scan4D moved that work to {aside}. To see that work, open this file")
         )
     )
 
@@ -190,18 +190,15 @@ def stored(scan: str) -> SavedSession | None:
         _seen[path] = digest, session.document.made
         return session
     except InputError as error:
-        what = f"Scan4D cannot read the saved changes ({error.what})"
+        what = f"Scan4D cannot read your saved work on this scan ({error.what})"
         if _is_foreign(error):
-            hint = (
-                f"The changes stay unchanged in {path}. The scan opens without these changes, and "
-                "Scan4D saves no new changes"
-            )
+            hint = f"The work stays in {path}. Scan4D opens the scan without this work, and saves no new work"
             raise InputError(what, scan, hint) from error
         aside = _put_aside(path)
         raise InputError(
             what,
             scan,
-            (f"Scan4D renamed the file of the changes to {aside}. The scan opens without these changes"),
+            (f"Scan4D renamed the file with this work to {aside}, and opens the scan without it"),
         ) from error
 
 
@@ -279,7 +276,7 @@ def _put_aside(path: Path) -> Path:
         os.replace(path, aside)
     except OSError as error:
         what, hint = explained(error)
-        raise InputError(f"cannot be moved out of the way: {what}", path, hint) from error
+        raise InputError(f"cannot be renamed: {what}", path, hint) from error
     return aside
 
 
@@ -297,7 +294,7 @@ def _free_aside(path: Path) -> Path:
             continue
         except OSError as error:
             what, hint = explained(error)
-            raise InputError(f"cannot be moved out of the way: {what}", path, hint) from error
+            raise InputError(f"cannot be renamed: {what}", path, hint) from error
     raise AssertionError("an unused file name always exists")
 
 

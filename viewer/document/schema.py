@@ -49,7 +49,7 @@ class NewerFormatError(InputError):
     """File of a later Scan4D, whose format is not known here."""
 
 
-DAMAGED = "The file is damaged, or Scan4D did not write it. Make the file again"
+DAMAGED = "The file is damaged, or another program wrote it. Create the file again with Scan4D"
 _MOST_BYTES = 256 * 2**20
 _MOST_SECONDS = 86_400.0
 _LATEST = 1e12  # seconds, of a scan
@@ -118,7 +118,7 @@ Values = Annotated[Any, Kind("an object with named values", is_object)]
 
 def _read_corrections(data: Any) -> dict[str, str]:
     if not is_object(data) or not all(isinstance(text, str) for text in data.values()):
-        raise InputError(f"is not an object with texts but {shortened(data)}", hint=DAMAGED)
+        raise InputError(f"must be an object with texts, not {shortened(data)}", hint=DAMAGED)
     return dict(Corrections.parse(data).texts)
 
 
@@ -267,7 +267,7 @@ def _check_storable(value: Any, name: str) -> None:
         raise TypeError(f"{where} cannot be stored: {cause}") from None
     if again != value:
         where, kept, read = _difference(value, again, name)
-        raise TypeError(f"{where} would be read back as {_typed(read)}, not {_typed(kept)}")
+        raise TypeError(f"{where} does not survive saving: {_typed(kept)} would become {_typed(read)}")
 
 
 def _typed(value: Any) -> str:
@@ -308,7 +308,7 @@ def check_format(data: Mapping[str, Any], expected: int, where: object) -> None:
     if type(found) is not int or found != expected:
         what = f"has the format {found!r:.40}, but this version of Scan4D ({__version__}) reads {expected}"
         kind = NewerFormatError if type(found) is int and found > expected else InputError
-        raise kind(what, where, f"Use version {data.get('version')!r:.40}, which wrote the file")
+        raise kind(what, where, f"Use version {data.get('version')!r:.40} of Scan4D, which wrote the file")
 
 
 # --- how the library reads ------------------------------------------------------------------
@@ -442,7 +442,7 @@ def _in_words(error: BaseException, where: object) -> InputError:
 
     if isinstance(cause, _Unfit):
         named = f"'{name}'" if name else "It"
-        return problem(f"{named} is not {cause.words} but {shortened(cause.value)}", outer)
+        return problem(f"{named} must be {cause.words}, not {shortened(cause.value)}", outer)
     if isinstance(cause, InputError):
         inner = "" if cause.where is None else f"{cause.where}: "
         return problem(inner + cause.what, path, cause.hint)

@@ -85,7 +85,7 @@ def draw_plan(
     stats = surface.stats
     stats.backend, stats.asked = backend.name, asked
     if planned is not ready:
-        stats.skipped[planned.request.backend.name] = "Scan4D is still preparing data that this picture needs"
+        stats.skipped[planned.request.backend.name] = "Scan4D is still preparing data for this picture"
     drawn = {**_drawn(ready), "camera": view.key, "size": surface.size, "values": surface.values_key}
     changed = surface.take_changes(drawn)
     frame = FrameView(view, params, ready.derived, share * asked, budget_ms, changed, moving, goes_on)
@@ -117,7 +117,7 @@ def reshade(ready: Ready, surface: Surface) -> bool:
     surface.drawn = {**before, "values": surface.values_key}
     shade(surface, request.look)
     stats = surface.stats
-    stats.skipped["draw"] = "the visible surface has not changed"
+    stats.skipped["draw"] = "the visible surface is the same as in the last picture"
     stats.samples = 1
     _note_times(stats, {ready.pose}, ready.start)
     return True

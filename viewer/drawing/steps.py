@@ -75,7 +75,7 @@ def _missing(pose: GpuPose, request: Request) -> tuple[str, ...]:
     backend, wanted = request.backend, set(request.needs)
     if "views" in wanted and not pose.views:
         raise InputError(
-            f"{backend.title} draws range views, but this scan has none", hint="Choose another renderer"
+            f"{backend.title} draws only range views, but this scan has none", hint="Choose another renderer"
         )
     has_own = backend.finds_normals or request.draws_samples
     if wants_normals(request.look) and not has_own:

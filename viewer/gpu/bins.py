@@ -78,7 +78,7 @@ class Bins:
         gpu = self._gpu
         length = self.length() if length is None else length
         if length * (8 if self.ordered else 4) > gpu.max_storage_bytes:
-            raise InputError(f"lists of {length:,} entries are too long for this driver")
+            raise InputError(f"lists of {length:,} entries are too long for this graphics driver")
         with gpu.timers.measure("list"):
             if 4 * length > self.items.buffer.size:
                 self.reserve(min(length * 5 // 4, gpu.max_storage_bytes // 4))

@@ -118,11 +118,11 @@ class Gpu:
             missing = []  # clip control is core since 4.5
         if ctx.version_code < REQUIRED_VERSION or missing:
             raise NoOpenGLError(
-                f"OpenGL {ctx.version_code / 100:.1f} on '{ctx.info['GL_RENDERER']}' is too old"
+                f"OpenGL {ctx.version_code / 100:.1f} on '{ctx.info['GL_RENDERER']}' is too old for Scan4D"
                 + (f" (no {', '.join(missing)})" if missing else ""),
                 hint=(
                     "Scan4D needs OpenGL 4.3 with ARB_clip_control. Update the graphics driver, or run "
-                    "'scan4d doctor' to see what this computer has"
+                    "'scan4d doctor' to see the versions on this computer"
                 ),
             )
         self.ctx = ctx
@@ -271,7 +271,7 @@ class Gpu:
                 resource.release()
             what = "not enough memory" if self.software else "not enough memory on the graphics card"
             raise Scan4DError(
-                f"{what} for this picture", hint="Make the picture smaller, or close other programs"
+                f"{what} for this picture", hint="Use a smaller picture, or close other programs"
             )
 
     def discard(self, *resources: Resource | None, nbytes: int = 0) -> None:
@@ -349,7 +349,7 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
     if device is None:
         device = device_from_environment()
     if device is not None and device < 0:
-        raise InputError(f"{device} is not the number of a device", "--device", "Use 0, 1, ...")
+        raise InputError(f"there is no device with the number {device}", "--device", "Use 0, 1, ...")
     options: list[tuple[str, dict[str, Any]]] = []
     if sys.platform.startswith("linux"):
         name = "EGL" if device is None else f"EGL device {device}"
@@ -377,7 +377,7 @@ def headless(device: int | None = None, attempts: Attempts | None = None) -> Gpu
     if device:
         raise NoOpenGLError(
             f"no usable OpenGL on device {device} ({attempts})",
-            hint="'scan4d doctor' lists the devices; without --device the driver chooses",
+            hint="'scan4d doctor' lists the devices. Without --device, the driver chooses a device",
         )
     raise NoOpenGLError(
         f"no usable OpenGL ({attempts})",
@@ -414,5 +414,7 @@ def device_from_environment() -> int | None:
     if not text:
         return None
     if not text.isdigit():
-        raise InputError(f"'{text}' is not the number of a device", "SCAN4D_DEVICE", "Use 0, 1, ...")
+        raise InputError(
+            f"'{text}' must be the number of a device, such as 0", "SCAN4D_DEVICE", "Use 0, 1, ..."
+        )
     return int(text)

@@ -234,7 +234,7 @@ class MappedBuffer:
         GL_4_4.glBufferStorage(_COPY_WRITE_BUFFER, nbytes, None, access | GL_4_4.GL_CLIENT_STORAGE_BIT)
         self.address: int = GL_3_0.glMapBufferRange(_COPY_WRITE_BUFFER, 0, nbytes, access)
         if not self.address:
-            raise MemoryError(f"no memory to map {nbytes:,} bytes of a buffer")
+            raise MemoryError(f"the graphics driver has no memory for a buffer of {nbytes:,} bytes")
 
     def take(self, source: moderngl.Buffer, offset: int, nbytes: int, at: int = 0) -> None:
         """Have the GPU copy bytes of another buffer. at: where they come to lie."""

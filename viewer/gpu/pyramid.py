@@ -72,7 +72,7 @@ class Image:
             raise ValueError(f"an image cannot have {width}x{height} samples of {channels} channels")
         nbytes = 4 * channels * width * height
         if nbytes > gpu.max_storage_bytes or width * height > gpu.max_points:
-            raise InputError(f"an image of {width}x{height} samples is too large for this driver")
+            raise InputError(f"an image of {width}x{height} samples is too large for this graphics driver")
         self._gpu = gpu
         self.size = size
         self.channels = channels
@@ -208,4 +208,4 @@ def _check(name: str, source: Image, result: Image, channels: bool = True) -> No
     if channels and source.channels != result.channels:
         raise ValueError("the levels have different channels")
     if result is source:
-        raise ValueError("a level cannot be made in place")
+        raise ValueError("a level cannot replace the level that it is computed from")

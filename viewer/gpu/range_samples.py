@@ -288,8 +288,9 @@ class RangeSamples:
         if self._total > self._gpu.max_points or written > self._gpu.max_storage_bytes:
             count = sum(levels[0].count for levels in self.view_levels)
             raise InputError(
-                f"the range views of one pose have {count:,} pixels, which are too many for this driver",
-                hint="Split the scan or make its images smaller",
+                f"the range views of one pose have {count:,} pixels, which is too many for this graphics "
+                "driver",
+                hint="Split the scan, or reduce the size of its images",
             )
 
     # --- level 0 ----------------------------------------------------------------------

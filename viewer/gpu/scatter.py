@@ -269,7 +269,9 @@ class CellSums:
             raise ValueError(f"sums need 0 or more cells and at least 1 channel, not {cells} and {channels}")
         nbytes = 4 * channels * cells
         if nbytes > gpu.max_storage_bytes:
-            raise InputError(f"sums of {channels} channels in {cells:,} cells are too large for this driver")
+            raise InputError(
+                f"sums of {channels} channels in {cells:,} cells are too large for this graphics driver"
+            )
         self._gpu = gpu
         self.cells, self.channels = cells, channels
         self.buffer = gpu.buffer(reserve=max(nbytes, 4))

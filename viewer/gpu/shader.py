@@ -125,7 +125,9 @@ def shader_error(sources: list[Source], error: Exception) -> ShaderError:
     """The error to raise for a moderngl compile error of these stages."""
     log = str(error)
     stage = next((s for s in sources if f"{_stage_of(s.name)}_shader" in log), sources[0])
-    return ShaderError(f"does not compile on this driver:\n{stage.explain(log)}", f"shaders/{stage.name}")
+    return ShaderError(
+        f"does not compile with this graphics driver:\n{stage.explain(log)}", f"shaders/{stage.name}"
+    )
 
 
 def _stage_of(name: str) -> str:

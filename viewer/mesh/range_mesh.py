@@ -26,7 +26,7 @@ def triangulated(views: Sequence[RangeView]) -> Mesh:
     InputError where there is no triangle.
     """
     if not views:
-        raise InputError("there are no range views to triangulate")
+        raise InputError("there are no range views from which to make a mesh")
     points = merge(views, normals=True)
     faces, before = [], 0
     for view in views:
@@ -34,7 +34,7 @@ def triangulated(views: Sequence[RangeView]) -> Mesh:
         faces.append(own + np.uint32(before))
         before += int(np.count_nonzero(view.valid()))
     if not sum(map(len, faces)):
-        raise InputError("no neighbouring samples of the range views lie on one surface")
+        raise InputError("neighbouring samples of the range views do not lie on the same surface")
     return Mesh(points, np.concatenate(faces))
 
 

@@ -80,7 +80,7 @@ def trace(scene: Scene, camera: Camera, size: tuple[int, int]) -> Reference:
     """
     width, height = size
     if width < 1 or height < 1:
-        raise InputError(f"a picture of {width}x{height} pixels cannot be drawn")
+        raise InputError(f"a picture cannot have {width}x{height} pixels")
     view = View.of(camera, size, scene.origin, scene.bounds)
     parts = []
     for start in range(0, width * height, _CHUNK):

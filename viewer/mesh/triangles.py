@@ -37,7 +37,9 @@ class Mesh:
         if self.points.dropped:
             raise InputError(f"{self.points.dropped} vertices of the mesh are not finite")
         if int(self.faces.max()) >= len(self.points):
-            raise InputError(f"a face refers to vertex {self.faces.max()} of {len(self.points)}")
+            raise InputError(
+                f"a face refers to vertex {self.faces.max()}, but there are only {len(self.points)} vertices"
+            )
 
     @property
     def origin(self) -> NDArray[np.float64]:
@@ -162,7 +164,7 @@ class Mesh:
 def read_mesh(path: Path | str) -> Mesh:
     """The mesh of a file of points with faces. Raises InputError where it is damaged or has no faces."""
     faces, points = read_faces(path), read(path)
-    assert isinstance(points, PointCloud), "a file with faces also holds points"
+    assert isinstance(points, PointCloud), "a file with faces must also contain points"
     try:
         return Mesh(points, faces.triangles())
     except InputError as error:

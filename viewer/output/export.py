@@ -68,7 +68,7 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     """
     suffix = path.suffix.lower()
     if suffix not in suffixes:
-        what = f"cannot write '{suffix}' files" if suffix else "has no suffix that sets the format"
+        what = f"cannot write '{suffix}' files" if suffix else "has no suffix, but the suffix sets the format"
         raise InputError(what, path, f"Known: {', '.join(suffixes)}")
     if not os.path.isdir(path.parent):  # which raises nothing
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
@@ -85,7 +85,7 @@ def check_output(path: Path, suffixes: Sequence[str], several: bool) -> None:
     if several and not places and not film:
         film_hint = f" or {path.stem}{FILM_SUFFIX}" if FILM_SUFFIX in suffixes else ""
         hint = f"Use a pattern such as {path.stem}%04d{path.suffix}{film_hint}"
-        raise InputError("is one file, but there are several results", path, hint)
+        raise InputError("is the name of one file, but this command writes several files", path, hint)
 
 
 @contextmanager
@@ -178,11 +178,11 @@ def read_description(path: Path) -> str:
             what, hint = explained(error)
             raise InputError(f"cannot be read: {what}", path, hint) from error
         raise InputError(
-            "cannot be read as a picture", path, "The file is damaged, or has another format"
+            "cannot be read as a picture", path, "The file is damaged, or is not a picture"
         ) from error
     if not isinstance(text, str):
-        hint = "Use a picture that 'scan4d render' or the window has saved"
-        raise InputError("does not store how the picture was made", path, hint)
+        hint = "Use a picture that you saved with 'scan4d render' or in the window"
+        raise InputError("does not contain the view and scan of the picture", path, hint)
     return text
 
 

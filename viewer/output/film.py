@@ -41,10 +41,10 @@ class FilmTimes:
     def __post_init__(self) -> None:
         low, high = FRAME_RATES
         if self.fps is not None and not low <= self.fps <= high:
-            what = f"a film cannot show {self.fps:g} pictures per second"
+            what = f"a film cannot have {self.fps:g} pictures per second"
             raise InputError(what, "--fps", f"Use {low:g} to {high:g}")
         if self.end > _LONGEST:
-            what = f"a film with the times of these frames lasts {self.end / 3600:,.1f} hours"
+            what = f"a film of these frames would last {self.end / 3600:,.1f} hours"
             raise InputError(what, hint=f"Films last at most {_LONGEST / 3600:g} hours. Choose fewer frames")
 
     @classmethod

@@ -31,12 +31,12 @@ class Marks:
         False,
         (
             "Scale bar with a round length. In perspective, the scale bar is valid only at the depth of "
-            "the camera's target"
+            "the pivot"
         ),
     )
     color_bar: bool = param(
         False,
-        "Colour bar, if the colours show values or levels, or mark holes",
+        "Colour bar, if the colours show values, levels or holes",
     )
     stamp: bool = param(False, "Number and time of the current frame")
     notes: bool = param(False, "Notes at positions of the subject, and notes on the frame")
@@ -45,7 +45,7 @@ class Marks:
     measure_lines: bool = param(False, "Distances and other measures in this frame, with their values")
     plot: bool = param(
         False,
-        ("Plot of the measures over time, if the view shows the plot, with a line at the current frame"),
+        ("Plot of the measures over time, with a line at the current frame, if the plot is open"),
     )
 
     def __bool__(self) -> bool:

@@ -40,11 +40,11 @@ class PictureBuffers:
         self._raster: gl.Raster | None = None
         width, height = size
         if width < 1 or height < 1:
-            raise InputError(f"a picture of {width}x{height} pixels cannot be drawn")
+            raise InputError(f"a picture cannot have {width}x{height} pixels")
         if width * height > gpu.max_pixels:
             raise InputError(
-                f"a picture of {width}x{height} pixels is too large; this driver takes "
-                f"{gpu.max_pixels:,} pixels",
+                f"a picture of {width}x{height} pixels is too large: this graphics driver "
+                f"can draw at most {gpu.max_pixels:,} pixels",
                 hint="Use a smaller --size",
             )
         gpu.collect()
@@ -130,8 +130,8 @@ class PictureBuffers:
             width, height = self.size
             if max(self.size) > gl.max_raster_edge():
                 raise InputError(
-                    f"a picture of {width}x{height} pixels is too long to be rasterised; this driver "
-                    f"takes {gl.max_raster_edge():,} pixels along an edge",
+                    f"a picture of {width}x{height} pixels is too large: this graphics driver "
+                    f"can draw at most {gl.max_raster_edge():,} pixels along an edge",
                     hint="Use a smaller --size, or --backend points",
                 )
             raster = gl.Raster(self.gpu.ctx, self.size)

@@ -128,6 +128,7 @@ class Coloring:
     def _found_texels(self, name: str) -> gl.BufferTexture:
         if self._given is None or self._given[0] != name:
             raise InputError(
-                f"'{name}' was not computed for this picture", hint="Draw the picture again with this look"
+                f"the renderer did not compute '{name}' for this picture",
+                hint="Draw the picture again with this look",
             )
         return self._given[1]

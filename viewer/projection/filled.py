@@ -87,7 +87,7 @@ def draw_filled(
     if merge is not None and isinstance(source, ViewSource):
         merge(source, channels)
     if source.is_closed:
-        surface.stats.skipped["hide"] = "polygons already hide what is behind them"
+        surface.stats.skipped["hide"] = "polygons already hide all samples behind them"
     if not (fills or hides):
         return refinable
     targets = surface.cached(Targets)

@@ -21,7 +21,7 @@ class ProjectionParams:
 
     fill: bool = param(
         True,
-        "Fill holes from coarser levels of the picture",
+        "Fill holes with values from coarser levels of the picture",
         key="H",
         group=_LEVELS,
         sweep=(True, False),
@@ -31,42 +31,42 @@ class ProjectionParams:
     level_0: bool = param(True, "Show the measured samples", key="0", group=_LEVELS)
     level_1: bool = param(
         True,
-        "Fill holes from the picture at 1/2 of its width and height",
+        "Fill holes with values from the picture at 1/2 of its width and height",
         key="1",
         group=_LEVELS,
         when=_FILLING,
     )
     level_2: bool = param(
         True,
-        "Fill holes from the picture at 1/4 of its width and height",
+        "Fill holes with values from the picture at 1/4 of its width and height",
         key="2",
         group=_LEVELS,
         when=_FILLING,
     )
     level_3: bool = param(
         True,
-        "Fill holes from the picture at 1/8 of its width and height",
+        "Fill holes with values from the picture at 1/8 of its width and height",
         key="3",
         group=_LEVELS,
         when=_FILLING,
     )
     level_4: bool = param(
         True,
-        "Fill holes from the picture at 1/16 of its width and height",
+        "Fill holes with values from the picture at 1/16 of its width and height",
         key="4",
         group=_LEVELS,
         when=_FILLING,
     )
     upsampling: str = param(
         "bilinear",
-        "How a filled pixel is interpolated from samples of a coarser level",
+        "Method that interpolates filled pixels between samples of a coarser level",
         choices=("nearest", "bilinear", "bicubic"),
         group=_LEVELS,
         when=_FILLING,
     )
     step: float = param(
         6.0,
-        "Largest depth step between neighbouring samples of one surface, in cell widths at their level",
+        "Largest depth step between neighbouring samples of the same surface, in cell widths of their level",
         low=0.1,
         high=100,
         group=_LEVELS,
@@ -74,8 +74,8 @@ class ProjectionParams:
     )
     margin: float | None = param(
         None,
-        "How far filling extends beyond the outermost samples of a surface, in sample spacings; auto: "
-        "0.15 for samples that polygons join, 0.4 for others",
+        "How far Scan4D fills beyond the outermost samples of a surface, in sample spacings; auto: 0.15 "
+        "for samples that polygons connect, and 0.4 for other samples",
         type=float,
         low=0,
         high=1,
@@ -92,8 +92,8 @@ class ProjectionParams:
     )
     widest: float = param(
         1.0,
-        "Widest hole that Scan4D fills from a level, in cell widths of that level. Gaps between "
-        "samples are always filled",
+        "Widest hole that Scan4D fills from a level, in cell widths of that level. Scan4D always fills "
+        "gaps between neighbouring samples",
         low=0,
         high=3,
         group=_LEVELS,
@@ -110,8 +110,8 @@ class ProjectionParams:
     )
     tolerance: float = param(
         2.0,
-        "Least distance behind a nearer surface at which Scan4D hides a sample, in cell widths of "
-        "the sample's level",
+        "Scan4D hides samples that lie at least this far behind a nearer surface, in cell widths of the "
+        "sample's level",
         low=0,
         high=100,
         group=_HIDDEN,
@@ -120,7 +120,7 @@ class ProjectionParams:
 
     neighbors: int = param(
         4,
-        "Distance, in samples, from a sample of the nearer surface within which samples stay visible",
+        "Samples stay visible within this distance of a sample of the nearer surface, in samples",
         low=0,
         high=100,
         unit="samples",
@@ -132,34 +132,41 @@ class ProjectionParams:
     )
     primitive: str = param(
         "polygons",
-        "How samples of range images are drawn",
+        "Shapes that Scan4D draws for samples of range images",
         choices=("points", "polygons"),
         group=_VIEWS,
         sweep=("points", "polygons"),
     )
     lod: bool = param(
-        True, "Draw the level of range images whose samples fit the pixels", group=_VIEWS, affects="draw"
+        True,
+        "Draw the level of range images whose samples are about as large as pixels",
+        group=_VIEWS,
+        affects="draw",
     )
     detail: float = param(
-        1.0, "Spacing of samples, in pixels, above which a finer level is drawn",
+        1.0, "Spacing of samples, in pixels, above which Scan4D draws a finer level",
         low=0.25, high=16, unit="px", group=_VIEWS, when={"lod": (True,)},
     )  # fmt: skip
     filter: str = param(
         "box",
-        "Filter that makes the coarser levels of range images",
+        "Filter that computes the coarser levels of range images",
         choices=tuple(_FILTERS),
         group=_VIEWS,
     )
     blend: str = param(
         "linear",
-        "What to show where several views see one surface. linear: the mean of all views; best: the "
-        "best view; nearest: the nearest sample",
+        "What to show where several range views see the same surface. linear: the mean of all range "
+        "views; best: the best range view; nearest: the nearest sample",
         choices=MODES,
         group=_VIEWS,
         sweep=("linear", "best", "nearest"),
     )
-    cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
-    skip: bool = param(True, "Skip tiles of range images that no pixel shows", group=_VIEWS, affects="speed")
+    cull_back: bool = param(
+        False, "Leave out surfaces of range images that the view shows from behind", group=_VIEWS
+    )
+    skip: bool = param(
+        True, "Skip tiles of range images that the picture does not show", group=_VIEWS, affects="speed"
+    )
     antialias: str = param(
         "off",
         "Draw each point as a blurred dot (point spread function) and add up the colours. table: "
@@ -177,7 +184,7 @@ class ProjectionParams:
     )
     fade: bool = param(
         False,
-        "Fade into the next coarser level where samples lie closer together than pixels",
+        "Blend with the next coarser level where samples lie closer together than pixels",
         group=_SMOOTHING,
         when={"lod": (True,)},
     )

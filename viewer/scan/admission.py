@@ -121,15 +121,18 @@ def admit(held: int, needed: int, ratio: int = _RATIO) -> None:
     if (budget := _shared.get()) is not None:
         held, needed = max(held, budget.held), needed + budget.retained
     if needed > most_memory(held, ratio):
-        what = f"reading the {held:,} bytes would take {needed / 1e6:,.0f} MB, which is too much for its size"
-        hint = f"If you trust the file, set {READ_VARIABLE}={(needed >> 20) + 1}"
+        what = (
+            f"reading this file of {held:,} bytes would need {needed / 1e6:,.0f} MB of memory, which is "
+            "suspiciously much"
+        )
+        hint = f"If you trust the file, set the environment variable {READ_VARIABLE}={(needed >> 20) + 1}"
         raise InputError(what, hint=hint)
 
 
 def check_count(number: int, most: int, what: str) -> None:
     """Raise InputError where a file has more of something than any scan; what: for example "columns"."""
     if number > most:
-        raise InputError(f"has {number:,} {what}, more than the {most:,} that Scan4D reads")
+        raise InputError(f"has {number:,} {what}, but Scan4D reads at most {most:,}")
 
 
 def whole_number(word: str, what: str) -> int:
@@ -143,7 +146,7 @@ def read_exactly(stream: BinaryIO, size: int) -> bytes:
     """The next bytes of a stream. Raises InputError where there are fewer."""
     data = stream.read(size)
     if len(data) != size:
-        raise InputError(f"ends early: {len(data)} bytes where {size} should be")
+        raise InputError(f"ends early: it has {len(data)} bytes where {size} bytes should be")
     return data
 
 
@@ -158,4 +161,4 @@ def read_records(stream: BinaryIO, dtype: np.dtype, count: int, what: str) -> ND
 
 def too_few(held: int, promised: int, what: str) -> InputError:
     """The error for a file that holds fewer rows than its header promises; what: as it calls them."""
-    return InputError(f"holds {held} of the {promised} {what} that its header promises")
+    return InputError(f"contains only {held} of the {promised} {what} that its header states")

@@ -132,7 +132,7 @@ def _scans_named(name: str, entered: set[str]) -> tuple[list[str], list[InputErr
     try:
         source = find_source(name)
         if os.path.isdir(name) and isinstance(source, FileSequence) and is_collection(source.files):
-            raise InputError("holds several scans, not the frames of one", name)
+            raise InputError("contains several scans, not the frames of one scan", name)
         return [name], []
     except InputError as problem:
         if (folder := os.path.realpath(name)) in entered:

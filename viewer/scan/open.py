@@ -82,13 +82,15 @@ def open_scan(
         timeline.decided.note(Decision("frames", f"{len(source)} in one file", "file"))
     aside = {row.file for row in timeline.reading.aside}
     others = [name for name in left_aside(path, source) if name not in aside]
-    timeline.decided.leave_aside(*(Aside(name, "may be a scan of its own") for name in others))
+    timeline.decided.leave_aside(*(Aside(name, "may be a separate scan") for name in others))
     if others:
-        what = f"The folder also holds {_listed(others)}, which this scan does not use"
-        timeline.messages.append(ScanMessage("beside", f"{what}. Open such a file by its name to see it."))
+        what = f"The folder also contains {_listed(others)}, which are not part of this scan"
+        timeline.messages.append(ScanMessage("beside", f"{what}. To see such a file, open it by its name."))
     if stated and not usable_unit(stated):
-        what = f"the scan has the unit of length '{shortened(stated)}', which is not a short word such as mm"
-        timeline.messages.append(ScanMessage("unit", f"{what}: the unit stays unknown"))
+        what = (
+            f"the scan states the unit of length '{shortened(stated)}', which is not a short word such as mm"
+        )
+        timeline.messages.append(ScanMessage("unit", f"{what}. The unit stays unknown"))
     if fps is not None and times.is_measured and times.decision.source != "user":
         timeline.messages.append(
             ScanMessage(
@@ -99,7 +101,7 @@ def open_scan(
 
 
 def left_aside(path: str | os.PathLike[str], source: FrameSource) -> list[str]:
-    """Names of scan files in a folder that are not its frames, so that each may be a scan of its own; none if
+    """Names of scan files in a folder that are not its frames, so that each may be a separate scan; none if
     `path` is no folder."""
     if not os.path.isdir(path):
         return []
@@ -146,7 +148,7 @@ def _times_table(source: FileSequence, corrections: Corrections) -> Path | None:
             read_times_csv(file, _labels(source))
             return file
         except InputError as error:
-            what = f"Scan4D does not take the times from {file.name}: {error.what}"
+            what = f"Scan4D does not use the times in {file.name}: {error.what}"
             source.decided.report("times", what)
     return None
 
@@ -197,20 +199,22 @@ def folder_frames(folder: Path) -> list[Path]:
             are_notes = all(frame.suffix.lower() in formats.NOTES for frame in frames)
             if are_notes and (lacking := lacking_part(searched)):
                 raise InputError(
-                    f"{lacking}: Scan4D reads no points from its text tables", folder, _NAME_TABLES
+                    f"{lacking}. Scan4D does not read points from the text tables in this folder",
+                    folder,
+                    _NAME_TABLES,
                 )
             return frames
     if lacking := lacking_part(folder):
-        raise InputError(lacking, folder, "Copy the folder as a whole")
+        raise InputError(lacking, folder, "Copy the complete folder, with all its files")
     inner = sorted((entry.name for entry in entries(folder) if os.path.isdir(entry)), key=natural_key)
     if (foreign := foreign_files(entries(folder))) is not None:
-        raise InputError(f"holds no scan files, but {foreign.what}", folder, foreign.hint)
+        raise InputError(f"contains no scan files, but {foreign.what}", folder, foreign.hint)
     hint = f"Open one of its folders: {_listed(inner)}" if inner else _known_files()
     raise InputError("holds no scan files", folder, hint)
 
 
 def _known_files() -> str:
-    return f"Known files: {_listed(formats.known_suffixes())}"
+    return f"Scan4D reads files with the suffixes {_listed(formats.known_suffixes())}"
 
 
 def _open_pattern(pattern: str, decided: Decided) -> FrameSource:
@@ -221,7 +225,7 @@ def _open_pattern(pattern: str, decided: Decided) -> FrameSource:
     if not frames:
         foreign = foreign_files(files)
         what, hint = ("", _known_files()) if foreign is None else (f", but {foreign.what}", foreign.hint)
-        raise InputError(f"matches no scan file{what}", pattern, hint)
+        raise InputError(f"matches no file that Scan4D can read{what}", pattern, hint)
     return _open_frames(frames, Path(pattern).name, decided)
 
 
@@ -262,15 +266,17 @@ def _choose_frames(files: Sequence[Path], where: object) -> list[Path]:
         lacking = os.path.isdir(str(where)) and lacking_part(Path(str(where)))
         if lacking:
             raise InputError(
-                f"{lacking}: Scan4D reads no points from text tables beside pictures", where, _NAME_TABLES
+                f"{lacking}. Scan4D does not read points from text tables beside pictures",
+                where,
+                _NAME_TABLES,
             )
-        hint = f"Scan4D reads depth from 16-bit PNG with a camera.json. {_NAME_TABLES}"
-        raise InputError("holds pictures and text tables, but no scan", where, hint)
+        hint = f"Scan4D reads depth from 16-bit PNG files with a camera.json. {_NAME_TABLES}"
+        raise InputError("contains pictures and text tables, but no scan", where, hint)
     if len(by_kind) > 1:
         found = ", ".join(f"{len(frames)} {kind}" for kind, frames in sorted(by_kind.items()))
         most = max(by_kind, key=lambda kind: len(by_kind[kind]))
         hint = f"Choose one kind with a pattern such as '*{most}'"
-        raise InputError(f"holds files of several kinds ({found})", where, hint)
+        raise InputError(f"contains files of several kinds ({found})", where, hint)
     return sorted(itertools.chain(*by_kind.values()), key=lambda file: natural_key(str(file)))
 
 

@@ -298,7 +298,7 @@ class PointCloud:
 
     def _find_whole_bounds(self) -> Bounds:
         if not len(self):
-            raise InputError("no points to fit a view to")
+            raise InputError("there are no points that a view could show")
         low, high = _extremes(self.positions)
         return Bounds(low + self.origin, high + self.origin)
 
@@ -311,7 +311,7 @@ class PointCloud:
 
     def _find_bounds(self) -> Bounds:
         if not len(self):
-            raise InputError("no points to fit a view to")
+            raise InputError("there are no points that a view could show")
         low, high = robust_box(strided(self.positions))
         smallest, largest = np.full(3, np.inf), np.full(3, -np.inf)
         for start in range(0, len(self), _CHUNK):
@@ -334,7 +334,7 @@ def checked_viewpoint(given: ArrayLike) -> NDArray[np.float64]:
     """A viewpoint as a PointCloud holds it, (3,) float64; raises InputError where it is none."""
     viewpoint = np.array(given, np.float64)
     if viewpoint.shape != (3,) or not np.isfinite(viewpoint).all():
-        raise InputError(f"{given!r} is not a viewpoint", hint="Give x, y and z in scan units")
+        raise InputError(f"{given!r} is not a viewpoint", hint="Write x, y and z in scan units")
     return viewpoint
 
 

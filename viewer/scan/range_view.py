@@ -95,8 +95,8 @@ class RangeView:
             raise unknown_name("kind of depth", self.kind, kinds)
         if self.kind == "range" and self.xy is not None:
             raise InputError(
-                "a range view cannot have measured x and y together with a range",
-                hint="Give z instead of the range",
+                "a range view cannot store measured x and y together with distances from the scanner (range)",
+                hint="Store z instead of the range",
             )
         numbers = np.array([self.fx, self.fy, self.cx, self.cy])
         if not ((np.abs(numbers) < _LARGEST).all() and (numbers[:2] > 1 / _LARGEST).all()):
@@ -212,7 +212,9 @@ class RangeView:
             return
         shown = ", ".join(f"{value:g}" for value in self.distortion)
         if self.kind == "height":
-            raise InputError(f"a range view of heights has no lens, but it has a distortion ({shown})")
+            raise InputError(
+                f"a range view of heights has no lens, but a lens distortion ({shown}) is stated"
+            )
         if len(self.distortion) not in COUNTS or not np.isfinite(self.distortion).all():
             counts = "k1 k2 p1 p2 [k3 [k4 k5 k6]]"
             raise InputError(f"a range view's distortion is ({shown}), expected the numbers {counts}")
@@ -221,8 +223,7 @@ class RangeView:
         x, y = self._seen(rows, columns)
         if not can_be_undone(x, -y, self.distortion):
             raise InputError(
-                f"a range view's distortion ({shown}) maps different directions to the same pixel of "
-                "the picture",
+                f"a range view's distortion ({shown}) maps different directions to the same pixel",
                 hint="Check the coefficients and their order: k1 k2 p1 p2 k3 k4 k5 k6",
             )
 
@@ -339,10 +340,8 @@ def _cloud(
         precise=False,  # depths are float32
     )
     if not len(cloud):
-        what = "holds no points: no pixel inside the masks has a depth"
-        raise EmptyFrame(
-            what, hint=("Check the masks, and whether the depths are in the right unit and format")
-        )
+        what = "contains no points: no pixel inside the masks has a depth"
+        raise EmptyFrame(what, hint=("Check the masks, and the unit and format of the depths"))
     return replace(cloud, ids=ids if cloud.ids is None else ids[cloud.ids])
 
 

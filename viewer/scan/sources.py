@@ -110,7 +110,7 @@ class FileSequence:
         decided = self.decided.at(index)
         if (count := formats.frame_count(path, decided)) > 1:
             raise InputError(
-                f"holds {count} frames, but each file of a sequence must hold one",
+                f"contains {count} frames, but each file of a sequence must contain one frame",
                 path,
                 "Open this file alone",
             )

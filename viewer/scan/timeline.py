@@ -551,7 +551,10 @@ class Timeline:
     def _report_decisions(self) -> None:
         """Pass on the messages about decisions, and name the corrections that none has used."""
         for key in self.decided.ignored():
-            what = f"Scan4D does not use the correction {key}={self.decided.corrections.texts[key]} here"
+            what = (
+                f"The correction {key}={self.decided.corrections.texts[key]} does not apply to this scan, "
+                "so Scan4D ignores it"
+            )
             self.decided.report("correction", what)
         stated = self.reading["unit"]
         with self._state:
@@ -567,8 +570,12 @@ class Timeline:
         converted = in_one_unit(views, unit)
         others = [before.unit for before in views if before.unit != unit]
         if others:
-            done = "converted" if all(view.unit == unit for view in converted) else "used without conversion"
-            what = f"{self.source.label(index)} is in {others[0]}, the scan in {unit}: other units are {done}"
+            done = (
+                "Scan4D converts the lengths"
+                if all(view.unit == unit for view in converted)
+                else "Scan4D does not convert the lengths"
+            )
+            what = f"{self.source.label(index)} is in {others[0]}, but the scan is in {unit}: {done}"
             self._tell_once("unit", what, index)
         return converted
 

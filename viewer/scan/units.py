@@ -29,7 +29,9 @@ _SPELT |= {f"{name}s": unit for name, unit in _SPELT.items() if "met" in name}
 def checked_unit(name: str, where: object = None) -> str:
     """The name of a unit as a user gives it. Raises InputError where it is no short word."""
     if usable_unit(name) is None:
-        raise InputError(f"'{shortened(name)}' is not a unit of length", where, "Use a short name such as mm")
+        raise InputError(
+            f"'{shortened(name)}' is not a usable name of a unit", where, "Use a short name such as mm"
+        )
     return name
 
 

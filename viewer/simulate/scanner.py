@@ -99,7 +99,7 @@ def rig(
     if not 1 <= len(azimuths) <= MOST_PODS:
         raise InputError(f"a scanner has 1 to {MOST_PODS} pods, not {len(azimuths)}")
     if not np.isfinite([*azimuths, elevation]).all():
-        raise InputError("azimuth and elevation of a pod must be finite numbers")
+        raise InputError("the azimuth and elevation of a pod must be finite numbers")
     return [
         Camera.orbit(bounds, azimuth, elevation, aspect=aspect, up=up, fov_y=fov_y) for azimuth in azimuths
     ]

@@ -283,7 +283,9 @@ def usable_feed(points: Points, feed: str, surface: Surface) -> str:
     """The `fitting_feed`; the surface's statistics tell where it is another."""
     fitting = fitting_feed(points, feed)
     if fitting != feed:
-        reason = f"{fitting}, in place of {feed}, which can only draw all points of a pose as stored"
+        reason = (
+            f"{fitting} instead of {feed}, because {feed} can draw only all points of a pose, in their order"
+        )
         surface.stats.chosen["instancing"] = reason
     return fitting
 

@@ -123,7 +123,7 @@ class _Choices:
         return self._chosen[task]
 
     def _begin(self, trial: _Trial) -> None:
-        job = Task("Measuring how splats are drawn fastest")
+        job = Task("Measuring which method draws splats fastest")
         given = (_file(), trial.task, trial.names, trial.variants, _TRIAL_POINTS, _TRIAL_SIZE)
 
         def run() -> None:

@@ -130,9 +130,9 @@ def surface_param(default: str, group: str, **declared: Any) -> Any:
     """The parameter `surface` of a backend that draws splats."""
     return param(
         default,
-        "Which depth a pixel shows. nearest: the depth of the nearest splat; local: the mean depth of all "
-        "splats of the front layer, so that noise does not move the surface forwards. Without noise, both "
-        "are the same",
+        "Depth of a pixel. nearest: the depth of the nearest splat; local: the mean depth of all splats "
+        "of the front layer, so that noise does not move the surface forwards. Without noise, both "
+        "depths are the same",
         choices=SURFACES,
         group=group,
         **declared,

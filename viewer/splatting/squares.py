@@ -130,7 +130,9 @@ def _draw_listed(surface: Surface, visits: Visits, size: int) -> None:
     """Write points that are far fewer than pixels."""
     hits = HitCells(surface.start_listed(surface.look.background), size**2)
     scatter(surface.gpu, visits, surface.depths, surface.rows, hits)
-    surface.stats.skipped["pixels"] = "few points: only their pixels are cleared and shaded"
+    surface.stats.skipped["pixels"] = (
+        "Scan4D clears and shades only the pixels of the points, because there are few points"
+    )
 
 
 def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before: Before) -> None:

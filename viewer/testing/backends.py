@@ -84,8 +84,8 @@ def backend_checks(name: str) -> list[Check]:
 def _declarations(one: Backend) -> None:
     assert isinstance(one.title, str), "title is not a text"
     assert one.title.strip(), "title is empty"
-    assert one.help.strip(), "the docstring of its module does not say what it draws"
-    assert one.good_for.strip(), "good_for does not say when to choose it"
+    assert one.help.strip(), "the docstring of the module does not say what the backend draws"
+    assert one.good_for.strip(), "good_for does not say when to choose the backend"
     assert one.params_class.__dataclass_params__.frozen, "params_class is not frozen"
     for parameter in one.parameters:
         assert parameter.help.strip(), f"parameter {parameter.name} has no help"
@@ -201,7 +201,7 @@ def _a_plane_has_constant_depth(name: str) -> None:
         camera = looking_down_z(fov_y=40, projection=projection, height=2.0)
         surface = draw(plane(120, 3.0), camera, (64, 48), name)
         covered = surface.id != NOTHING
-        assert covered.sum() > 1000, "it shows too little of the plane"
+        assert covered.sum() > 1000, "the backend shows too little of the plane"
         np.testing.assert_allclose(surface.depth[covered], 3.0, rtol=_rounded(surface))
 
 

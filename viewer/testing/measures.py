@@ -163,7 +163,9 @@ def _on_ball(
     cloud = PointCloud.from_arrays(scale * ball.world() + away, normals=ball.normals)
     compute: Any = kind.compute
     found = compute(PoseSurface(Pose.of(0, 0.0, "ball", cloud)), scale * _around_a_cap(kind) + away, options)
-    assert isinstance(found, Found | Refused), f"it returns a {type(found).__name__}, not Found or Refused"
+    assert isinstance(found, Found | Refused), (
+        f"the measure returns a {type(found).__name__}, not Found or Refused"
+    )
     return found
 
 

@@ -229,7 +229,7 @@ def _refused(path: Path, frame: int = 0) -> str:
     except InputError as error:
         assert error.hint, f"the message does not say what to do: {error}"
         return str(error)
-    raise AssertionError(f"{path.name} is read, but should be refused")
+    raise AssertionError(f"the reader reads {path.name}, but should refuse it")
 
 
 def _assert_equal(one: Scanned, other: Scanned) -> None:

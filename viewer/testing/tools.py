@@ -40,7 +40,7 @@ def tool_checks(name: str) -> list[Check]:
 
 def _it_declares_itself(module: str) -> None:
     tool = import_module(module)
-    assert (tool.__doc__ or "").strip(), "the docstring must say what the tool does"
+    assert (tool.__doc__ or "").strip(), "the docstring of the tool must say what the tool does"
     assert isinstance(tool.TITLE, str), "TITLE must name its section of the panel"
     assert tool.TITLE
     assert isinstance(tool.Tool, type), "Tool is a class"

@@ -58,7 +58,8 @@ class Candidates:
         self._capacity = sectors.count
         if 4 * sectors.count > gpu.max_storage_bytes or 12 * points > gpu.max_storage_bytes:
             raise InputError(
-                f"{sectors.count:,} sectors for {points:,} points are more than this driver can handle",
+                f"{sectors.count:,} sectors for {points:,} points are more than this graphics driver can "
+                "handle",
                 hint="Use fewer sectors",
             )
 

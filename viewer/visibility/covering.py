@@ -64,7 +64,7 @@ class Covering:
     def __init__(self, gpu: Gpu, points: int) -> None:
         self._gpu, self.points = gpu, points
         if 16 * points > gpu.max_storage_bytes or points >= 1 << 32 - _FACE_BITS:
-            raise InputError(f"{points:,} points are more than this driver can handle")
+            raise InputError(f"{points:,} points are more than this graphics driver can handle")
         self._held: dict[str, gl.BufferTexture] = {}
         self._lists: dict[str, IndexList] = {}
         self._bins = Bins(gpu, 1)

@@ -106,7 +106,7 @@ def flipping(seen: SeenPoints, radius: float) -> Kernel:
     if not farthest <= radius * _ROUNDED < np.inf:
         raise InputError(
             f"a sphere of radius {radius:g} around the eye does not contain all points",
-            hint=f"The farthest point is {farthest:g} away",
+            hint=f"Use a radius larger than the distance of the farthest point, {farthest:g} away",
         )
 
     def shrink(distance: Floats, beyond: Floats, middle: float) -> Floats:
@@ -236,7 +236,7 @@ def katz_radius(points: Pose | PointCloud | ArrayLike, eye: ArrayLike) -> float:
     both = (first, SeenPoints.of(cloud, np.asarray(eye, np.float64) + 2 * first.middle))
     least = max(float(seen.distance.max(initial=0.0)) for seen in both)
     if least == 0:
-        raise InputError("there are no points from which to find a radius")
+        raise InputError("there are no points from which to compute the radius")
 
     def disjoint(decades: float) -> int:
         counts = np.zeros(len(cloud), np.uint8)

@@ -137,7 +137,7 @@ class SeenPicture(_Search):
         stats = surface.stats
         known = self._found is not None and self._pose is not None and self._pose() is pose
         if known and self._sought in ((sought, None), (sought, sides)):
-            stats.skipped["visible"] = "neither the pose nor the eye has changed"
+            stats.skipped["visible"] = "the pose and the position of the camera are the same as before"
         else:
             clip = (near, *(sides or EVERYWHERE[1:]))
             self._find(pose, directions, clip, (settings, frame.moving), sample, surface.stats.share)
@@ -231,7 +231,7 @@ def calibrated(
     """
     cloud, at = as_cloud(points), checked_viewpoint(eye)
     if not len(cloud):
-        raise InputError("there are no points to calibrate with")
+        raise InputError("there are no points from which to calibrate the test for visible points")
     if radius is not None:
         flipping(SeenPoints.of(cloud, at), radius)  # refuses one that is too small
     body = body_of(cloud)

@@ -82,7 +82,7 @@ def test_a_unit_that_is_none_is_not_passed_over_in_silence(
     assert found.unit == of_scan
     np.testing.assert_array_equal(found.positions[0, 0], [10, -2.5, 30])
     (remark,) = found.remarks
-    assert remark.startswith(f"Lengths are in '{unit[:5]}")
+    assert remark.startswith(f"The lengths are in '{unit[:5]}")
     assert len(remark) < 200
 
 
@@ -100,8 +100,8 @@ def test_states_of_markups(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.known[0], [placed, pending, pending, pending, placed, pending])
     np.testing.assert_array_equal(found.positions[0, 1], [1, 2, 3])  # a preview
     assert found.remarks == (
-        "2 points have no position, although the file marks them as defined, such as 'd'",
-        "1 point is a preview, which nobody has confirmed in 3D Slicer, such as 'b'",
+        "The file marks 2 points as defined, but gives them no position, such as 'd'",
+        "1 point is a preview that nobody has confirmed in 3D Slicer, such as 'b'",
     )
 
 
@@ -176,7 +176,7 @@ def test_tps_of_other_programs(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.positions[0, 0], [0.5, 1, 0])
     assert np.isnan(found.positions[0, 1]).all()
     np.testing.assert_array_equal(found.positions[1], [[1, 2, 3], [4, -5, 6]])
-    assert [text.split()[0:2] for text in found.remarks] == [["Scan4D", "leaves"], ["The", "landmarks"]]
+    assert [text.split()[0:2] for text in found.remarks] == [["Scan4D", "does"], ["The", "landmarks"]]
 
 
 MORPHOLOGIKA = """[Individuals]

@@ -52,9 +52,9 @@ BOX = Bounds(np.array([-90.0, 20, 500]), np.array([90.0, 240, 650]))
     ("factor", "words"),
     [
         (1.0, None),
-        (0.001, "multiplied by 1000, the landmarks"),
-        (1000.0, "multiplied by 0.001, the landmarks"),
-        (np.array([-1, -1, 1]), "signs of x and y reversed"),
+        (0.001, "are multiplied by 1000. The landmarks"),
+        (1000.0, "are multiplied by 0.001. The landmarks"),
+        (np.array([-1, -1, 1]), "signs of x and y are reversed"),
         (-7.0, "belong to another scan"),
     ],
 )
@@ -88,5 +88,5 @@ def test_one_place_that_is_off_is_told() -> None:
     points[0, 5] = np.nan
     told = why_apart(LandmarkSet.of([f"{n}" for n in range(9)], points, notes=LandmarkNotes("mm")), BOX)
     assert told is not None
-    assert told.startswith("1 of 8 positions lie off the scan")
+    assert told.startswith("1 of 8 positions do not lie on the scan")
     assert why_apart(LandmarkSet.of(["a"], np.full((1, 1, 3), np.nan)), BOX) is None

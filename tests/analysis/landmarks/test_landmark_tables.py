@@ -133,7 +133,7 @@ def test_picked_points_of_meshlab(tmp_path: Path) -> None:
     [
         ("<PickedPoints>", "is not XML"),
         ("<PickedPoints/>", "holds no landmarks"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]><PickedPoints/>', "defines entities"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><PickedPoints/>', "defines XML entities"),
         ('<PickedPoints><point x="1" y="two" z="3"/></PickedPoints>', "'two' is not a number"),
     ],
 )

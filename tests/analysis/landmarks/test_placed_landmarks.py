@@ -67,7 +67,7 @@ def test_landmarks_beside_the_surface_are_told() -> None:
         told = why_beside(made)
         assert (told is not None) == is_told
     assert told is not None
-    assert told.startswith("3 of 10 landmarks lie off the surface (p0, p1, p2)")
+    assert told.startswith("3 of 10 landmarks do not lie on the surface (p0, p1, p2)")
     assert why_beside([Landmark("a")]) is None
 
 

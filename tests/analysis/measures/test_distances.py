@@ -208,11 +208,11 @@ def test_lengths_are_converted(tmp_path: Path) -> None:
     [
         ("ear", "nose", "belongs to the scan 'the \"left\", nose', not to"),
         ("mm", "furlong", "lengths are in 'furlong'"),
-        (",placed,", ",", "lacks a column"),
+        (",placed,", ",", "too few or too many columns"),
         ("Distance 1,1,", "Distance 1,4,", "'frame' is 4, but must be from 1 to 3"),
         ("Distance 1,1,", "Distance 1,1.5,", "'frame' is 1.5"),
-        (",placed,3,", ",placed,3,nan,", "lacks a column"),
-        (",placed,", ",tracked,", "lacks the position of one end of the distance 'Distance 1'"),
+        (",placed,3,", ",placed,3,nan,", "too few or too many columns"),
+        (",placed,", ",tracked,", "has no position for one end of the distance 'Distance 1'"),
     ],
 )
 def test_what_cannot_be_used_is_one_message(former: str, new: str, words: str, tmp_path: Path) -> None:

@@ -265,8 +265,10 @@ def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
         across = series_of(rim, pair, timeline)
     told = f"{100 * across.shares[1]:.0f} % of the line lies on the surface"
     assert [across.note(frame) for frame in range(2)] == ["", told]
-    assert across.warning == f"openings in 1 of 2 frames: as little as {told}"
-    assert "no value in 1 of 3 frames: c3 has no data; openings in 1 of 3 frames" in area.warning
+    assert across.warning == f"the surface has openings in 1 of 2 frames: as little as {told}"
+    assert (
+        "no value in 1 of 3 frames: c3 has no data; the surface has openings in 1 of 3 frames" in area.warning
+    )
     assert way.in_frames([1, 2]).note(0) == way.note(1)
 
 
@@ -314,14 +316,18 @@ def test_a_section_that_ends_at_an_opening_is_refused() -> None:
         return np.array([[radius, height, 0], [0, height, radius], [-radius, height, 0]])
 
     assert found(tube, "section", around(15)).value == pytest.approx(2 * np.pi * radius, rel=0.01)
-    assert refused(tube, "section", around(0)).startswith("the line of the section ends at an opening")
+    assert refused(tube, "section", around(0)).startswith(
+        "the line where the plane cuts the surface ends at an opening"
+    )
     both = found(tube, "section", around(0), lines="all")
     assert both.value == pytest.approx(2 * np.pi * radius - 12, abs=2)
     places = sheet(44, 44)
     bent = np.column_stack([places, -(places[:, 0] ** 2) / 60])
     holed = PoseSurface(pose_of(bent[np.linalg.norm(places, axis=1) > 6]))
     upright = np.array([[-15.0, 0, -15 * 15 / 60], [15, 0, -15 * 15 / 60], [10, 0, -40]])
-    assert refused(holed, "section", upright).startswith("the line of the section ends at an opening")
+    assert refused(holed, "section", upright).startswith(
+        "the line where the plane cuts the surface ends at an opening"
+    )
     beside = found(holed, "section", upright + np.array([0, 12, 0]))
     steps = np.linspace(-22, 22, 400)
     expected = np.hypot(np.diff(steps), np.diff(-(steps**2) / 60)).sum()

@@ -164,7 +164,9 @@ def test_what_is_missing_is_told_with_values_and_warns_of_numbers(tmp_path: Path
     assert value_in_words(whole, 30, MM).endswith("mm² (95 %)")
     assert numbers_in_words(first)[0].startswith("(!) ")
     assert not numbers_in_words(second)[0].startswith("(!)")
-    assert first.warning.startswith(f"no value in 4 of 240 frames: {why}; openings in 2 of 240 frames")
+    assert first.warning.startswith(
+        f"no value in 4 of 240 frames: {why}; the surface has openings in 2 of 240 frames"
+    )
     assert shown.plot is not None
     shown.plot.save(tmp_path / "lips.csv")
     with open(tmp_path / "lips.csv", encoding="utf-8", newline="") as stream:

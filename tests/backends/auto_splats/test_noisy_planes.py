@@ -190,7 +190,7 @@ def test_other_planes_are_those_of_neighborhoods(
 def test_pictures_of_noisy_points_stay_the_same(draw: Callable[..., Surface]) -> None:
     cloud = bare(sphere(6000), 0.5)
     surface = draw(cloud, camera_of(cloud), SIZE, NAME)
-    assert "because points are noisy" in surface.stats.chosen["adaptive"]
+    assert "because the points are noisy" in surface.stats.chosen["adaptive"]
     first = surface.arrays()
     again = draw(bare(sphere(6000), 0.5), camera_of(cloud), SIZE, NAME).arrays()
     assert (first["id"] != NOTHING).any()

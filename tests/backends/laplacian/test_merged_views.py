@@ -73,7 +73,7 @@ def test_one_view_is_drawn_as_it_is(draw: Draw) -> None:
     for name in ("depth", "id", "level"):
         np.testing.assert_array_equal(getattr(merged, name), getattr(direct, name))
     np.testing.assert_array_equal(merged.image(), direct.image())
-    assert merged.stats.skipped["bands"] == "only one view is in the picture"
+    assert merged.stats.skipped["bands"] == "the picture shows only one range view"
 
 
 def test_views_beside_the_picture_are_not_looked_at(renderer: Renderer) -> None:
@@ -293,7 +293,7 @@ def test_a_preview_shows_the_nearest_view_and_is_refined(renderer: Renderer) -> 
 
 def test_points_are_refused(draw: Draw) -> None:
     cloud = sphere(100)
-    with pytest.raises(InputError, match="draws range views, but this scan has none"):
+    with pytest.raises(InputError, match="draws only range views, but this scan has none"):
         draw(cloud, Camera.orbit(cloud.bounds()), SIZE, "laplacian")
 
 

@@ -241,7 +241,8 @@ def test_colours_of_another_shape_are_left_out_and_told(path: Path) -> None:
     with open_scan(path) as scan:
         assert scan.pose(0).views[0].color is None
         assert [one.text for one in scan.messages] == [
-            "Scan4D leaves out the colours: a picture has 90 x 40 pixels, but its depth picture has 32 x 24"
+            "Scan4D does not use the colours, because a picture has 90 x 40 pixels, but its depth picture "
+            "has 32 x 24"
         ]
         assert scan.reading.unused
 
@@ -250,7 +251,10 @@ def test_colours_of_another_shape_are_left_out_and_told(path: Path) -> None:
     ("arrays", "reason"),
     [
         ({"K": [[500, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]}, "principal point 319.5, 239.5 of the camera"),
-        ({"K": K, "width": 64, "height": 36}, "the camera is for 64 x 36, the picture has 32 x 24"),
+        (
+            {"K": K, "width": 64, "height": 36},
+            "the camera is for pictures of 64 x 36 pixels, but this picture has 32 x 24",
+        ),
     ],
 )
 def test_cameras_of_another_picture(arrays: dict[str, object], reason: str, path: Path) -> None:
@@ -314,9 +318,9 @@ def test_points_count_more_than_depth_without_a_camera(path: Path) -> None:
         ),
         (
             {"depth": np.ones((2, 2)), "distortion": np.ones(3)},
-            "has 3 coefficients of distortion, expected 4, 5 or 8",
+            "has 3 distortion coefficients, expected 4, 5 or 8",
         ),
-        ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add dx and dy"),
+        ({"elevation": np.ones((2, 2))}, "no ground coordinates. Add the arrays dx and dy"),
         ({"elevation": np.ones((2, 2)), "dx": 0, "dy": 1}, "the cells have the unusable size 0 x -1"),
         (
             {"normals": np.ones((2, 3))},
@@ -334,7 +338,9 @@ def test_arrays_that_do_not_fit(arrays: dict[str, object], reason: str, path: Pa
 def test_what_unpacks_to_too_much_is_refused(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     np.savez_compressed(path, depth=np.ones((2000, 2000), np.float32))
     monkeypatch.setenv(READ_VARIABLE, "20")
-    with pytest.raises(InputError, match=rf"would take .* MB, .* set {READ_VARIABLE}="):
+    with pytest.raises(
+        InputError, match=rf"would need .* MB, .* set the environment variable {READ_VARIABLE}="
+    ):
         formats.read(path)
     whole = path.read_bytes()
     for size in range(0, len(whole), max(1, len(whole) // 20)):

@@ -109,7 +109,7 @@ def test_delimiters_of_ascii(delimiter: str, path: Path) -> None:
 @pytest.mark.parametrize("encoding", ["ascii", "binary"])
 @pytest.mark.parametrize("promised", ["4", "1000000", str(10**18)])
 def test_fewer_points_than_promised(encoding: str, promised: str, path: Path) -> None:
-    with pytest.raises(InputError, match=f"holds 3 of the {promised} points"):
+    with pytest.raises(InputError, match=f"contains only 3 of the {promised} points"):
         read(save(path, encoding, WIDTH=promised, POINTS=promised))
 
 
@@ -117,11 +117,11 @@ def test_damaged_compressed_data(path: Path) -> None:
     whole = body_of("binary_compressed")
     packed, unpacked = struct.unpack("<II", whole[:8])
     cases = {
-        whole[:20]: f"holds 12 of {packed} bytes",
+        whole[:20]: f"contains only 12 of {packed} bytes",
         whole[:4]: "ends early: 4 bytes where 8 should be",
         struct.pack("<II", packed, 10**9)
-        + whole[8:]: "holds 1000000000 bytes of points, but its header promises",
-        struct.pack("<II", 1, unpacked) + whole[8:]: f"1 bytes of compressed data cannot hold {unpacked}",
+        + whole[8:]: "contains 1000000000 bytes of points, but its header states",
+        struct.pack("<II", 1, unpacked) + whole[8:]: f"1 bytes of compressed data cannot contain {unpacked}",
         whole[:8] + bytes([255]) * packed: "cannot be read as PCD|damaged",
     }
     for body, reason in cases.items():
@@ -142,13 +142,16 @@ def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
         ({"POINTS": None, "WIDTH": None}, "no WIDTH line"),
         ({"SIZE": "4 4 4"}, "have different numbers of entries"),
         ({"SIZE": "4 4 3 4 8 2"}, "unknown PCD type and size 'F3'"),
-        ({"COUNT": f"1 1 1 1 {10**12} 1"}, "has 1,000,000,000,005 values a point, more than the 4,096"),
+        (
+            {"COUNT": f"1 1 1 1 {10**12} 1"},
+            "has 1,000,000,000,005 values a point, but Scan4D reads at most 4,096",
+        ),
         ({"COUNT": "1 1 1 1 0 1"}, "promises 3 points"),
-        ({"POINTS": "0"}, "holds no points"),
+        ({"POINTS": "0"}, "contains no points"),
         ({"POINTS": "-3"}, "promises -3 points"),
         ({"POINTS": "9" * 5000}, "the number of points is .9+\\.\\.\\.., which is not a usable whole number"),
         ({"COUNT": "1 1 1 1 x 1"}, "a COUNT is .x., which is not a usable whole number"),
-        ({"FIELDS": "x y w rgba moment label"}, "no x, y and z among the columns: x, y, w"),
+        ({"FIELDS": "x y w rgba moment label"}, "the columns do not include x, y and z: x, y, w"),
     ],
 )
 def test_headers_that_cannot_be_used(changes: dict[str, str | None], reason: str, path: Path) -> None:
@@ -181,7 +184,7 @@ def test_other_programs_can_read_what_is_written(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("encoding", ["ascii", "binary", "binary_compressed"])
 def test_a_field_that_is_there_twice(encoding: str, path: Path) -> None:
-    with pytest.raises(InputError, match="two columns are called 'X'"):
+    with pytest.raises(InputError, match="two columns have the name 'X'"):
         read(save(path, encoding, FIELDS="x y z rgba moment X"))
     twice = read(save(path, encoding, FIELDS="x y z n moment n")).scalars
     assert twice["n"].tolist() == [0x80FF2010, 2]
@@ -189,7 +192,7 @@ def test_a_field_that_is_there_twice(encoding: str, path: Path) -> None:
 
 
 def test_a_field_of_millions_of_values_is_refused(path: Path) -> None:
-    with pytest.raises(InputError, match="has 4,000,005 values a point, more than the 4,096"):
+    with pytest.raises(InputError, match="has 4,000,005 values a point, but Scan4D reads at most 4,096"):
         read(save(path, COUNT="1 1 1 1 4000000 1"))
 
 
@@ -230,7 +233,7 @@ def test_its_viewpoint_is_the_pose_of_the_camera(path: Path) -> None:
     assert view.positions() == pytest.approx(grid[seen] * (-1, -1, 1) + (1, 2, 3), abs=1e-6)
     for words in ("1 2 3 0 0 0 0", "1 2 3 nan 0 0 0", "1 2 3", "a b c d e f g"):
         organised(path, VIEWPOINT=words)
-        with pytest.raises(InputError, match=r"the VIEWPOINT is not a pose|is not a rotation"):
+        with pytest.raises(InputError, match=r"the line VIEWPOINT is not a pose|is not a rotation"):
             read(path)
 
 

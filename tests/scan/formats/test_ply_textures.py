@@ -73,7 +73,7 @@ def test_positions_at_vertices(
     assert not cloud.scalars
     if has_faces:
         assert len(cloud) > 1000
-        assert decision.why.startswith("The file holds 5 points. Scan4D adds")
+        assert decision.why.startswith("The file contains 5 points. Scan4D adds")
         assert cloud.topology is not None
     else:
         assert len(cloud) == 5

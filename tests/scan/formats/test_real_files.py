@@ -25,7 +25,7 @@ REFUSED = {
     "odd/pcd/missingheader.pcd": "has no DATA line",
     "odd/pcd/stereo_left.pcd": "no x, y and z among the columns: red, green, blue",
     "odd/pts_ptx_txt/badheader.txt": "line 1 names 'x' twice, and lacks x, y or z",
-    "odd/pts_ptx_txt/text.txt": "line 1 is neither numbers nor names with x, y, z",
+    "odd/pts_ptx_txt/text.txt": "line 1 contains neither numbers nor the names x, y and z",
     "odd/other/no_vertex.obj": "holds no points",
 }
 

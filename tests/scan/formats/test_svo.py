@@ -155,7 +155,7 @@ def test_a_cut_inside_the_last_pose_breaks_that_one_alone(scan: Path, tmp_path: 
     (tmp_path / "cut.svo").write_bytes(scan.read_bytes()[:-5])
     with open_scan(tmp_path / "cut.svo") as timeline:
         assert len([*timeline]) == COUNT - 1
-        with pytest.raises(InputError, match=r"cut\.svo, frame 20: ends within level 7 of an octree's 7"):
+        with pytest.raises(InputError, match=r"cut\.svo, frame 20: ends within level 7 of 7 of an octree"):
             timeline.pose(19)
 
 
@@ -218,11 +218,11 @@ def test_a_cut_behind_a_level_of_the_last_pose_is_a_coarser_one(scan: Path, tmp_
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda data, at: data + b"some more", r"octree 20, at byte \d+: an octree is missing"),
-        (lambda data, at: data[:at] + b"x" + data[at:], r"octree 2, at byte \d+: an octree is missing"),
+        (lambda data, at: data + b"some more", r"octree 20, at byte \d+: no octree begins"),
+        (lambda data, at: data[:at] + b"x" + data[at:], r"octree 2, at byte \d+: no octree begins"),
         (lambda data, at: data[:at + 40] + b"x" + data[at + 41:], "the header of an octree is damaged"),
-        (lambda data, at: data[: headers_at(data, 1)] + data[headers_at(data, 5):], "depends on 5 before it"),
-        (lambda data, at: data[headers_at(data, 5):], "octree 0 depends on 5 before it"),
+        (lambda data, at: data[: headers_at(data, 1)] + data[headers_at(data, 5):], "depends on 5 octrees"),
+        (lambda data, at: data[headers_at(data, 5):], "octree 0 depends on 5 octrees before it"),
     ],
 )  # fmt: skip
 def test_damage_is_one_clear_error(change, message: str, scan: Path, tmp_path: Path) -> None:
@@ -287,9 +287,9 @@ def test_convert_with_a_delta(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["a%d.svo"], "one file holds all frames"),
-        (["a.ply", "--depth", "5"], "--depth is for octrees"),
-        (["a.ply", "--delta", "0.1"], "--delta is for octrees"),
+        (["a%d.svo"], "a single file with all frames"),
+        (["a.ply", "--depth", "5"], "--depth applies only to octrees"),
+        (["a.ply", "--delta", "0.1"], "--delta applies only to octrees"),
         (["a.svo", "--depth", "22"], "depth: 22 is outside 0 to 21"),
         (["a.svo", "--delta", "nan"], "delta"),
         (["missing/a.svo"], "there is no folder"),
@@ -324,7 +324,7 @@ def test_a_tree_of_far_more_leaves_than_its_bytes_is_refused_before_it_is_read(t
     path = tmp_path / "full.svo"
     path.write_bytes(to_bytes(tree, packed=False))
     tracemalloc.start()
-    with pytest.raises(InputError, match=r"would take 1,1\d\d MB, which is too much for its size"):
+    with pytest.raises(InputError, match=r"would need 1,1\d\d MB of memory, which is suspiciously much"):
         formats.read(path)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -337,7 +337,7 @@ def test_octrees_in_two_units_are_refused(tmp_path: Path, full_cloud: PointCloud
         formats.write_poses(tmp_path / f"{unit}.svo", [Pose(0, 0.0, "", full_cloud)], unit)
         parts.append((tmp_path / f"{unit}.svo").read_bytes())
     (tmp_path / "both.svo").write_bytes(b"".join(parts))
-    with pytest.raises(InputError, match="octree 1 has a different unit of length from the first"):
+    with pytest.raises(InputError, match="octree 1 has a different unit of length than the first"):
         formats.frame_count(tmp_path / "both.svo")
 
 
@@ -352,7 +352,7 @@ def test_files_of_very_many_octrees_are_refused(tmp_path: Path, monkeypatch: pyt
     tree = Octree(np.zeros(3), 1.0, (), 1, 1)
     (tmp_path / "scan.svo").write_bytes(b"".join(to_bytes(tree, time=float(i)) for i in range(6)))
     monkeypatch.setattr(octree_file, "_MOST_POSES", 5)
-    with pytest.raises(InputError, match="has 6 octrees, more than the 5 that Scan4D reads"):
+    with pytest.raises(InputError, match="has 6 octrees, but Scan4D reads at most 5"):
         formats.frame_count(tmp_path / "scan.svo")
 
 
@@ -367,6 +367,6 @@ def test_convert_tells_of_a_file_that_takes_too_much_to_be_read(
     assert len(formats.read_points(tmp_path / "a.svo")) > 20_000
     monkeypatch.setenv("SCAN4D_READ_MB", "1")
     assert cli.main([*words[:1], "demo", "--pose", "0", str(tmp_path / "b.svo")]) == 0
-    assert "set SCAN4D_READ_MB=" in capsys.readouterr().err
-    with pytest.raises(InputError, match="too much for its size"):
+    assert "set the environment variable SCAN4D_READ_MB=" in capsys.readouterr().err
+    with pytest.raises(InputError, match="suspiciously much"):
         formats.read_points(tmp_path / "b.svo")

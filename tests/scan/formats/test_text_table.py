@@ -66,7 +66,7 @@ def test_the_count_of_a_pts_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(cloud.colors[:, :3], [[10, 20, 30], [40, 50, 60], [1, 1, 1]])
     (report,) = decided.reports()
     assert report.text == (
-        "scan.pts: the number of points above the rows is 2, but there are 3 rows. Scan4D reads all rows"
+        "scan.pts: the line above the rows states 2 points, but there are 3 rows. Scan4D reads all rows"
     )
     assert len(read(save(path, "1000000000\n1 2 3\n"))) == 1
 
@@ -111,14 +111,14 @@ def test_guesses_without_names(values: list[float], names: str) -> None:
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("This is a letter, not a scan.\n", "line 1 is neither numbers nor names with x, y, z"),
+        ("This is a letter, not a scan.\n", "line 1 contains neither numbers nor the names x, y and z"),
         ("X,Y,X\n1,2,3\n", "line 1 names 'x' twice"),
-        ("x y z\n", "holds no rows of numbers"),
-        ("# only a remark\n", "holds no rows of numbers"),
+        ("x y z\n", "contains no rows of numbers"),
+        ("# only a remark\n", "contains no rows of numbers"),
         ("1 2\n3 4\n", "fewer than three numbers"),
-        ("1 2 3\n4 5\n", "row 2 has 2 values, but column 3 is read"),
+        ("1 2 3\n4 5\n", "row 2 has only 2 values, but Scan4D needs column 3"),
         ("1 2 3\n4 5 six\n", "row 2, column 3: 'six' is not a number"),
-        ("nan nan nan 1 2 3 4\n", "none of the 1 points has finite coordinates"),
+        ("nan nan nan 1 2 3 4\n", "contains 1 points, but none of them has finite coordinates"),
     ],
 )
 def test_files_that_cannot_be_used(text: str, reason: str, tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_tables_longer_than_what_is_parsed_at_once(tmp_path: Path) -> None:
     lines = text.splitlines(keepends=True)
     with pytest.raises(InputError, match="row 30,001, column 1: 'x' is not a number"):
         read(save(tmp_path / "scan.xyz", "".join([*lines[:30_000], "x 1 2\n", *lines[30_001:]])))
-    with pytest.raises(InputError, match="row 30,001 has 2 values"):
+    with pytest.raises(InputError, match="row 30,001 has only 2 values"):
         read(save(tmp_path / "scan.xyz", "".join([*lines[:30_000], "1 2\n", *lines[30_001:]])))
     with open(tmp_path / "scan.ply", "w") as file:
         file.write("ply\nformat ascii 1.0\nelement vertex 40000\nproperty float x\nproperty float y\n")
@@ -146,7 +146,7 @@ def test_tables_longer_than_what_is_parsed_at_once(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_row_of_very_many_columns_is_refused(tmp_path: Path) -> None:
     """Guessing the names of half a million columns would take hours if it looked at all for each."""
-    with pytest.raises(InputError, match="has 500,000 columns, more than the 4,096"):
+    with pytest.raises(InputError, match="has 500,000 columns, but Scan4D reads at most 4,096"):
         read(save(tmp_path / "scan.xyz", "1 " * 500_000 + "\n"))
     wide = read(save(tmp_path / "scan.xyz", "1 2 3 " + "700 " * 4093 + "\n"))
     assert list(wide.scalars)[-1] == "column_4096"
@@ -180,14 +180,14 @@ def test_a_line_without_an_end_is_refused(suffix: str, tmp_path: Path) -> None:
 def test_names_that_stand_twice_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="line 1 names 'x' twice, and lacks x, y or z"):
         read(save(tmp_path / "scan.txt", "X,Y,X\n1,2,3\n"))
-    with pytest.raises(InputError, match="two columns are called 'x'"):
+    with pytest.raises(InputError, match="two columns have the name 'x'"):
         read(save(tmp_path / "scan.csv", "X,Y,Z,x\n1,2,3,4\n"))
 
 
 @pytest.mark.parametrize("line", ["\n", "# x y z\n", ",,,\n"])
 def test_rows_far_below_are_not_looked_for(line: str, tmp_path: Path) -> None:
     assert len(read(save(tmp_path / "scan.csv", line * 60_000 + "1,2,3\n"))) == 1
-    with pytest.raises(InputError, match="holds no rows of numbers in its first 65,536 lines"):
+    with pytest.raises(InputError, match="contains no rows of numbers in its first 65,536 lines"):
         read(save(tmp_path / "scan.csv", line * 70_000 + "1,2,3\n"))
 
 

@@ -186,7 +186,9 @@ def test_damaged_files_are_refused(path: Path, monkeypatch: pytest.MonkeyPatch) 
             formats.read(path)
     save(path, np.ones((2000, 2000), np.float32), compression="tiff_adobe_deflate")
     monkeypatch.setenv(READ_VARIABLE, "20")
-    with pytest.raises(InputError, match=rf"would take .* MB, .* set {READ_VARIABLE}="):
+    with pytest.raises(
+        InputError, match=rf"would need .* MB, .* set the environment variable {READ_VARIABLE}="
+    ):
         formats.read(path)
 
 

@@ -121,13 +121,13 @@ def test_a_pod_may_miss_a_frame_but_not_its_texture(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [
-        ({"range": None}, "pod 'left' has the range None, expected a file name"),
+        ({"range": None}, "pod 'left' has the range None, but this must be a file name"),
         ({"range": "a_*_*.tif"}, "with one . at most"),
         ({"range": "../x.tif"}, r"pod 'left' names '../x.tif', which is not a file in its folder"),
         ({"range": "/etc/passwd"}, "which is not a file in its folder"),
         ({"range": "*/x.tif"}, "with one . at most"),
         ({"range": "none.tif"}, r"there is no range image none\.tif"),
-        ({"mask": 3}, "has the mask 3, expected a file name"),
+        ({"mask": 3}, "has the mask 3, but this must be a file name"),
         ({"fx": None}, "pod 'left' is not a calibration: fx is None"),
         ({"fx": 0}, "fx is 0"),
         ({"kind": "far"}, "unknown kind of depth 'far'"),
@@ -174,7 +174,7 @@ def test_images_of_another_shape_are_left_out_and_a_mask_is_refused(tmp_path: Pa
         assert scan.pose(0).views[0].color is None
         assert "121 x 57 pixels, but its depth picture has 121 x 97" in scan.reading.unused[0]
     save(tmp_path / "left_0_mask.png", COLORS[40:, :, 0])
-    with open_scan(tmp_path) as scan, pytest.raises(InputError, match="a mask of another shape"):
+    with open_scan(tmp_path) as scan, pytest.raises(InputError, match="mask has a different shape"):
         scan.pose(0)
 
 

@@ -242,7 +242,10 @@ def test_depth_without_a_camera_opens_with_an_assumed_one(tmp_path: Path) -> Non
 def test_a_camera_of_another_shape_or_outside_is_refused(tmp_path: Path) -> None:
     put(tmp_path)
     for stored, reason in (
-        (PINHOLE | {"width": 640, "height": 360}, "the camera is for 640 x 360, the picture has 32 x 24"),
+        (
+            PINHOLE | {"width": 640, "height": 360},
+            "the camera is for pictures of 640 x 360 pixels, but this picture has 32 x 24",
+        ),
         (PINHOLE | {"cx": 319.5}, "principal point 319.5, 11.5 of the camera is outside the picture"),
     ):
         (tmp_path / "camera.json").write_text(json.dumps(stored))
@@ -464,7 +467,7 @@ def test_a_recording_of_record3d_that_is_only_unpacked_is_told(tmp_path: Path) -
     (tmp_path / "rgbd").mkdir()
     (tmp_path / "rgbd/0.depth").write_bytes(b"bvx-")
     (tmp_path / "metadata").write_text(json.dumps({"K": BY_COLUMNS}))
-    with pytest.raises(InputError, match="Export them as EXR with RGB-D in Record3D"):
+    with pytest.raises(InputError, match="export the recording as EXR with RGB-D"):
         find_source(tmp_path)
 
 

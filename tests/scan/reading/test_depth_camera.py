@@ -68,7 +68,8 @@ def test_a_camera_for_another_size_is_scaled(factor: float) -> None:
 
 def test_a_camera_for_another_aspect_ratio_is_refused() -> None:
     with pytest.raises(
-        InputError, match=r"the camera is for 640 x 480, the picture has 320 x 180 \(info\.txt\)"
+        InputError,
+        match=r"the camera is for pictures of 640 x 480 pixels, but this picture has 320 x 180 \(info\.txt\)",
     ):
         decided(stated=[replace(STATED, width=640, height=480)])
 

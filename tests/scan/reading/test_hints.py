@@ -37,10 +37,13 @@ def test_other_suffixes_get_the_known_ones() -> None:
 def test_a_folder_of_such_files_says_what_it_holds_and_what_to_do(suffix: str, tmp_path: Path) -> None:
     for number in (1, 2):
         (tmp_path / f"scan{number}.{suffix}").write_bytes(b"1")
-    with pytest.raises(InputError, match="holds no scan files, but 2 ") as refused, open_scan(tmp_path):
+    with pytest.raises(InputError, match="contains no scan files, but 2 ") as refused, open_scan(tmp_path):
         pass
     assert (refused.value.hint or "").startswith("Scan4D does not read ")
-    with pytest.raises(InputError, match="matches no scan file, but 2 "), open_scan(tmp_path / "scan*"):
+    with (
+        pytest.raises(InputError, match="matches no file that Scan4D can read, but 2 "),
+        open_scan(tmp_path / "scan*"),
+    ):
         pass
 
 

@@ -109,7 +109,10 @@ def test_cells_that_are_absent() -> None:
     [
         ("1 2 3\n4 5\n", "row 2 has 2 values, but the rows above have 3"),
         ("1 2 3\n4 5 six\n", "row 2, column 3: 'six' is not a number"),
-        ("1 2 3\n4 5 6,5\n", r"'6,5' is not a number. If it is one, read the file with --read decimal=,"),
+        (
+            "1 2 3\n4 5 6,5\n",
+            r"'6,5' is not a number. If this is a number, read the file with --read decimal=,",
+        ),
     ],
 )
 def test_rows_that_cannot_be_read(text: str, reason: str) -> None:

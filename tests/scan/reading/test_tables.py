@@ -75,9 +75,9 @@ def messages(file: Path) -> str:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("x [mm],y [mm],z [m]\n1,2,3\n", "several units (m, mm)"),
-        ("x y z\n1 2 3 255 0 0\n4 5 6 0 255 0\n", "3 names of columns, but the rows have 6 values"),
-        ("x y z r g b\n1 2 3\n4 5 6\n", "6 names of columns, but the rows have 3 values"),
+        ("x [mm],y [mm],z [m]\n1,2,3\n", "different units (m, mm)"),
+        ("x y z\n1 2 3 255 0 0\n4 5 6 0 255 0\n", "the table names 3 columns, but the rows have 6 values"),
+        ("x y z r g b\n1 2 3\n4 5 6\n", "the table names 6 columns, but the rows have 3 values"),
         ("1 2 3\n4 5 6 7\n", "3 to 4 values"),
         ("0x10 2 3\n4 5 6\n7 8 9\n", "does not read line 1"),
         ("x,y,z\n1,2,3\n4,5,6\nTotal: 2 points\n", "1 lines of text below the rows"),
@@ -94,13 +94,13 @@ def test_columns_of_text_are_in_the_record(tmp_path: Path) -> None:
     ) as scan:
         scan.pose(0)
         texts = scan.reading.unused
-    assert texts == ("column 'name', which holds text", "column 'color', which holds text")
+    assert texts == ("the column 'name', which contains text", "the column 'color', which contains text")
 
 
 @pytest.mark.parametrize("time", ["2024-05-01T12:30:0{}", "12:30:0{}.5"])
 def test_clock_times_of_several_moments_are_reported(time: str, tmp_path: Path) -> None:
     rows = "".join(f"{time.format(frame)},{x},0,0\n" for frame in (1, 2) for x in range(3))
-    assert "does not read the frames or times of column 'Time'" in messages(
+    assert "does not read frames or times from the column 'Time'" in messages(
         save(tmp_path / "scan.csv", f"Time,x,y,z\n{rows}")
     )
 
@@ -119,7 +119,7 @@ def test_a_table_without_rows_is_an_empty_frame_of_a_sequence(text: str, tmp_pat
 
 
 def test_a_table_that_lacks_the_rows_it_promises_is_damaged(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the count above the rows is 7") as refused:
+    with pytest.raises(InputError, match="a line states 7 points") as refused:
         formats.read(save(tmp_path / "scan.pts", "7\n"))
     assert not isinstance(refused.value, EmptyFrame)
 
@@ -167,7 +167,7 @@ def test_sparse_points_with_tracks(head: str, tracks: str, tmp_path: Path) -> No
 
 
 def test_unknown_names_are_no_remark(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"neither numbers nor names with x, y, z: 'a,b,c"):
+    with pytest.raises(InputError, match=r"neither numbers nor the names x, y and z: 'a,b,c"):
         formats.read(save(tmp_path / "scan.csv", "a,b,c\n1,2,3\n"))
 
 
@@ -182,7 +182,7 @@ def test_moments_of_a_table(tmp_path: Path) -> None:
         assert len(timeline) == 2
         assert timeline.times.tolist() == [0, 0.05]
         first, second = (timeline.pose(index).cloud for index in range(2))
-        assert timeline.reading["frames"].value == "by column time [ms]"
+        assert timeline.reading["frames"].value == "by the column time [ms]"
     np.testing.assert_array_equal(first.world(), [[4, 5, 6], [1.5, 2, 3]])
     assert (first.ids.tolist(), second.ids.tolist()) == ([0, 1], [0])
     assert second.dropped == 1
@@ -237,7 +237,7 @@ def test_a_preview_of_a_table(tmp_path: Path) -> None:
 
 def test_a_preview_of_what_cannot_be_read(tmp_path: Path) -> None:
     shown = preview(save(tmp_path / "scan.csv", "a;b;c\n1;2;3\n"))
-    assert "neither numbers nor names" in shown.problem
+    assert "neither numbers nor the names" in shown.problem
     assert shown.lines == ("a;b;c", "1;2;3")
     assert shown.row_count == 0
 

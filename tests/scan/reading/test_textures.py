@@ -51,7 +51,7 @@ def test_where_the_texture_is_much_finer_scan4d_adds_points_between_the_vertices
     np.testing.assert_array_equal(cloud.colors[5:, :3][is_inside], quarter(added[is_inside]))
     np.testing.assert_allclose(cloud.normals, [[0, 0, 1]] * len(cloud))
     assert (decision.value, decision.source) == ("dense", "assumed")
-    assert decision.why.startswith("The file holds 5 points. Scan4D adds 4,050 between them")
+    assert decision.why.startswith("The file contains 5 points. Scan4D adds 4,050 points between them")
     assert decision.alternatives == ("vertices", "none")
 
 
@@ -64,7 +64,7 @@ def test_the_user_states_how_many_points_are_added(stated: str, most: int, tmp_p
         decision = timeline.reading["texture"]
     assert 0.8 * most <= added <= most
     assert (decision.value, decision.source) == ("dense", "user")
-    assert f"adds {added:,} between" in decision.why
+    assert f"adds {added:,} points between" in decision.why
 
 
 def test_frames_with_the_same_faces_get_the_same_points_under_the_same_ids(tmp_path: Path) -> None:
@@ -144,7 +144,7 @@ def test_materials_of_several_colours_stand_in_for_their_pictures(tmp_path: Path
         decision = timeline.reading["texture"]
     np.testing.assert_array_equal(colors[[1, 3, 4]], [RED, BLUE, [255] * 3])
     assert decision.source == "assumed"
-    assert "colors of the materials" in decision.why
+    assert "colours of the materials" in decision.why
 
 
 @pytest.mark.parametrize(
@@ -240,6 +240,6 @@ def test_a_picture_with_the_name_of_the_file_is_assumed(named: bool, tmp_path: P
     with open_scan(tmp_path / "a.obj") as timeline:
         assert timeline.pose(0).cloud.colors is not None
         decision = timeline.reading["texture"]
-        assert any("materials" in message.text for message in timeline.messages) == named
+        assert any("material file" in message.text for message in timeline.messages) == named
     assert (decision.value, decision.source, decision.where) == ("vertices", "assumed", "a.png")
     assert decision.alternatives == ("dense", "none")

@@ -84,7 +84,7 @@ class LandmarkSet:
         usable, of_names = _usable_names(names)
         if unit and usable_unit(unit) is None:
             named = f"'{shortened(unit)}', which is not a known unit such as mm"
-            of_names = [*of_names, f"Lengths are in {named}: Scan4D does not convert the lengths"]
+            of_names = [*of_names, f"The lengths are in {named}. Scan4D does not convert them"]
         there = np.isfinite(positions).all(axis=2)
         if known is None:
             known = np.where(there, Known.PLACED, Known.PENDING)
@@ -169,7 +169,7 @@ class LandmarkSet:
         factor = conversion(self.unit, unit)
         if factor is None:
             units = f"Lengths are in '{self.unit}', but the scan is in '{unit}'"
-            remark = f"{units}: Scan4D does not convert the lengths"
+            remark = f"{units}. Scan4D does not convert them"
             return replace(self, unit=unit, remarks=(*self.remarks, remark))
         with np.errstate(over="ignore"):
             return replace(self, unit=unit, positions=self.positions * factor, sigmas=self.sigmas * factor)
@@ -192,7 +192,7 @@ class LandmarkSet:
 def check_cells(frames: int, names: int) -> None:
     """Raise InputError, before anything is allocated, for more landmarks in more frames than any scan has."""
     if frames * names > _MOST_CELLS:
-        raise InputError(f"has {names:,} landmarks in {frames:,} frames, which is too many")
+        raise InputError(f"has {names:,} landmarks in {frames:,} frames, more than Scan4D can read")
 
 
 def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
@@ -215,13 +215,16 @@ def _usable_names(names: Sequence[str]) -> tuple[tuple[str, ...], list[str]]:
     remarks = []
     if twice:
         remarks.append(
-            f"{_counted(len(twice), 'name')} appeared twice, so Scan4D added a number, such as "
-            f"'{shortened(twice[0])}'"
+            f"{_counted(len(twice), 'name')} appeared twice. Scan4D added numbers to the repeated names, "
+            f"such as '{shortened(twice[0])}'"
         )
     if unnamed:
         remarks.append(f"{_counted(unnamed, 'landmark')} had no name, so Scan4D numbered them")
     if changed:
-        remarks.append(f"Scan4D shortened or cleaned {_counted(changed, 'name')} that it cannot show")
+        remarks.append(
+            f"Scan4D changed {_counted(changed, 'name')} with too many characters, or characters that the "
+            "window cannot show"
+        )
     return tuple(usable), remarks
 
 
@@ -242,9 +245,9 @@ def why_apart(landmarks: LandmarkSet, bounds: Bounds) -> str | None:
     unit = landmarks.unit or "units"
     few = int((off > _MARGIN * bounds.radius).sum())
     head = (
-        f"{few} of {len(points)} positions lie off the scan, by up to {off.max():.4g} {unit}"
+        f"{few} of {len(points)} positions do not lie on the scan, but up to {off.max():.4g} {unit}"
         if few < len(points)
-        else f"all landmarks lie off the scan, by at least {off.min():.4g} {unit}"
+        else f"no landmark lies on the scan: the nearest one is {off.min():.4g} {unit} away"
     )
     cause = _cause(points, bounds)
     return f"{head}: {cause or 'the landmarks belong to another scan'}"
@@ -260,15 +263,15 @@ def _cause(points: NDArray[np.float64], bounds: Bounds) -> str | None:
         return None
     if fits(points * _TURNED):
         return (
-            "with the signs of x and y reversed, the landmarks lie on the scan, so one of them has "
-            "the axes RAS (right, anterior, superior), and the other LPS"
+            "the landmarks fit if the signs of x and y are reversed. The landmarks or the scan have the "
+            "axes RAS (right, anterior, superior), and the other has LPS"
         )
     span = float(np.linalg.norm(np.ptp(points, axis=0)))
     for factor in _FACTORS:
         if factor * span >= _WIDE * bounds.radius and fits(points * factor):
             return (
-                f"multiplied by {factor:.4g}, the landmarks lie on the scan, so their unit differs from "
-                "the unit of the scan"
+                f"the landmarks fit if their coordinates are multiplied by {factor:.4g}. The landmarks "
+                "and the scan have different units"
             )
     return None
 

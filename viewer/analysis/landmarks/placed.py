@@ -68,8 +68,8 @@ def why_beside(landmarks: Sequence[Landmark]) -> str | None:
         return None
     some = ", ".join(map(shortened, beside[:3]))
     return (
-        f"{len(beside)} of {len(set_here)} landmarks lie off the surface ({some}). Do they belong to "
-        "this scan?"
+        f"{len(beside)} of {len(set_here)} landmarks do not lie on the surface ({some}). Check that the "
+        "landmarks belong to this scan."
     )
 
 

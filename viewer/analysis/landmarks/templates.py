@@ -68,7 +68,9 @@ def _template(data: Any) -> Template:
     for name, partner in partners.items():
         if partners.get(partner) != name:
             raise InputError(
-                f"'{name}' has the mirror partner '{partner}', which has another one or none", "landmarks"
+                f"'{name}' has the mirror partner '{partner}', but '{name}' is not the mirror partner of "
+                f"'{partner}'",
+                "landmarks",
             )
     names = {landmark.name for landmark in landmarks}
     measures = tuple(
@@ -117,9 +119,9 @@ def _list(fields: Mapping[str, Any], key: str, where: str = "") -> list[Any]:
 def _text(fields: Mapping[str, Any], key: str, where: str, *, needed: bool = False) -> str:
     value = fields.get(key, "")
     if not isinstance(value, str) or not (value.isprintable() and len(value) <= _LONGEST):
-        raise InputError(f"'{key}' must be a text of one line, not {shortened(value)}", where or None)
+        raise InputError(f"'{key}' must be one line of text, not {shortened(value)}", where or None)
     if (needed and value.strip() != value) or (needed and not value):
-        raise InputError(f"'{key}' is missing, or begins or ends with blanks", where or None)
+        raise InputError(f"'{key}' is missing, or has blanks at its start or end", where or None)
     return value
 
 

@@ -97,5 +97,5 @@ class Series:
         open_ = self.shares < WHOLE if len(self.shares) else np.zeros(count, bool)
         if open_.any():
             filled = self._filled(float(self.shares[open_].min()), "as little as ")
-            remarks.append(f"openings in {int(open_.sum())} of {count} frames: {filled}")
+            remarks.append(f"the surface has openings in {int(open_.sum())} of {count} frames: {filled}")
         return "; ".join(remarks)

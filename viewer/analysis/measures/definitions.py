@@ -20,7 +20,7 @@ def read_measures(path: Path | str) -> tuple[Measure, ...]:
     """The measures of a file, of a template as well, at least one. Raises InputError, which says what is
     wrong and where."""
     path = Path(path)
-    with reading(path, "is neither JSON nor TOML", _HINT):
+    with reading(path, "is neither a JSON nor a TOML file", _HINT):
         text = read_text(path, _MOST_BYTES)
         return _measures(parsed_toml(text) if path.suffix.lower() == ".toml" else parsed_json(text))
 
@@ -28,7 +28,7 @@ def read_measures(path: Path | str) -> tuple[Measure, ...]:
 def _measures(data: Any) -> tuple[Measure, ...]:
     held = data.get("measures") if isinstance(data, dict) else data
     if not isinstance(held, list) or not 0 < len(held) <= _MOST:
-        raise InputError(f"needs 'measures', a list of 1 to {_MOST} measures")
+        raise InputError(f"must contain 'measures', a list of 1 to {_MOST} measures")
     found = tuple(measure_of(each, f"measures[{number}]") for number, each in enumerate(held))
     names = [measure.name for measure in found]
     for name in names:
@@ -47,11 +47,11 @@ def measure_of(data: Any, where: str) -> Measure:
     name, kind = data.get("name"), data.get("kind")
     landmarks, options = data.get("landmarks", []), data.get("options", {})
     if not (isinstance(name, str) and name and name.isprintable() and isinstance(kind, str)):
-        raise InputError("needs a 'name' and a 'kind', each a text", where)
+        raise InputError("must have a 'name' and a 'kind', both of them texts", where)
     if not (isinstance(landmarks, list) and all(isinstance(landmark, str) for landmark in landmarks)):
         raise InputError("'landmarks' is not a list of names", where)
     if not (isinstance(options, dict) and all(isinstance(value, str) for value in options.values())):
-        raise InputError("'options' must contain names with texts as values", where)
+        raise InputError("'options' must be names with texts as values", where)
     measure = Measure(name, kind, tuple(landmarks), options)
     try:
         kind_of(measure)

@@ -30,7 +30,7 @@ from . import Measure, Series
 from .series import series_of
 
 _MOST_BYTES = 16 * 2**20  # of a table
-_HINT = "Use an unchanged table that 'Export distances...' has written"
+_HINT = "Use an unchanged table that you saved with 'Export distances...'"
 _OF_END = ("state", "point", "x", "y", "z", "uncertainty", "spacing", "level")
 COLUMNS = (
     "scan", "measure", "frame", "time", "distance", "uncertainty", "unit",
@@ -120,8 +120,8 @@ def read_distances(
             continue
         factor = conversion(row["unit"], unit)
         if factor is None:
-            what = f"lengths are in '{row['unit']}', but the scan is in '{unit}'"
-            raise InputError(what, where, "First set the scan unit in the panel")
+            what = f"the lengths are in '{row['unit']}', but the scan is in '{unit}'"
+            raise InputError(what, where, "Set the scan unit in the panel, then import the table again")
         for number, points in enumerate(found.setdefault(text_of_cell(row["measure"]), ([], [])), 1):
             if row[f"state_{number}"] == STATES[Known.PLACED]:
                 points.append(_surface_point(row, number, where, factor, count, pose_of))
@@ -129,7 +129,7 @@ def read_distances(
         what = f"belongs to the scan '{min(others)}', not to '{scan}'" if others else "holds no distances"
         raise InputError(what, path, "Open that scan first" if others else _HINT)
     if unplaced := next((name for name, ends in found.items() if not all(ends)), None):
-        raise InputError(f"lacks the position of one end of the distance '{unplaced}'", path, _HINT)
+        raise InputError(f"has no position for one end of the distance '{unplaced}'", path, _HINT)
     return {name: (tuple(first), tuple(second)) for name, (first, second) in found.items()}
 
 
@@ -142,7 +142,7 @@ def _rows(path: Path) -> Iterator[tuple[str, Mapping[str, str]]]:
         for row in rows:
             where = f"{path}, line {rows.line_num}"
             if None in row or None in row.values() or not row.keys() >= set(COLUMNS):
-                raise InputError("lacks a column, or has a column too many", where, _HINT)
+                raise InputError("this row has too few or too many columns", where, _HINT)
             yield where, row
     except csv.Error as error:
         raise InputError(f"is not a table: {error}", f"{path}, line {rows.line_num}", _HINT) from error

@@ -22,7 +22,7 @@ from .kinds import MeasureKind, kind_of
 from .regions import Refused
 from .surface import Found, PoseSurface
 
-_NO_DIRECTION = "the landmarks of the measure coincide or lie on a line"
+_NO_DIRECTION = "the landmarks of the measure lie at the same position or on a line"
 _DRAWN = 48  # places of a line along the surface that are kept, in each frame
 
 

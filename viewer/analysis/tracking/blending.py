@@ -86,7 +86,7 @@ def _between(
         return sides[0] if sides else one or other
     apart = sides[0].position - sides[1].position
     if (distance := float(np.linalg.norm(apart))) > bound:
-        return Sighting.gap(f"tracking forward and backward gives positions that are {distance:.3g} apart")
+        return Sighting.gap(f"the positions from tracking forward and backward differ by {distance:.3g}")
     spreads = np.array([np.trace(side.covariance) for side in reversed(sides)])  # each weighs by the other's
     weights = spreads / spreads.sum() if spreads.any() else np.full(2, 0.5)
     # Both look at the same points of this frame: their errors are taken to be the same ones.

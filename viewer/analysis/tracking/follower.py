@@ -207,7 +207,7 @@ class Follower:
         returned = wide.turn @ (self._back(surface, fine.position, wide.turn) - self._position)
         apart = float(np.linalg.norm(returned))
         if apart > self._bound:
-            raise _Lost(f"tracking forward and backward gives positions that are {apart:.3g} apart")
+            raise _Lost(f"the positions from tracking forward and backward differ by {apart:.3g}")
         between = fine.position - wide.position
         covariance = (
             _NOISE * fine.covariance
@@ -243,11 +243,11 @@ class Follower:
         self, patch: SurfacePatch, surface: MomentSurface, guesses: Iterator[Placement]
     ) -> Placement:
         """The wide patch on a surface, from the first guess from which it fits. Raises _Lost."""
-        reason = "tracking did not find the region around the landmark"
+        reason = "Scan4D did not find the surface around the landmark in this frame"
         for start in guesses:
             fit = registered(patch, surface, start, _WIDE[self._is_held], self._loose)
             if fit is None or fit.kept < self._settings.least_kept:
-                reason = "tracking found too little of the surface around the landmark"
+                reason = "Scan4D found too little of the surface around the landmark in this frame"
             elif fit.deviation > self._limit(_OFF_WIDE):
                 reason = "the surface around the landmark has a different shape"
             else:
@@ -274,7 +274,7 @@ class Follower:
             start = Placement(self._position, turn.T)
             back = registered(patch, self._own, start, _BACK[self._is_held], self._loose)
         if back is None or back.kept < self._settings.least_kept:
-            raise _Lost("tracking back to the earlier frame did not find the landmark again")
+            raise _Lost("tracking from this frame back to the earlier frame did not return to the landmark")
         if back.deviation > self._limit(_OFF_WIDE):
             raise _Lost("the surface around the landmark had a different shape")
         return back.position

@@ -392,7 +392,7 @@ def _exact(spot: SurfacePoint, pose: Pose) -> Sighting:
     """A spot in a pose of the same topology."""
     there = followed(spot, pose)
     if there is None:
-        return Sighting.gap("the frame lacks the points around the landmark")
+        return Sighting.gap("the points around the landmark are missing in this frame")
     spread = np.zeros((3, 3)) if there.spread is None else there.spread
     return Sighting(np.array(there.position), spread)
 

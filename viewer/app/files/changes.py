@@ -79,15 +79,15 @@ class Changes(WindowPart):
             self._look = in_background(Task("Looking for changes"), lambda: Seen.of(scan, files, last))
 
     def _offer(self, new: int) -> None:
-        """Offer to read the scan anew. new: how many files it has more."""
+        """Offer to read the scan again. new: how many files it has more."""
         scan = self.session.scan
         choices = {"Reload": lambda: self.open_scan(scan)}
         text = (
-            f"The scan has {new} more files on disk."
+            f"The scan has {new} new file{'s' * (new > 1)} on disk."
             if new > 0
-            else "Files of the scan have changed on disk."
+            else "Another program has changed files of the scan."
         )
-        self.note_of_scan(Offer(text.replace("1 more files", "1 more file"), choices, "changes"))
+        self.note_of_scan(Offer(text, choices, "changes"))
 
 
 def _stamp(path: Path) -> _Stamp:

@@ -47,7 +47,10 @@ class Dropping(WindowPart):
             return
         if recordings:
             names = ", ".join(Path(path).name for path in recordings)
-            self.note(f"Not opened: {names}. Drop a recording, a session or a picture alone to open it.")
+            self.note(
+                f"Scan4D did not open {names}. To open a recording, a session or a picture, drop only this "
+                "file."
+            )
         named = [path for path in paths if path not in recordings]
         if named:
             one = as_one_scan(named)

@@ -234,7 +234,9 @@ class FolderView:
         imgui.set_next_item_width(-1)
         returns = imgui.InputTextFlags_.enter_returns_true
         entered, self._text = widgets.edit_path("##path", self._text, returns)
-        widgets.tooltip("Folder, file, or pattern such as frame%04d.ply; Enter opens it")
+        widgets.tooltip(
+            "Type a folder, a file, or a pattern such as frame%04d.ply, and press Enter to open it"
+        )
         if entered:
             imgui.set_nav_cursor_visible(False)  # the next Enter is for the rows
             self._enter_text()
@@ -256,7 +258,7 @@ class FolderView:
     def draw_rows(self) -> None:
         """Declare the rows, in a window that scrolls."""
         if not self._rows:
-            nothing = f"No name contains '{self.filter}'." if self._all else self._nothing
+            nothing = f"No name in this folder contains '{self.filter}'." if self._all else self._nothing
             shown = "Reading ..." if self._listing else self._problem or nothing
             imgui.text_wrapped(printable(shown))
             return

@@ -296,7 +296,7 @@ def _draw_times(choices: FrameChoices) -> None:
     elif choices.times == FILE:
         widgets.dialog_label(
             "File of times",
-            "A table in this folder. Each row: a file name or an index, and its time in seconds",
+            "Table of times in this folder. Each row gives a file name or an index, and its time in seconds",
         )
         entered, name = widgets.edit_path("##file", choices.times_file)
         if entered and name.strip():
@@ -319,7 +319,9 @@ def _draw_files(choices: FrameChoices, height: float) -> None:
     imgui.table_next_row(imgui.TableRowFlags_.headers)
     imgui.table_next_column()
     toggled, is_used = imgui.checkbox(f"{_FILE}###all", len(choices.used) == len(choices.rows))
-    widgets.tooltip("Choose all files, or none. Shift and a click on a file choose several files.")
+    widgets.tooltip(
+        "Choose all files, or none. To choose several files, click the first, then Shift+click the last."
+    )
     if toggled:
         choices.use_all(is_used)
     for title in [*columns][1:]:

@@ -190,7 +190,7 @@ class Opener(WindowPart):
         if scan != self.session.scan:
             return
         self.abandon()
-        self.session.change("Start without the saved changes", bookmarks=(), parts={}, unread={})
+        self.session.change("Start without the saved work", bookmarks=(), parts={}, unread={})
         self._look_for_stored()
 
     def _pass_on_messages(self) -> None:
@@ -225,7 +225,10 @@ class Opener(WindowPart):
         named = {take.name: f"{take.name} ({take.frames})" for take in takes[:_MOST_TAKES]}
         named |= {ALL: "All"}
         choices = {title: partial(self.correct_reading, {"take": name}) for name, title in named.items()}
-        text = f"The folder holds {len(takes)} recordings (takes). Scan4D shows {shown}. Choose one, or all."
+        text = (
+            f"The folder holds {len(takes)} recordings (takes). Scan4D shows {shown}. Choose one recording, "
+            "or all recordings."
+        )
         return Offer(text, choices, "takes")
 
     def _has_moved(self, scan: str) -> bool:
@@ -238,7 +241,7 @@ class Opener(WindowPart):
             return False
         if saved is None or not saved.document.made:
             return False
-        problem = f"The scan '{printable(scan)}' is missing. Scan4D still has your work on this scan."
+        problem = f"Scan4D cannot find the scan '{printable(scan)}'. Scan4D still has your work on this scan."
         self.offer_to_locate(problem, Path(known_as(scan)).parent, partial(self.open_with, saved))
         return True
 

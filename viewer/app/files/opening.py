@@ -104,7 +104,9 @@ def begin(way: Way, check: Callable[[Timeline, int], int] = lambda _, first: fir
         if both == way.stated or way.must_correct:
             raise
         ours = opened(way.stated)
-        what = f"Scan4D cannot read the scan with its saved corrections, and reads it without them: {error}"
+        what = (
+            f"Scan4D cannot read the scan with the saved corrections, so it ignores the corrections: {error}"
+        )
         return ours._replace(problem=what)
 
 

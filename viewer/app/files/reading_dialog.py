@@ -81,7 +81,7 @@ class ReadingDialog(WindowPart):
         imgui.same_line()
         if imgui.button("Reset"):
             choices.reset()
-        widgets.tooltip("Leave all choices to Scan4D")
+        widgets.tooltip("Let Scan4D make all choices")
         imgui.same_line()
         leaves = imgui.button("Cancel") or imgui.is_key_pressed(imgui.Key.escape)
         if opens or leaves:

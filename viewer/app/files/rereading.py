@@ -90,7 +90,7 @@ class Rereading(WindowPart):
         fields: dict[str, object] = {"reading": dict(reading)}
         if "times" in corrections:
             fields |= {"fps": None, "times_by_names": False}
-        self._step = "Correct how the scan is read"
+        self._step = "Correct how Scan4D reads the scan"
         self.session.change(self._step, **fields)
 
     def advance(self, now: float) -> None:
@@ -101,7 +101,7 @@ class Rereading(WindowPart):
         if wanted in (self.opener.reading, self._asked) or (job.scan is not None and self._asked is None):
             return
         self._refits = self.steering.is_at_first
-        log.debug("reads the scan anew with %s", dict(wanted))
+        log.debug("reading the scan again with %s", dict(wanted))
         self.opener.reread()
         self._asked = wanted
 
@@ -113,9 +113,9 @@ class Rereading(WindowPart):
         if self.session.history.undoes == self._step:
             self.session.history.undo()
         if self.session.document.reading != self.opener.reading:
-            self.session.change("Take the correction back", reading=self.opener.reading)
+            self.session.change("Remove the correction", reading=self.opener.reading)
         why = problem.removeprefix(CANNOT_OPEN)
-        text = f"Scan4D cannot read the scan with this correction, and removes it: {why}"
+        text = f"Scan4D cannot read the scan with this correction, and removes the correction: {why}"
         if isinstance(problem, Offer):
             self.note_of_opening(Refusal(text, problem.choices, problem.about))
         else:

@@ -26,7 +26,7 @@ def offer_of_stored(scan: str, hash: Future[str | None], use: Callable[[SavedSes
     if not found:
         return ""
     named = [f"{printable(each.scan)} ({_made(each)})" for each in found]
-    gone = "" if os.path.lexists(found[0].scan) else ", which is no longer there"
+    gone = "" if os.path.lexists(found[0].scan) else ", which no longer exists"
     choices = {f"Use {_made(each)} of {_title(each.scan)}": partial(use, each) for each in found[::-1]}
     text = f"Scan4D has seen the files of this scan under another name: {'; '.join(named)}{gone}."
     return Offer(text, dict(reversed(choices.items())), _ABOUT)
@@ -41,15 +41,15 @@ def offer_of_change(saved: SavedSession, hash: Future[str | None], begin: Callab
     if hash.result() in (saved.hash, None):
         return ""
     text = (
-        "The files of the scan have changed since Scan4D saved your changes: bookmarks and distances may "
-        "no longer fit."
+        "The files of the scan have changed since Scan4D saved your work. Bookmarks and distances may no "
+        "longer fit the scan."
     )
     if not saved.document.made:
         return text
     with suppress(InputError):  # what is kept stays as it is, and a message says so when it is written
         set_aside(saved)
     kept = _made(saved)
-    choices = {f"Keep the {kept}": lambda: None, f"Begin without the {kept}": begin}
+    choices = {f"Keep the {kept}": lambda: None, f"Start without the {kept}": begin}
     return Offer(f"{text} The files may show another subject.", choices, _ABOUT)
 
 

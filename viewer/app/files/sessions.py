@@ -45,7 +45,10 @@ class Sessions(WindowPart):
     redraw: Callable[[], None]
 
     def __post_init__(self) -> None:
-        about = "Saves view, look, renderer, bookmarks, distances and landmarks, not the scan itself"
+        about = (
+            "A session stores view, look, renderer, bookmarks, distances and landmarks, but not the scan "
+            "itself"
+        )
         self.saving: FileDialog = FileDialog(SAVE, "Save session", about, (SUFFIX,), self._save, self.redraw)
         self.take_located: Callable[[str], object] | None = None
         self._files: dict[str, Path] = {}  # of scans, as `known_as` has them: saved to or opened from
@@ -88,7 +91,7 @@ class Sessions(WindowPart):
         if is_there(scan):
             self.open_with(session, scan)
             return
-        problem = f"{path.name}: its scan '{printable(session.scan)}' is missing."
+        problem = f"{path.name}: Scan4D cannot find the scan '{printable(session.scan)}' of this session."
         self.offer_to_locate(problem, path.parent, partial(self.open_with, session))
 
     def offer_to_locate(self, problem: str, folder: Path, take: Callable[[str], object]) -> None:

@@ -106,7 +106,7 @@ class Capture(WindowPart):
             entry = self.shown()
         except InputError as error:
             entry = None
-            self.note_of_work(Problem(f"This picture cannot be replayed: {error}"))
+            self.note_of_work(Problem(f"Scan4D cannot replay this picture: {error}"))
         legend = None
         if entry is not None:
             plain = entry.legend(self.playback.timeline, request.pose)
@@ -180,7 +180,7 @@ class Capture(WindowPart):
             words = failure_in_words("Saving the recording", error)
             if journal is not None:
                 journal.leave()
-                words += " Scan4D keeps the recorded part, and saves this part at the next start."
+                words += " Scan4D keeps what it has recorded, and saves the recording at the next start."
             self.note_of_work(Problem(words))
             return
         if journal is not None:
@@ -220,8 +220,8 @@ class Capture(WindowPart):
     def _tell_unsafe(self, error: OSError) -> None:
         what, _ = explained(error)
         self.note_of_work(
-            "Scan4D keeps the recording only in memory until you stop it, because it cannot write to "
-            f"{journal_folder()}: {what}."
+            f"Scan4D cannot write to {journal_folder()}: {what}. Until you stop the recording, Scan4D "
+            "keeps it only in memory."
         )
 
     def find_unfinished(self) -> None:

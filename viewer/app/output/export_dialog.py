@@ -101,7 +101,9 @@ def _edit_format(choices: Choices, even_rate: float, problems: dict[str, str]) -
     widgets.label("Format", _HELP["format"])
     choices = replace(choices, format=widgets.combo("format", choices.format, list(_FORMATS), _FORMATS))
     if choices.format == MP4 and choices.what == FRAMES:
-        widgets.label("Frame times", "As in the scan: each frame stays until the time of the next")
+        widgets.label(
+            "Frame times", "As in the scan: the film shows each frame until the time of the next frame"
+        )
         now = EVEN if choices.fps is not None else AS_SCAN
         chosen = widgets.combo("times", now, list(_TIMES), _TIMES)
         if chosen != now:
@@ -121,8 +123,8 @@ def _edit_size(choices: Choices, of_view: tuple[int, int] | None, problems: dict
     now = f"{choices.width}x{choices.height}"
     widgets.label(
         "Size",
-        "Width and height in pixels. If the proportions differ from the view's, the picture shows "
-        "more or less at the sides",
+        "Width and height in pixels. If the proportions differ from the view's, the picture shows more "
+        "or less of the scan at the sides",
     )
     chosen = widgets.combo("size", now if now in titles else "Other", list(titles), titles)
     if chosen in titles and chosen != now:

@@ -39,14 +39,15 @@ class Choices:
     what: str = param(VIEW, "What to export", choices=(VIEW, TURNTABLE, FRAMES))
     pictures: int = param(36, "Number of pictures in one turn", low=2, high=_MOST_PICTURES)
     first: int = param(1, "First frame to export")
-    last: int | None = param(None, "Last frame to export; auto: the scan's last", type=int)
+    last: int | None = param(None, "Last frame to export; auto: the last frame of the scan", type=int)
     step: int = param(
         1, "Which frames to export. 1: every frame; 2: every second frame; and so on", low=1, high=100_000
     )
     format: str = param(PNG, "File format", choices=(PNG, EXR, MP4))
     fps: float | None = param(
         None,
-        "Frames per second of a film with an even rate; auto: each frame stays until the next one's time",
+        "Frames per second of a film with a constant rate; auto: the film shows each frame until the "
+        "time of the next frame",
         low=FRAME_RATES[0], high=FRAME_RATES[1], type=float,
     )  # fmt: skip
     width: int = param(1920, "Pixels", low=1, high=_MOST_PIXELS)
@@ -118,7 +119,9 @@ def problems(choices: Choices, times: NDArray[np.float64], most_pixels: int) -> 
         except InputError as error:
             found[parameter.name] = error.what
     if "width" not in found and "height" not in found and choices.width * choices.height > most_pixels:
-        found["height"] = f"More than the {most_pixels:,} pixels that the graphics driver can draw"
+        found["height"] = (
+            f"Choose a smaller size: the graphics driver can draw at most {most_pixels:,} pixels"
+        )
     if choices.what == FRAMES:
         last = count if choices.last is None else choices.last
         if not 1 <= choices.first <= count:

@@ -157,7 +157,7 @@ class Replayer(WindowPart):
             self._show(entry, timeline.drawn(entry.pose))
             replaying.next, replaying.since = replaying.next + 1, None
         elif entry.pose in timeline.broken or entry.pose >= len(timeline):
-            self.note(f"{frame_in_words(entry.pose).capitalize()} cannot be shown: Scan4D skips it.")
+            self.note(f"Scan4D cannot show {frame_in_words(entry.pose)}, and skips this frame.")
             replaying.next += 1
         elif (pose := timeline.ready(entry.pose)) is None:
             timeline.request(entry.pose)
@@ -212,7 +212,7 @@ class Replayer(WindowPart):
             replaying.located[scan], replaying.asked = path, None
             self._begin(replaying)
 
-        problem = f"{replaying.path.name}: its scan '{printable(scan)}' is missing."
+        problem = f"{replaying.path.name}: Scan4D cannot find the scan '{printable(scan)}' of this recording."
         self.offer_to_locate(problem, replaying.path.parent, take)
 
     def _show(self, entry: Entry, pose: Pose) -> None:

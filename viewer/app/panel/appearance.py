@@ -129,7 +129,9 @@ def idle_parameters(look: Look, pose: Pose, is_here: bool, why_unlit: str) -> di
     has_own = pose.overview.colors is not None
     idle = {}
     if has_own and (look.color_by in ("auto", "own") or not is_here):
-        idle["plain"] = "The scan has its own colours. For one colour, choose Single colour above"
+        idle["plain"] = (
+            "The scan has its own colours. To show one colour instead, choose 'Single colour' above"
+        )
     elif is_here and look.color_by not in ("auto", "own", "plain", "level"):
         shown = COLOR_WORDS.get(look.color_by, printable(look.color_by)).lower()
         idle["plain"] = f"This setting has no effect while the colours show {shown}"

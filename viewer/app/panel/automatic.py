@@ -64,7 +64,7 @@ def _edit_goal(goal: Goal, unit: str, footprint: float | None) -> Goal:
     scan is, in it; None while that is not known."""
     lengths = sorted({unit, goal.unit} - {PIXELS, "ms"})
     words = {"ms": "Time", PIXELS: "Error in pixels"} | {each: f"Error in {each}" for each in lengths}
-    widgets.label("Limit", "What to limit: the drawing time of a picture, or its error")
+    widgets.label("Limit", "Whether to limit the drawing time or the error of a picture")
     kind = widgets.combo("bound", goal.unit, list(words), words)
     if kind != goal.unit:
         first = _FIRST_ERROR if kind == PIXELS else float(f"{_FIRST_ERROR * (footprint or 1.0):.2g}")
@@ -95,8 +95,7 @@ def _draw_choice(choosing: Choosing) -> None:
     )
     widgets.fact("90 % within", f"{bounded:.2g} {comparison.goal.unit}")
     widgets.tooltip(
-        "Nine of ten pictures are expected to stay within the shown value. Scan4D compares the value with "
-        "your limit"
+        "Nine of ten pictures should stay within this value. Scan4D compares this value with your limit"
     )
     if measured is not None:
         widgets.fact("Last picture", f"{measured:.3g} ms")

@@ -22,7 +22,7 @@ from ..files.table_dialog import READ_TABLE, TableDialog
 from ..part import Section, WindowPart
 from ..ui import Ui
 
-_MARKED = "Scan4D assumes this value. If the value is wrong, what you measure may be wrong too."
+_MARKED = "Scan4D assumes this value. If the value is wrong, your measurements may be wrong too."
 _AUTOMATIC, _OTHER = "Automatic", "Other..."
 _MOST_FACTS = 4  # of one kind, such as files left aside
 _MOST_NAMED = 20  # entries of a tooltip
@@ -125,7 +125,7 @@ class ReadingSection(WindowPart):
     def _draw_field(self, key: str) -> None:
         """Declare the field that the user types a value into."""
         text = self._field.draw(-1)
-        widgets.tooltip(f"Type {CORRECTED[key].form}. Press Enter to read the scan with it.")
+        widgets.tooltip(f"Type {CORRECTED[key].form}. Press Enter to read the scan with this value.")
         if text is not None and text.strip():
             self._correct(key, text.strip())
 
@@ -164,7 +164,7 @@ def words_on_assumed(record: Reading) -> str:
     """Words on the assumptions that can change a number; empty where there is none."""
     if not (marks := record.marks()):
         return ""
-    warning = "If a value is wrong, what you measure may be wrong too."
+    warning = "If a value is wrong, your measurements may be wrong too."
     return "\n".join(
         ["Scan4D assumes:", *marks, warning, "Change a value in the section 'How this was read'."]
     )
@@ -205,7 +205,7 @@ def other_facts(record: Reading) -> list[OtherFact]:
                   _listed(names))
         for why, names in files.items()
     ]  # fmt: skip
-    help = "The file contains these data, but Scan4D does not use them"
+    help = "The file also contains these data, which Scan4D does not use"
     unused = [OtherFact("Not used", text, help) for text in record.unused]
     help = "This frame contradicts what Scan4D decided for the whole scan"
     contradictions = [

@@ -124,7 +124,7 @@ class ScanSection(WindowPart):
             if imgui.button(widgets.labelled(f"Set to {_PLURALS[guess[0]]}?", "accept"), ImVec2(-1, 0)):
                 chosen = guess[0]
             widgets.tooltip(
-                f"If the unit is {guess[0]}, the scan is as large as {guess[1]}. Click to set this unit."
+                f"With the unit {guess[0]}, the scan has the size of {guess[1]}. Click to set this unit."
             )
         if chosen != (document.unit or _OWN):
             self.session.change("Set the unit", unit=None if chosen == _OWN else chosen)
@@ -156,7 +156,8 @@ class ScanSection(WindowPart):
             return
         widgets.label(
             "Frame rate",
-            "Frames per second of the scan. Press Enter to set the rate. Scan4D remembers it for this scan.",
+            "Frames per second of the scan. Press Enter to set the rate. Scan4D remembers the rate for "
+            "this scan.",
         )
         entered, rate = imgui.input_float(
             "##rate", pacing.rate, format="%.4g Hz", flags=imgui.InputTextFlags_.enter_returns_true.value

@@ -27,7 +27,8 @@ class ViewsSection(WindowPart):
         """Declare it."""
         widgets.label(
             "Projection",
-            "Perspective: near things look larger. Orthographic: sizes are comparable at any depth",
+            "Perspective: nearer objects look larger. Orthographic: an object has the same size at any "
+            "distance",
         )
         camera = self.session.document.camera
         now = camera.projection if camera else PROJECTIONS[0]

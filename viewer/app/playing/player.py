@@ -19,9 +19,11 @@ class Pace:
 
     speed: float = param(1.0, "Speed of playback, 1 is real time", low=SPEEDS[0], high=SPEEDS[-1])
     reverse: bool = param(False, "Play backward")
-    loop: bool = param(True, "After the last frame, start again at the first")
+    loop: bool = param(True, "Start again at the first frame after the last frame")
     every_frame: bool = param(
-        False, ("Show every frame, even if playback gets slower. If off, Scan4D skips late frames")
+        False,
+        "Show every frame, even if playback gets slower. If this option is off, Scan4D skips frames "
+        "that are late",
     )
 
     @property

@@ -117,9 +117,13 @@ class TimelineBar(WindowPart):
         """Declare how it plays."""
         pace, accent = self.session.pace, self.window_look.palette.accent
         for icon, name, about in (
-            (icons.ICON_FA_ARROW_ROTATE_RIGHT, "loop", ": after the last frame, start again"),
+            (
+                icons.ICON_FA_ARROW_ROTATE_RIGHT,
+                "loop",
+                ": start again at the first frame after the last frame",
+            ),
             (icons.ICON_FA_BACKWARD, "reverse", ""),
-            (icons.ICON_FA_FILM, "every_frame", ": show each frame, even if playback gets slower"),
+            (icons.ICON_FA_FILM, "every_frame", ": show every frame, even if playback gets slower"),
         ):
             self._draw_button(icon, name, accent if getattr(pace, name) else None, about)
         imgui.set_next_item_width(_SPEED_WIDTH * imgui.get_font_size())

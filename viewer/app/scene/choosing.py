@@ -137,7 +137,7 @@ class Choosing(WindowPart):
         self.comparison = self.choice = None
         try:
             if not known:
-                raise InputError("none of the renderers that were measured on this device can draw this scan")
+                raise InputError("no renderer with measured times on this device can draw this scan")
             self.comparison = Comparison.of(known, seen, in_unit(goal, unit), self._model)
         except InputError as error:
             self.problem = error.what
@@ -177,7 +177,7 @@ class Choosing(WindowPart):
         """Tell, once until it is over, that pictures take far longer than the limit."""
         before, ms = self.overrun, self.measured_ms
         is_over = goal.kind == "time" and ms is not None and ms > _OVER * goal.bound
-        busy = "This computer is busy, or slower than when it was measured (scan4d bench --calibrate)."
+        busy = "The computer is busy, or slower than when 'scan4d bench --calibrate' measured it."
         self.overrun = f"Pictures take {ms:.0f} ms; the limit is {goal}. {busy}" if is_over else ""
         if self.overrun and not before:
             self.note_of_scan(self.overrun)

@@ -114,7 +114,7 @@ class Steering(WindowPart):
         shown = np.abs(framed.places_in_picture(motion.points(pose.sample + pose.origin)))
         if self.framing.subject(pose) is not None and not (shown <= (self.viewport.aspect / 2, 0.5)).all():
             self.note_of_scan(
-                "The view shows what the depth camera looks at. Zoom out to see the rest of the scan."
+                "The view shows the area in front of the depth camera. Zoom out to see the rest of the scan."
             )
         self.session.change("Fit", camera=framed, pivot=None)
 
@@ -235,7 +235,7 @@ class Steering(WindowPart):
                 look = replace(self.session.document.look, up=pose.upright.up)
                 self.session.amend(look=look, front=pose.upright.front)
                 if pose.upright.up != UP:
-                    guess = f"{pose.upright.up} is up: {pose.upright.why}"
+                    guess = f"{pose.upright.up} points up, because {pose.upright.why}"
                     self.note_of_scan(
                         f"Scan4D assumes that {guess}. You can change the up axis below the orientation cube."
                     )

@@ -34,7 +34,7 @@ from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from .values import VALUES, give_value
 
 _HIDDEN_COPIES = (
-    "the search takes visible copies of a point as one neighbour, but hidden copies as several neighbours"
+    "the search for neighbours counts visible copies of a point once, but hidden copies several times"
 )
 
 _FEW = 200  # points
@@ -54,7 +54,7 @@ class Params:
     k: int = param(
         10,
         "Number of points in a neighbourhood, including the point itself. A larger number smooths noise, "
-        "a smaller one keeps detail",
+        "and a smaller number keeps detail",
         low=3,
         high=MOST_NEIGHBORS,
         sweep=(6, 10, 20),
@@ -64,8 +64,8 @@ class Params:
     )
     adaptive: bool = param(
         True,
-        "Fit each normal to as few of the k neighbours as the noise allows, and to more points if the points "
-        "are very noisy",
+        "Compute each normal from as few of the k neighbours as the noise allows, and from more points "
+        "if the scan is very noisy",
         group=_NEIGHBORS,
         sweep=(True, False),
     )
@@ -75,7 +75,7 @@ class Params:
         group=_NEIGHBORS,
     )
     outliers: bool = param(
-        False, "Show outliers: points without close neighbours", key="Shift+O", group=_NEIGHBORS
+        False, "Show outliers, which are points without close neighbours", key="Shift+O", group=_NEIGHBORS
     )
     expansions: int = param(
         3,
@@ -87,15 +87,15 @@ class Params:
     )
     growth: float = param(
         4.0,
-        "Factor by which the search area can grow without reaching another point, for the search to "
-        "stop with fewer than k neighbours",
+        "If the search area grows by this factor without reaching another point, the search ends with "
+        "fewer than k neighbours",
         low=1,
         high=100,
         group=_NEIGHBORS,
     )
     orient: str = param(
         "eye",
-        "Where normals point: towards the viewer, or towards the scanner that measured the point",
+        "Direction of normals. eye: towards the viewer; scanner: towards the scanner that measured the point",
         choices=("eye", "scanner"),
         group=_NEIGHBORS,
     )
@@ -108,7 +108,8 @@ class Params:
     surface: str = surface_param("local", _SPLATS)
     elliptical: bool = param(
         False,
-        "Stretch splats along the direction in which neighbours lie farther apart; off: round splats",
+        "Draw elliptical splats, which are longer in the direction where neighbours lie farther apart; "
+        "off: round splats",
         group=_SPLATS,
     )
     radius_scale: float = param(
@@ -122,13 +123,13 @@ class Params:
     )
     refine: bool = param(
         True,
-        "Shrink the splats of hidden points to the size of the splats in front, so that they do not show "
-        "beyond outlines",
+        "Shrink the splats of hidden points to the size of the splats in front, so that hidden splats do "
+        "not extend beyond outlines",
         group=_SPLATS,
     )
     cull: bool = param(
         True,
-        "Skip points far behind the nearest points around them, until a picture needs the skipped points",
+        "Skip points far behind the nearest points, until a picture needs the skipped points",
         affects="speed",
         group=_SPEED,
     )
@@ -156,13 +157,15 @@ class AutoSplats(Backend):
         "collinear points, viewed along their line, orthographic": Limit(0.001, NO_SPACING),
     }
     default_reasons = {
-        "adaptive": "the default improves normals of other scans: 1.3° instead of 1.4° on the bunny, 2.6° "
-        "instead of 3.1° on the armadillo",
+        "adaptive": "the default improves the normals of other scans: the error is 1.3° instead of 1.4° "
+        "on the "
+        "bunny, and 2.6° instead of 3.1° on the armadillo",
         "hidden_neighbors": "the default improves outlines of other scans: it draws "
         "1.2 % instead of 1.8 % of the silhouette's area outside the silhouette on the bunny, and "
         "2.2 % instead of 3.0 % on the armadillo",
-        "instancing": "on software drivers auto means tiles, so the measured difference is "
-        "noise; on graphics cards auto means the fastest method",
+        "instancing": "with a software driver, auto is the same as tiles, so the measured difference is "
+        "noise; with "
+        "a graphics card, auto is the fastest method",
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
@@ -206,7 +209,7 @@ class AutoSplats(Backend):
             found.find_late(pose, surface, search)
         if search.widening > 1:
             surface.stats.chosen["adaptive"] = (
-                f"balls of {search.widening:.2g} radii, because points are noisy"
+                f"fitted to all points within {search.widening:.2g} radii, because the points are noisy"
             )
         left = _LEFT if is_moved else 1.0
         layer = layer_of(pose, frame, surface, blends=params.passes == "two", left=left)

@@ -160,7 +160,7 @@ class Neighborhoods:
         made_of = (view.key, search, share, border)
         if not anew and self._pose is not None and self._pose() is pose and self._made_of == made_of:
             surface.stats.skipped["neighborhoods"] = (
-                "points, camera and settings of the search have not changed since the last picture"
+                "the points, the camera and the settings of the search are the same as for the last picture"
             )
             return
         self._made_of, self._pose = None, weakref.ref(pose)
@@ -306,7 +306,7 @@ class Neighborhoods:
             if self._find_usual(search) <= _LARGEST_CROWD:
                 break
         if search.hidden_neighbors and not hidden:
-            surface.stats.skipped["hidden neighbours"] = "too many points would take part in the search"
+            surface.stats.skipped["hidden neighbours"] = "the search for neighbours would use too many points"
         if self.participants < search.k:  # an outlier is far from others, of which there are none
             self._grids = replace(grids, alone=UNKNOWN)
 

@@ -33,8 +33,8 @@ from .encoder import encode_points
 from .engine import Sheet, WordBuffers, draw_bands
 
 _HELD = (
-    "code words store positions, shapes, depths and colours in steps: a rounding difference can move "
-    "a value by a whole step, and added points move the steps"
+    "code words store positions, shapes, depths and colours as whole steps: rounding can change a value "
+    "by one step, and added points change the steps"
 )
 _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
 
@@ -45,8 +45,8 @@ class Params(settings.Params):
 
     lighting: str = param(
         "common",
-        "common: the colours and light of all renderers; own: Phong lighting in integers with a "
-        "palette of materials, one colour per disc",
+        "How discs are lit. common: with the colours and light of all renderers; own: with Phong "
+        "lighting in whole numbers, from a table of materials, with one colour per disc",
         choices=("common", "own"),
         sweep=("common", "own"),
         group="Light",
@@ -57,7 +57,7 @@ class CodeWords(Backend):
     """The backend `codeword`."""
 
     title = "Code words"
-    good_for = "For research: discs from compact tables"
+    good_for = "For research: draws discs from compact tables"
     params_class = Params
     limits = {
         "the near plane inside the scan": Limit(0.0, _HELD, _OF_PALETTE),

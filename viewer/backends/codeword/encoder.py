@@ -135,7 +135,7 @@ def encode_points(
     line_starts = gpu.read(starts, np.uint32, lines + 1)
     if (total := int(line_starts[-1])) > MOST_WORDS or 8 * total > gpu.max_storage_bytes:
         raise InputError(
-            f"one picture would need {total:,} code words",
+            f"one picture would need {total:,} code words, which is too many",
             hint="Move the camera away, or draw smaller splats with radius_scale",
         )
     with gpu.timers.measure("encode"):

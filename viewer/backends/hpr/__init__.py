@@ -75,9 +75,9 @@ class Params:
     surface: str = surface_param("local", _SHOWN, when={"output": ("splats",)})
     mode: str = param(
         MODES[0],
-        "hull: a point is visible if it lies on the convex hull of the flipped points; combined: a "
-        "point is visible if no disc around another point covers it. combined shows more points in "
-        "folds and hides more points behind gaps",
+        "Test for visible points. hull: a point is visible if it lies on the convex hull of the flipped "
+        "points; combined: a point is visible if no disc around another point covers it. 'combined' "
+        "shows more points in folds, and hides more points behind gaps",
         choices=MODES,
         title="Visibility test",
         basic=True,
@@ -85,7 +85,7 @@ class Params:
     )
     quality: float = param(
         QUALITY,
-        "Number of sectors, as a factor on the number that would leave half of them empty",
+        "Number of sectors, as a multiple of the number at which half of the sectors are empty",
         title="Sector density",
         low=0.05,
         high=64,
@@ -96,8 +96,8 @@ class Params:
     )
     depth: float = param(
         DEPTH,
-        "How far a point may lie behind a surface and still be shown, in point spacings. A larger "
-        "value shows deeper folds, but also more of what lies behind gaps",
+        "How far a point may lie behind a surface and still be shown, in point spacings. A larger value "
+        "shows deeper folds, but also more points behind gaps",
         low=1e-3,
         high=1e6,
         title="Depth tolerance",
@@ -108,8 +108,8 @@ class Params:
     )
     radius: float | None = param(
         None,
-        "Radius of the sphere that flips the points, as a factor on the distance of the farthest "
-        "point; auto: from the depth and the density of the points",
+        "Radius of the sphere that flips the points, as a multiple of the distance of the farthest "
+        "point; auto: computed from the depth and density of the points",
         type=float,
         low=1,
         high=1e9,
@@ -118,7 +118,7 @@ class Params:
     )
     sectors: int | None = param(
         None,
-        "Number of sectors; auto: from the sector density",
+        "Number of sectors; auto: computed from the sector density",
         type=int,
         low=1,
         high=MOST_SECTORS,
@@ -127,8 +127,8 @@ class Params:
     )
     steps: int | None = param(
         None,
-        "Number of neighbouring sectors in which a point can replace others; auto: as many as lie "
-        "between visible points",
+        "Number of neighbouring sectors in which a point can replace other points; auto: the number of "
+        "sectors between visible points",
         type=int,
         low=0,
         high=UNLIMITED,
@@ -146,7 +146,7 @@ class VisiblePoints(Backend):
     """The backend `hpr`."""
 
     title = "Visible points"
-    good_for = "Hides points on the far side"
+    good_for = "Hides the points on the far side of the scan"
     params_class = Params
     blends = True
     fills = True

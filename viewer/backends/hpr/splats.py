@@ -68,7 +68,7 @@ class SectorSplats:
         seen: knows which points are visible. calibration: says how densely they lie.
         """
         if self._map is not None and self._state is seen.state:
-            surface.stats.skipped["splats"] = "the visible points have not changed since the last picture"
+            surface.stats.skipped["splats"] = "the visible points are the same as in the last picture"
             return self._map
         sectors = calibration.sectors
         most = math.isqrt(_MOST_SECTORS * sectors.edge**2 // sectors.count)

@@ -43,22 +43,26 @@ class Params:
     )
     bands: str = param(
         "picture",
-        "What the bands are computed from. picture: from the picture that each view gives; capture: "
-        "from the captured image, whose samples are drawn as Gaussians",
+        "Images that Scan4D divides into bands. picture: each view, as the picture shows it; capture: "
+        "the captured range image, with samples drawn as Gaussians",
         choices=("picture", "capture"),
         group=_BANDS,
         sweep=("picture", "capture"),
     )
     kernel: str = param(
         "5x5",
-        "Filter that makes coarser levels. 5x5: Burt and Adelson's; 3x3: a Gaussian with a sigma of "
-        "0.5 samples",
+        "Filter that computes coarser levels. 5x5: the filter of Burt and Adelson; 3x3: a Gaussian with "
+        "a sigma of 0.5 samples",
         choices=tuple(FILTERS),
         group=_BANDS,
         sweep=("5x5", "3x3"),
     )
     detail: float = param(
-        1.0, "Factor on the finest band: above 1 sharpens, below 1 softens", low=0, high=4, group=_BANDS
+        1.0,
+        "Factor on the finest band: a value above 1 sharpens the picture, a value below 1 softens it",
+        low=0,
+        high=4,
+        group=_BANDS,
     )
     weights: str = param(
         "mixed",
@@ -70,26 +74,27 @@ class Params:
     )
     light: str = param(
         "logarithm",
-        "Scale of the colours in the bands. logarithm: a brighter view differs only by a constant; "
-        "linear: the light itself",
+        "Scale of the colours in the bands. logarithm: logarithmic, so that a brighter view differs only "
+        "by a constant; linear: proportional to the light",
         choices=("logarithm", "linear"),
         group=_BANDS,
         sweep=("logarithm", "linear"),
     )
     tolerance: float = param(
         4.0,
-        "Largest distance between surfaces of two views that are merged, in sample spacings",
+        "Largest distance between the surfaces of two views that Scan4D merges, in sample spacings",
         low=0,
         high=100,
         unit="samples",
         group=_VIEWS,
     )
-    cull_back: bool = param(False, "Leave out surfaces of range images seen from behind", group=_VIEWS)
+    cull_back: bool = param(
+        False, "Leave out surfaces of range images that the view shows from behind", group=_VIEWS
+    )
     quality: str = param(
         "fast",
-        "How to read a range view where its samples lie closer together than the pixels. fast: one "
-        "value per pixel, interpolated between two levels; fine: four values per pixel, from a finer "
-        "level",
+        "How to read a range view whose samples lie closer together than the pixels. fast: one value per "
+        "pixel, interpolated between two levels; fine: four values per pixel, from a finer level",
         choices=("fast", "fine"),
         title="Texture sampling",
         group=_VIEWS,
@@ -98,7 +103,7 @@ class Params:
     )
     fill: bool = param(
         True,
-        "Fill holes from coarser levels of the picture",
+        "Fill holes with values from coarser levels of the picture",
         key="H",
         group=_LEVELS,
         title="Fill holes",

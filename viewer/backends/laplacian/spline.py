@@ -98,13 +98,13 @@ def spline_views(surface: Surface, source: ViewSource, channels: Sequence[str], 
     if not colored:
         surface.stats.skipped["bands"] = "views have no colours"
     elif not merges:
-        surface.stats.skipped["bands"] = "only one view is in the picture"
+        surface.stats.skipped["bands"] = "the picture shows only one range view"
     if len(views) < 2 and not (merges or sharpens or (colored and bands.fine)):
         return
     size = surface.size
     if 16 * size[0] * size[1] > surface.gpu.max_storage_bytes:
         raise InputError(
-            f"a picture of {size[0]}x{size[1]} pixels is too large to merge views in on this driver",
+            f"this graphics driver cannot merge views in a picture of {size[0]}x{size[1]} pixels",
             hint="Use a smaller --size, or --backend pyramidal",
         )
     spline = _Spline(surface, source, channels, bands)

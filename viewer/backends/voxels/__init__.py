@@ -49,7 +49,7 @@ class Params:
 
     stop: str = param(
         "delta",
-        "When to stop dividing octants. delta: when nearly every position has an octant of its own; "
+        "When Scan4D stops dividing octants. delta: when nearly every position has its own octant; "
         "depth: at a fixed level; occupancy: when an octant holds few points",
         choices=STOPS,
         affects="derive",
@@ -57,7 +57,7 @@ class Params:
     )
     delta: float = param(
         0.05,
-        "Share of the positions that may lie in one octant with other positions",
+        "Share of the positions that may lie in the same octant as other positions",
         low=0,
         high=1,
         affects="derive",
@@ -85,8 +85,9 @@ class Params:
     )
     shape: str = param(
         "discs",
-        "How octants are drawn. discs: at the mean position, facing along the mean normal; cubes: "
-        "cubes lit by the mean normal; flat_cubes: cubes lit by the normals of their faces",
+        "Shape of octants in the picture. discs: a disc at the mean position, perpendicular to the mean "
+        "normal; cubes: a cube with the light of the mean normal; flat_cubes: a cube with the light of "
+        "its faces",
         choices=("discs", *_CUBES),
         words={"discs": "Pieces of the surface", "cubes": "Cubes", "flat_cubes": "Flat cubes"},
         basic=True,
@@ -95,7 +96,7 @@ class Params:
     )
     radius_scale: float = param(
         1.0,
-        "Factor on the radius of discs. 1 closes the surface",
+        "Factor on the radius of discs. With 1, discs form a closed surface",
         low=0.01,
         high=100.0,
         sweep=(0.8, 1.0),
@@ -104,8 +105,8 @@ class Params:
     )
     passes: str = param(
         "auto",
-        "one: show the nearest disc; two: blend the nearest disc with those close behind it; auto: two, "
-        "or one if two is too slow in motion",
+        "one: show the nearest disc; two: blend the nearest disc with the discs close behind it; auto: "
+        "two, or one if two is too slow in motion",
         choices=("auto", "one", "two"),
         sweep=("auto", "one"),
         group="Octants",
@@ -114,9 +115,8 @@ class Params:
     surface: str = surface_param("local", "Octants", when={"shape": ("discs",)})
     least: float = param(
         0.75,
-        "Smallest half edge of a cube, in radii of the disc that would replace it. Larger cubes "
-        "close the surface;"
-        " 0: the exact octant",
+        "Smallest half edge of a cube, in radii of the disc that would replace it. Larger cubes leave "
+        "fewer gaps; 0: the exact size of the octant",
         low=0.0,
         high=10.0,
         group="Octants",
@@ -134,7 +134,8 @@ class Params:
     )
     pixel_threshold: float = param(
         1.0,
-        "Largest edge, in pixels, of an octant that is drawn instead of its children",
+        "Scan4D draws an octant instead of its children if the edge of the octant is at most this many "
+        "pixels",
         low=0.25,
         high=64.0,
         unit="px",
@@ -145,9 +146,9 @@ class Params:
     )
     instancing: str = param(
         "auto",
-        "How the GPU draws octants. auto: the fastest way on this device; tiles: in a compute shader, or "
-        "as faces if cubes are small; the others use a geometry shader, uniform blocks, buffer textures, "
-        "vertex attributes or pulled vertices",
+        "Method by which the GPU draws octants. auto: the fastest method on this device; tiles: a "
+        "compute shader, which draws small cubes as faces. The other methods use a geometry shader, "
+        "uniform blocks, buffer textures, vertex attributes or pulled vertices",
         choices=("auto", *VARIANTS),
         affects="speed",
         group="Speed",
@@ -158,7 +159,7 @@ class Voxels(Backend):
     """The backend `voxels`."""
 
     title = "Voxels"
-    good_for = "For large scans: coarser where the scan is far away"
+    good_for = "For large scans: draws distant parts of the scan coarser"
     params_class = Params
     rows = "octants"
     blends = True
@@ -188,10 +189,12 @@ class Voxels(Backend):
         ),
     }
     default_reasons = {
-        "cull_back": "the camera can see the inside of an open scan: without octants that face "
-        "away, 1.5 % of the pixels of the bunny, which has no base, would show the background",
-        "radius_scale": "with a radius_scale of 0.8, gaps between discs stay open: 0.1 % of "
-        "the pixels of the armadillo, and 1 % of a dancing body",
+        "cull_back": "the camera can see the inside of an open scan: without octants that face away, 1.5 "
+        "% of the "
+        "pixels of the bunny would show the background, because the bunny has no base",
+        "radius_scale": "with a radius_scale of 0.8, gaps remain between discs: in 0.1 % of the pixels of "
+        "the "
+        "armadillo, and in 1 % of the pixels of a dancing body",
     }
 
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:

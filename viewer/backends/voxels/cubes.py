@@ -40,7 +40,7 @@ def draw_cubes(points: Points, surface: Surface, instancing: str) -> None:
         surface.stats.chosen["instancing"] = "scatter"
     if large is None:
         surface.stats.skipped["splat"] = (
-            "all voxels are smaller than a pixel, so each one is written to its pixel"
+            "all voxels are smaller than a pixel, so Scan4D writes each voxel to a single pixel"
         )
     else:
         feed = instancing_for(surface, "auto", "gs", "voxels", _OF_SOME, _variants)

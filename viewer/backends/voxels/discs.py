@@ -44,7 +44,9 @@ def draw_discs(
     if share > 0:
         splats = _splats(radius_scale, share)
     if share > 0 and (variant == TILES or instancing == "auto"):
-        surface.stats.skipped["tiles"] = "discs are smaller than a pixel, so each one is written to its pixel"
+        surface.stats.skipped["tiles"] = (
+            "discs are smaller than a pixel, so Scan4D writes each disc to a single pixel"
+        )
         splat_subpixel(points, surface, splats)
     else:
         _draw(points, surface, splats, variant, two=False)

@@ -394,7 +394,7 @@ def _inline(path: Path) -> str:
             image.convert("RGB").save(stream, "webp", quality=75, method=4)
     except OSError as error:
         raise InputError(
-            f"is not a picture: {error}", path, "Remove this file, or run the benchmark again"
+            f"is not a picture: {error}", path, "Delete this file, or run the benchmark again"
         ) from error
     return f"data:image/webp;base64,{base64.b64encode(stream.getvalue()).decode()}"
 

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 PANELS = (
     "reference",
     "backend",
-    "signed depth difference in pixel footprints (holes magenta, pixels outside the true outline yellow)",
+    "signed depth difference in pixel footprints; magenta: holes; yellow: pixels outside the true outline",
     "angle between the normals",
-    "largest colour difference of the channels",
+    "largest colour difference over all channels",
 )
 
 Image = NDArray[np.uint8]  # (H, W, 3)

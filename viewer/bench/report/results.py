@@ -65,27 +65,35 @@ COSTS = [
     Metric("gpu_ms", "ms", "time of one picture on the GPU, median over the views"),
     Metric("cpu_ms", "ms", "wall time of the call that draws one picture, median over the views"),
     Metric("busy_ms", "ms", "processor time of all threads to draw one picture, median over the views"),
-    Metric("prepare_ms", "ms", "derive_ms + upload_ms: once for each pose, before the first picture"),
+    Metric(
+        "prepare_ms", "ms", "derive_ms + upload_ms: time to prepare a pose once, before its first picture"
+    ),
     Metric("derive_ms", "ms", "time to derive data from a pose on the CPU"),
     Metric("upload_ms", "ms", "time to upload a pose and its derived data to the GPU"),
     Metric("bytes_gpu", "bytes", "memory on the GPU for one pose and its picture"),
     Metric("peak_rss", "bytes", "peak memory of the process"),
 ]
 _ERRORS = [
-    Metric("hole_percent", "%", "share of the true silhouette that the picture leaves empty"),
-    Metric("through_percent", "%", "share of the true silhouette that shows a farther layer"),
+    Metric("hole_percent", "%", "share of the true silhouette in which the picture is empty"),
+    Metric("through_percent", "%", "share of the true silhouette in which the picture shows a farther layer"),
     Metric(
         "closed_percent",
         "%",
-        "share of the true silhouette that is neither empty nor shows a farther layer",
+        "share of the true silhouette in which the picture is neither empty nor shows a farther layer",
         "high",
     ),
     Metric(
-        "hole_scanned_percent", "%", "share of the visible, scanned surface that the picture leaves empty"
+        "hole_scanned_percent", "%", "share of the visible, scanned surface in which the picture is empty"
     ),
-    Metric("spill_percent", "%", "covered pixels outside the true silhouette, relative to its area"),
     Metric(
-        "spill_p95", "px", "distance from the true silhouette to covered pixels outside it, 95th percentile"
+        "spill_percent",
+        "%",
+        "area of drawn pixels outside the true silhouette, relative to the area of the silhouette",
+    ),
+    Metric(
+        "spill_p95",
+        "px",
+        "distance of drawn pixels outside the true silhouette from the silhouette, 95th percentile",
     ),
     Metric("boundary_mean", "px", "distance between drawn and true outline, mean"),
     Metric("boundary_p95", "px", "distance between drawn and true outline, 95th percentile"),
@@ -121,8 +129,8 @@ _ERRORS = [
     Metric(
         "psnr_scanned", "dB", "PSNR of the shaded picture where the scan measured the visible surface", "high"
     ),
-    Metric("false_positives", "points", "hidden points that the renderer takes for visible"),
-    Metric("false_negatives", "points", "visible points that the renderer takes for hidden"),
+    Metric("false_positives", "points", "hidden points that the renderer treats as visible"),
+    Metric("false_negatives", "points", "visible points that the renderer treats as hidden"),
     Metric("correct", "points", "points whose visibility the renderer finds correctly", "high"),
     Metric(
         "visibility_error_percent",
@@ -133,7 +141,7 @@ _ERRORS = [
         Metric(
             f"flicker_{kind}_{name}",
             unit,
-            f"change of {text} {between}, minus the same change in true pictures",
+            f"change of {text} {between}, beyond the change in the true pictures",
             "zero",
         )
         for kind, between in (("orbit", "along a camera orbit"), ("pose", "from pose to pose"))
@@ -204,7 +212,7 @@ def read_rows(path: Path, needed: dict[str, Any] | None = None) -> list[Row]:
                 rows.append(_parsed(line, needed))
             except ValueError as error:
                 if number < len(lines):
-                    hint = "Remove the line, or run the benchmark again"
+                    hint = "Delete the line, or run the benchmark again"
                     raise InputError(
                         f"is not a row of data: {error}", f"{path}, line {number}", hint
                     ) from error
@@ -217,7 +225,7 @@ def _parsed(line: str, needed: dict[str, Any]) -> Row:
     if not isinstance(row, dict):
         raise ValueError("not a JSON object")
     if missing := [name for name, kind in needed.items() if not isinstance(row.get(name), kind)]:
-        raise ValueError(f"the row lacks a usable {', '.join(missing)}")
+        raise ValueError(f"the row has no usable value for {', '.join(missing)}")
     return _from_json(row)
 
 
@@ -281,7 +289,7 @@ def compare(old: Iterable[Row], new: Iterable[Row]) -> list[str]:
         was, now = before.get(identity), after.get(identity)
         if was is None or now is None:
             notes.append(
-                f"missing in the {'old' if was is None else 'new'} results: {row_title(was or now or {})}"
+                f"the {'old' if was is None else 'new'} results do not contain: {row_title(was or now or {})}"
             )
             continue
         if was[_SCENE] != now[_SCENE]:

@@ -109,7 +109,11 @@ def _file(request: _Request) -> Subject:
     try:
         made.moment(0)
     except InputError as error:
-        hint = error.hint or ("A scene needs a mesh, not points alone" if "no faces" in error.what else None)
+        hint = error.hint or (
+            "Use a file with faces: a scene needs a mesh, not only points"
+            if "no faces" in error.what
+            else None
+        )
         raise InputError(error.what, error.where or request.name, hint) from error
     return made
 
@@ -134,7 +138,7 @@ def _sequence(folder: str, credit: str, up: str = "+y") -> _Scene:
 def _frame(source: FrameSource, index: int) -> Mesh:
     """The mesh of a frame."""
     points = source.load(index)
-    assert isinstance(points, PointCloud), "a file with faces also holds points"
+    assert isinstance(points, PointCloud), "a file with faces must also contain points"
     return smooth(Mesh(points, source.faces(index).triangles()))
 
 
@@ -146,7 +150,7 @@ def _of_mesh(mesh: Mesh, request: _Request, index: int, time: float, label: str)
     assert mesh.points.normals is not None
     sided = np.flatnonzero(mesh.points.normals.any(axis=1))
     if not len(sided):
-        raise InputError("no face of the mesh has an area", label)
+        raise InputError("all faces of the mesh have an area of zero", label)
     if request.count is None:
         cloud = with_rows(mesh.points, sided)
     else:
@@ -408,7 +412,7 @@ def _missing(scene: _Scene, data: Path | None) -> str:
     """The files that a scene lacks; "": none."""
     for need in scene.needs:
         if data is None:
-            return f"needs {need} from the data folder"
+            return f"needs {need} from the folder of real scans (--data)"
         if not (data / need).exists():
             return f"no {need} in {data}"
     return ""

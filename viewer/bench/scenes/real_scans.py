@@ -48,7 +48,9 @@ class DepthFrames:
     def __init__(self, folder: Path, reference: Path) -> None:
         self._source = find_source(folder)
         if len(self._source) <= _FIRST:
-            raise InputError(f"holds {len(self._source)} frames, but must hold more than {_FIRST}", folder)
+            raise InputError(
+                f"contains {len(self._source)} frames, but the benchmark needs more than {_FIRST}", folder
+            )
         times = self._source.times()
         self._times = np.zeros(len(self)) if times is None else times
         surfels = read(reference)

@@ -53,7 +53,7 @@ class Subject:
         """The moment of this index; the last two are cached. Raises InputError where there is none."""
         if not 0 <= index < self.moments:
             raise InputError(
-                f"has no moment {index}", self.name, f"The subject has the moments 0 to {self.moments - 1}"
+                f"has no moment {index}", self.name, f"The sequence has the moments 0 to {self.moments - 1}"
             )
         return self._latest(index)
 

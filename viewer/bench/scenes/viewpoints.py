@@ -50,7 +50,8 @@ def viewpoints(
         if len(cameras) == count:
             return cameras
     raise InputError(
-        f"only {len(cameras)} of {count} views fill {COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of a picture"
+        f"the subject fills {COVERAGE[0]:.0%} to {COVERAGE[1]:.0%} of the picture in only {len(cameras)} of "
+        f"{count} views"
     )
 
 

@@ -47,13 +47,9 @@ class Rules:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.ties) and self.ties >= 0):
-            raise InputError(
-                f"the difference up to which weights are tied must be 0 or more, not {self.ties}"
-            )
+            raise InputError(f"the largest difference of tied weights must be 0 or more, not {self.ties}")
         if not 0 <= self.smoothing <= 100:
-            raise InputError(
-                f"the radius for averaging weights must be 0 to 100 pixels, not {self.smoothing}"
-            )
+            raise InputError(f"the radius that smooths weights must be 0 to 100 pixels, not {self.smoothing}")
         if self.tolerance is not None and not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise InputError(
                 "the largest distance between two measurements of one surface must be above 0, not "

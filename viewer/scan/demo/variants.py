@@ -86,5 +86,7 @@ def demo_motion(scan: str) -> HeadMotion:
     if variant not in VARIANTS:
         raise unknown_name("variant of the demo", variant, VARIANTS)
     if seed and not (seed.isascii() and seed.isdigit() and len(seed) <= 18):
-        raise InputError(f"'{seed}' is not a seed", scan, "Give a whole number from 0, such as demo:smile:3")
+        raise InputError(
+            f"'{seed}' is not a seed", scan, "Use a whole number of at least 0, such as demo:smile:3"
+        )
     return VARIANTS[variant](np.random.default_rng(int(seed or 0)))

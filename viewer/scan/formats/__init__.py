@@ -143,7 +143,9 @@ def read(path: Path | str, frame: int = 0, decided: Decided | None = None) -> Sc
     decided = decided or Decided()
     frames = frame_count(path, decided)
     if not 0 <= frame < frames:
-        raise InputError(f"has no pose {frame}", path, f"The file holds {frames} poses, counted from 0")
+        raise InputError(
+            f"has no pose {frame}", path, f"The file contains {frames} poses, and Scan4D counts them from 0"
+        )
     where = path if frames == 1 else f"{path}, {frame_in_words(frame)}"
     with one_message(where, f"cannot be read as {module.TITLE}"):
         return _scanned(module, path, frame, decided)
@@ -245,7 +247,7 @@ def frames(path: Path | str, decided: Decided | None = None) -> Callable[[int], 
 
 def _with_points(scanned: Scanned) -> Scanned:
     if isinstance(scanned, PointCloud) and not len(scanned):
-        what = f"none of the {scanned.dropped} points has finite coordinates"
+        what = f"contains {scanned.dropped} points, but none of them has finite coordinates"
         raise EmptyFrame(what if scanned.dropped else "holds no points")
     return scanned
 
@@ -344,7 +346,7 @@ def _formats() -> dict[str, ModuleType]:
         if not hasattr(module, "SUFFIXES"):
             if not hasattr(module, "find"):
                 raise InputError(
-                    "the module has neither SUFFIXES nor find", hint="See viewer/scan/formats/__init__.py"
+                    "the module defines neither SUFFIXES nor find", hint="See viewer/scan/formats/__init__.py"
                 )
             return  # for folders: see viewer/scan/range_folders
         if not isinstance(module.SUFFIXES, tuple):
@@ -352,12 +354,14 @@ def _formats() -> dict[str, ModuleType]:
         reads = "contents" if hasattr(module, "contents") else "read"
         if missing := [name for name in ("TITLE", reads) if not hasattr(module, name)]:
             raise InputError(
-                f"the module has SUFFIXES, but no {' and no '.join(missing)}", hint="Add what is missing"
+                f"the module defines SUFFIXES, but no {' and no '.join(missing)}", hint="Add what is missing"
             )
         for suffix in module.SUFFIXES:
             if not (isinstance(suffix, str) and suffix.startswith(".") and suffix == suffix.lower()):
                 hint = f"Write '.{suffix.lower().removeprefix('.')}'" if isinstance(suffix, str) else None
-                raise InputError(f"the suffix {suffix!r} is not lower case with a dot in front", hint=hint)
+                raise InputError(
+                    f"the suffix {suffix!r} must begin with a dot and be in lower case", hint=hint
+                )
         if taken := [suffix for suffix in module.SUFFIXES if suffix in found]:
             raise InputError(f"{found[taken[0]].TITLE} already reads '{taken[0]}'", hint="Use other suffixes")
         found.update(dict.fromkeys(module.SUFFIXES, module))

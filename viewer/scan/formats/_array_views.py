@@ -167,7 +167,10 @@ def _of_terrain(
     elif "dx" in arrays and "dy" in arrays:
         left, first, right, down = 0.0, 0.0, abs(_number(arrays, "dx")), -abs(_number(arrays, "dy"))
     else:
-        raise InputError("has heights but no ground coordinates", hint="Add dx and dy, or xmin to ymax")
+        raise InputError(
+            "has heights, but no ground coordinates",
+            hint="Add the arrays dx and dy, or xmin, xmax, ymin and ymax",
+        )
     there = np.isfinite(heights)
     span = float(np.ptp(heights[there])) if there.any() else 0.0
     size = right * columns, down * rows

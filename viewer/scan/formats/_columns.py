@@ -44,7 +44,7 @@ def named(pairs: Iterable[tuple[str, NDArray]]) -> dict[str, NDArray]:
         seen[key] = seen.get(key, 0) + 1
         if seen[key] > 1:
             if key in GEOMETRY:
-                raise InputError(f"two columns are called '{name}'", hint="Rename one of them")
+                raise InputError(f"two columns have the name '{name}'", hint="Rename one of them")
             name = next(free for n in count(seen[key]) if (free := f"{name}_{n}") not in columns)
         columns[name] = column
     return columns

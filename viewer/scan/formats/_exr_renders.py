@@ -56,7 +56,8 @@ def rendered_eyes(headers: Sequence[dict[str, Any]], decided: Decided) -> list[R
     if not found:
         there = ", ".join(channel.name for header in headers for channel in header["channels"])
         raise InputError(
-            f"is not a range view: none of its channels is depth ({shortened(there)})", hint=EXPECTED
+            f"is not a range view: none of its channels contains depth (channels: {shortened(there)})",
+            hint=EXPECTED,
         )
     known = [eye for eye in found if "worldToCamera" in headers[eye.depth[0]]]
     return known or found[:1]

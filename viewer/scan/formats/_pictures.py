@@ -59,7 +59,7 @@ def opened_picture(path: Path, kinds: tuple[str, ...], reduction: int = 1) -> It
         raise InputError(error.what, error.where or path, error.hint) from error
     except Image.DecompressionBombError as error:
         most = 2 * (Image.MAX_IMAGE_PIXELS or 0)
-        raise InputError(f"has more than the {most:,} pixels that Scan4D reads", path) from error
+        raise InputError(f"has too many pixels: Scan4D reads at most {most:,}", path) from error
     except OSError as error:
         what, hint = (f"is not a valid {title} file", _HINT) if error.errno is None else explained(error)
         raise InputError(what, path, hint) from error
@@ -73,7 +73,7 @@ def numbers_of_picture(image: Image) -> NDArray:
     Raises InputError for pictures in colour.
     """
     if image.mode not in _OF_NUMBERS and not image.mode.startswith("I;16"):
-        raise InputError(f"is a picture of type {image.mode}, where Scan4D needs one number per pixel")
+        raise InputError(f"is a picture of type {image.mode}, but Scan4D needs one number per pixel here")
     tiles = getattr(image, "tile", [])  # that are still to be decoded
     for index, tile in enumerate(tiles):
         # Pillow takes what was decoded for numbers in the file's order of bytes.
@@ -86,7 +86,7 @@ def numbers_of_picture(image: Image) -> NDArray:
 def srgb_of_picture(image: Image) -> NDArray[np.uint8]:
     """The colours of a picture, (H, W, 3), sRGB; grey ones too. Raises InputError beyond 8 bit."""
     if image.mode in ("I", "F") or image.mode.startswith("I;16"):
-        raise InputError(f"is a picture of type {image.mode}, where Scan4D needs colours")
+        raise InputError(f"is a picture of type {image.mode}, but Scan4D needs colours here")
     return np.array(image if image.mode == "RGB" else image.convert("RGB"))
 
 
@@ -133,7 +133,7 @@ def _of_texture(image: Image) -> Image:
     if image.mode.startswith("I;16") or image.mode == "I":
         return images.fromarray((np.asarray(image) // 257).clip(0, 255).astype(np.uint8)).convert("RGB")
     if image.mode == "F":
-        raise InputError("is a picture of floating-point numbers, where Scan4D needs colours")
+        raise InputError("is a picture of floating-point numbers, but Scan4D needs colours here")
     is_transparent = image.mode in ("RGBA", "LA", "PA", "RGBa", "La") or "transparency" in image.info
     wanted = "RGBA" if is_transparent else "RGB"
     return image if image.mode == wanted else image.convert(wanted)

@@ -47,7 +47,8 @@ class Property:
                 raise unknown_name("PLY property type", name[:_LONGEST_WORD], _KNOWN)
         if TYPES[self.length_type or "int"][0] == "f":
             raise InputError(
-                f"the list '{self.name[:_LONGEST_WORD]}' has a length of type {self.length_type}"
+                f"the length of the list '{self.name[:_LONGEST_WORD]}' is of type {self.length_type}, not "
+                "of a whole-number type"
             )
 
     @property
@@ -159,7 +160,9 @@ def parse_header(head: bytes) -> PlyHeader:
 
 def _element(name: str, count: str) -> Element:
     if not count.isdecimal() or len(count) > _LONGEST_WORD:
-        raise InputError(f"the header promises '{count[:_LONGEST_WORD]}' rows of {name}")
+        raise InputError(
+            f"the header states '{count[:_LONGEST_WORD]}' rows of {name}, which is not a usable number"
+        )
     return Element(name, int(count))
 
 

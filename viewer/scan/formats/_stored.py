@@ -51,18 +51,18 @@ class StoredArray:
         headers = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}
         version = npy.read_magic(stream)
         if version not in headers:
-            raise InputError(f"array '{name}' has format version {version}")
+            raise InputError(f"array '{name}' has the format version {version}, which Scan4D does not read")
         head = stream.read(2 * version[0])
         length = int.from_bytes(head, "little")
         if length > _LONGEST_HEADER:
-            raise InputError(f"array '{name}' has a header of {length:,} bytes")
+            raise InputError(f"array '{name}' has a header of {length:,} bytes, which is too long")
         header = BytesIO(head + stream.read(length))
         # numpy warns of headers written by Python 2.
         with QUIETLY, warnings.catch_warnings(action="ignore"):
             shape, column_order, dtype = headers[version](header)
         array = cls(name, stream, shape, dtype, column_order, size - stream.tell())
         if not dtype.hasobject and (min(shape, default=0) < 0 or array.nbytes > array.size):
-            raise InputError(f"array '{name}' promises {array.nbytes} bytes but holds {array.size}")
+            raise InputError(f"array '{name}' should contain {array.nbytes} bytes, but contains {array.size}")
         return array
 
     @property
@@ -115,7 +115,9 @@ class StoredArray:
 
     def _check_type(self) -> None:
         if self.dtype.hasobject:
-            raise InputError(f"array '{self.name}' holds pickled objects, which are refused")
+            raise InputError(
+                f"array '{self.name}' contains pickled Python objects, which Scan4D does not read for safety"
+            )
 
     def _values(self, shape: tuple[int, ...]) -> NDArray:
         if not self.moved:
@@ -129,7 +131,7 @@ class StoredArray:
         for start in range(0, flat.size, _CHUNK):
             part = flat[start : start + _CHUNK]
             if self.stream.readinto(part) != part.size:  # type: ignore[attr-defined]
-                raise InputError(f"array '{self.name}' ends early")
+                raise InputError(f"array '{self.name}' is not complete")
         values = flat.view(self.dtype)
         return values.reshape(shape[::-1]).T if self.column_order else values.reshape(shape)
 

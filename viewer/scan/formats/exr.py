@@ -47,8 +47,10 @@ SUFFIXES = (".exr",)
 _PINHOLE = ("fx", "fy", "cx", "cy")
 _LENS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 _SRGB8 = "srgb8"
-_FORM = "A range scan has the channel Z, and worldToCamera, fx, fy, cx and cy, in every part"
-_FLAT = "Flatten the deep image to a picture with a channel Z"
+_FORM = (
+    "Each part of an EXR range scan needs the channel Z and the attributes worldToCamera, fx, fy, cx and cy"
+)
+_FLAT = "Convert the deep image into a flat image with a channel Z"
 _MAGIC_BYTES, _CHANNEL_BYTES = 8, 16  # in front of the headers; behind the name of a channel in a header
 _TYPE_BYTES = {1: 2}  # of a sample of a half; other types have 4
 _MOST_RATIO = 40  # of memory to the file: masks leave little of most pictures
@@ -94,7 +96,7 @@ def _decoded(stream: BinaryIO, parts: int) -> list[dict[str, NDArray]]:
     # OpenEXR leaves damaged parts out and prints that to standard output, where results go.
     with redirect_stdout(_OfOthers(sys.stdout)), _file(stream, separate_channels=True) as file:
         if len(file.parts) != parts:
-            raise InputError(f"only {len(file.parts)} of the {parts} parts can be decoded")
+            raise InputError(f"Scan4D can decode only {len(file.parts)} of the {parts} parts of the file")
         return [{name: channel.pixels for name, channel in part.channels.items()} for part in file.parts]
 
 

@@ -117,7 +117,7 @@ def _unpack_beside(packed: Path, plain: Path) -> None:
     if process.returncode:
         words = said.decode(errors="replace").strip().splitlines()
         raise InputError(
-            f"the points cannot be unpacked ({words[-1][:_SAID] if words else process.returncode})"
+            f"Scan4D cannot unpack the points ({words[-1][:_SAID] if words else process.returncode})"
         )
 
 
@@ -131,9 +131,11 @@ def _checked_format(head: bytes, held: int) -> int:
         raise InputError("is not a LAS file")
     begin, records, form = _FIRST.unpack(head)
     if _SMALLEST_RECORD * records > held:
-        raise InputError(f"promises {records:,} records before its points, more than the file can hold")
+        raise InputError(f"states {records:,} records before its points, more than the file can contain")
     if begin > held:
-        raise InputError(f"states that the points begin at byte {begin:,}, but has only {held:,} bytes")
+        raise InputError(
+            f"states that its points begin at byte {begin:,}, but the file has only {held:,} bytes"
+        )
     return form
 
 
@@ -156,7 +158,7 @@ def _columns(reader: LasReader, held: int) -> dict[str, NDArray]:
     if not done:
         if not count:
             raise EmptyFrame("holds no points")
-        raise InputError("holds none of the points that it promises")
+        raise InputError("contains none of the points that its header states")
     if done < count:
         raise too_few(done, count, "points")
     columns = {name: np.concatenate(parts.pop(name)) for name in list(parts)}

@@ -340,13 +340,19 @@ def _check_members(infos: Sequence[ZipInfo], held: int) -> None:
     """Raise InputError where an archive of `held` bytes is not as numpy writes it."""
     check_count(len(infos), MOST_MEMBERS, "arrays")
     if twice := first_repeated(info.filename for info in infos):
-        raise InputError(f"two arrays are called '{twice}'", hint=_SAVE_ANEW)
+        raise InputError(f"two arrays have the name '{twice}'", hint=_SAVE_ANEW)
     for info in infos:
         if info.compress_type not in (ZIP_STORED, ZIP_DEFLATED) or info.flag_bits & _ENCRYPTED:
-            raise InputError(f"'{info.filename}' is packed in a way that numpy does not use", hint=_SAVE_ANEW)
+            raise InputError(
+                f"'{info.filename}' is encrypted, or compressed in a way that numpy does not use",
+                hint=_SAVE_ANEW,
+            )
     unpacked = sum(info.file_size for info in infos)
     if unpacked > _FREE + _MOST_RATIO * held:
-        raise InputError(f"{held} bytes would unpack to {unpacked}", hint=_SAVE_ANEW)
+        raise InputError(
+            f"the {held} bytes of the file would unpack to {unpacked} bytes, which is suspiciously much",
+            hint=_SAVE_ANEW,
+        )
 
 
 def _shares(arrays: dict[str, StoredArray], points: PointArray, frame: int) -> dict[str, int | None]:

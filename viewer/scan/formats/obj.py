@@ -280,7 +280,7 @@ def _materials(lines: ObjLines, path: Path, decided: Decided) -> dict[str, Mater
             try:
                 found |= read_materials(file_beside(path.parent, name))
             except (InputError, OSError, ValueError):
-                decided.report("assumed", "Scan4D cannot read the file of materials that the OBJ file names")
+                decided.report("assumed", "Scan4D cannot read the material file that the OBJ file names")
     return found if any(material.image for material in found.values()) else {}
 
 

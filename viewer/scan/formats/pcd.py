@@ -64,7 +64,10 @@ _VIEW_BYTES, _WORK = 64, 20 << 20  # bytes of a point as it becomes a view, and 
 # Open3D 0.20 and PCL's point types do; CloudCompare (2.12) and PDAL read them. Offsets in float32 would need
 # a field for the origin that others know, and programs differ in what VIEWPOINT means.
 _SLACK = 1e-6  # scan units: what is less is no reason for coordinates that few programs read
-_IN_FLOAT64 = "coordinates are float64, because float32 would round them. Open3D and PCL read them as zeros"
+_IN_FLOAT64 = (
+    "Scan4D stores coordinates as float64, because float32 would round them. Open3D and PCL read float64 "
+    "coordinates as zeros"
+)
 _LONGEST_WORD = 40  # of a file, in a message
 _LZF_MAX_RATIO = 88  # three bytes stand for 264 at most
 
@@ -157,7 +160,7 @@ def _world_to_camera(viewpoint: list[str]) -> NDArray[np.float64]:
     except ValueError:
         numbers = np.empty(0)
     if numbers.shape != (7,) or not np.isfinite(numbers).all():
-        raise InputError(f"the VIEWPOINT is not a pose: {shortened(' '.join(viewpoint))}")
+        raise InputError(f"the line VIEWPOINT is not a pose: {shortened(' '.join(viewpoint))}")
     return from_camera_to_world(rigid_matrix(rotation_of(np.roll(numbers[3:], -1)), numbers[:3]))
 
 
@@ -203,14 +206,16 @@ def _read_header(head: bytes) -> _Header:
     sizes, types = words.get("SIZE", []), words.get("TYPE", [])
     counts = [whole_number(count, "a COUNT") for count in words.get("COUNT", ["1"] * len(names))]
     if not len(names) == len(sizes) == len(types) == len(counts):
-        raise InputError("FIELDS, SIZE, TYPE and COUNT of the PCD header have different numbers of entries")
+        raise InputError(
+            "the lines FIELDS, SIZE, TYPE and COUNT of the PCD header have different numbers of entries"
+        )
     for code in (type_ + size for type_, size in zip(types, sizes, strict=True)):
         if code not in _TYPES:
             raise unknown_name("PCD type and size", code[:_LONGEST_WORD], list(_TYPES))
     sides = words["POINTS"] if "POINTS" in words else words["WIDTH"] + words["HEIGHT"]
     points = math.prod(whole_number(side, "the number of points") for side in sides)
     if points == 0:
-        raise EmptyFrame("holds no points, as its header states")
+        raise EmptyFrame("contains no points, according to its header")
     if points < 1 or min(counts) < 1:
         raise InputError(f"the PCD header promises {points} points of {sum(counts)} values")
     check_count(sum(counts), MOST_COLUMNS, "values a point")
@@ -235,7 +240,7 @@ def _read_ascii(stream: BinaryIO, header: _Header, decided: Decided) -> Columns:
         raise too_few(len(table), header.points, "points")
     ends = np.cumsum([f.count for f in header.fields])
     if table.shape[1] < ends[-1]:
-        raise InputError(f"the rows hold {table.shape[1]} values, but the header promises {ends[-1]}")
+        raise InputError(f"the rows have {table.shape[1]} values, but the header states {ends[-1]}")
     blocks = np.split(table, ends[:-1], axis=1)
     return _unpacked(
         _columns(
@@ -256,12 +261,12 @@ def _read_compressed(stream: BinaryIO, header: _Header, decided: Decided) -> Col
     packed, unpacked = struct.unpack("<II", read_exactly(stream, 8))
     promised = header.points * header.dtype.itemsize
     if unpacked != promised:
-        raise InputError(f"holds {unpacked} bytes of points, but its header promises {promised}")
+        raise InputError(f"contains {unpacked} bytes of points, but its header states {promised}")
     held = size_of(stream) - stream.tell()
     if packed > held:
-        raise InputError(f"holds {held} of {packed} bytes of compressed data")
+        raise InputError(f"contains only {held} of {packed} bytes of compressed data")
     if unpacked > packed * _LZF_MAX_RATIO:
-        raise InputError(f"{packed} bytes of compressed data cannot hold {unpacked} bytes")
+        raise InputError(f"{packed} bytes of compressed data cannot contain {unpacked} bytes")
     admit(size_of(stream), packed + 2 * unpacked)  # the library has two, and so have the fields
     data = lzf.decompress(read_exactly(stream, packed), unpacked)
     if data is None or len(data) != unpacked:

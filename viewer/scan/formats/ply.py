@@ -187,7 +187,9 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
         cells = sum(element.count for element in header.elements if element.name == _GRID)
         if len(sizes) != 2 or not cells or math.prod(sizes) != cells:
             found = " x ".join(map(str, sizes)) or "no size"
-            raise InputError(f"has no range grid: {cells} cells for {found}")
+            raise InputError(
+                f"its range grid is damaged: it has {cells} cells, but the header states a size of {found}"
+            )
         admit(size_of(stream), cells * _CELL_BYTES)
         stream.seek(header.size)
         lists = Faces.joined(_faces(stream, header, of=_GRID))
@@ -195,7 +197,9 @@ def read_range_grid(path: Path) -> NDArray[np.float64]:
     points = np.full((len(cloud) + cloud.dropped, 3), np.nan)
     points[slice(None) if cloud.ids is None else cloud.ids] = cloud.world()
     if lists.sizes.max() > 1 or (lists.corners >= len(points)).any():
-        raise InputError("the range grid has several vertices in one cell, or a missing vertex")
+        raise InputError(
+            "the range grid has several vertices in one cell, or names a vertex that does not exist"
+        )
     grid = np.full((cells, 3), np.nan)
     grid[lists.sizes == 1] = points[lists.corners]
     return grid.reshape(*sizes, 3)
@@ -272,7 +276,7 @@ def _read_ascii(stream: BinaryIO, element: Element, decided: Decided | None) -> 
         table = parse_table(text_lines(stream), element.count, decided)
         if len(table) and table.shape[1] < len(element.properties):
             promised = len(element.properties)
-            raise InputError(f"the rows hold {table.shape[1]} values, but the header promises {promised}")
+            raise InputError(f"the rows have {table.shape[1]} values, but the header states {promised}")
     if len(table) < element.count:
         raise too_few(len(table), element.count, _rows_of(element))
     return named(

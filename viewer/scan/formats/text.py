@@ -61,10 +61,10 @@ def _whole(path: Path, decided: Decided) -> PointContents:
     _report_doubts(head, path, decided)
     promised = None if head.promised is None else head.promised + sum(loose.counts)
     if promised not in (None, len(table)):
-        what = f"the number of points above the rows is {promised:,}, but there are {len(table):,} rows"
+        what = f"the line above the rows states {promised:,} points, but there are {len(table):,} rows"
         decided.report("contradiction", f"{path.name}: {what}. Scan4D reads all rows")
     if loose.behind:
-        what = f"{path.name}: Scan4D leaves out {len(loose.behind)} lines of text below the rows, such as"
+        what = f"{path.name}: Scan4D does not read {len(loose.behind)} lines of text below the rows, such as"
         decided.report("contradiction", f"{what} '{shortened(loose.behind[0][0].strip())}'")
     names = _names(head, table, path, decided)
     return PointContents(
@@ -178,10 +178,13 @@ def _note_writing(head: TableHead, encoding: Decision, decided: Decided) -> None
     decided.note(encoding, separator, decimal, skip)
     for name in head.unused:
         if name:
-            decided.note_unused(f"column '{shortened(name)}', which holds text")
+            decided.note_unused(f"the column '{shortened(name)}', which contains text")
             if columns.moment_columns([name]).can_split:
-                what = f"Scan4D does not read the frames or times of column '{shortened(name)}', a text"
-                decided.report("times", f"{what}. Write them as numbers to play the moments of the table")
+                what = (
+                    f"Scan4D does not read frames or times from the column '{shortened(name)}', because it "
+                    "contains text"
+                )
+                decided.report("times", f"{what}. To play the rows as frames, write numbers into this column")
 
 
 def _report_doubts(head: TableHead, path: Path, decided: Decided) -> None:
@@ -191,8 +194,8 @@ def _report_doubts(head: TableHead, path: Path, decided: Decided) -> None:
     units = columns.units_in_names(head.names or ())
     if len(units) > 1:
         listed = ", ".join(sorted(unit or "none" for unit in units))
-        what = f"{path.name}: the names of x, y and z state several units ({listed})"
-        decided.report("unit", f"{what}. Scan4D uses the numbers as they are, in an unknown unit")
+        what = f"{path.name}: the names of the columns x, y and z contain different units ({listed})"
+        decided.report("unit", f"{what}. Scan4D does not convert the numbers, and their unit stays unknown")
 
 
 def _names(head: TableHead, table: NDArray[np.float64], path: Path, decided: Decided) -> list[str]:
@@ -207,7 +210,7 @@ def _names(head: TableHead, table: NDArray[np.float64], path: Path, decided: Dec
     decision = decided.settle(columns.KEY, lambda: columns.decide(table, suffix))
     if len(decision.value) != table.shape[1]:
         had, has = len(decision.value), table.shape[1]
-        decided.contradict(columns.KEY, f"{path.name} has {has} columns, but the frames before it have {had}")
+        decided.contradict(columns.KEY, f"{path.name} has {has} columns, but earlier frames have {had}")
         decision = columns.decide(table, suffix)
     return columns.names_of(decision.value)
 
@@ -234,5 +237,5 @@ def _moments(path: Path, decided: Decided) -> columns.Moments | None:
     if moments is None:
         return None
     check_count(len(moments.numbers), MOST_FRAMES, "frames")
-    decided.note(Decision("frames", f"by column {(head.names or ())[chosen[0]]}", why=moments.why))
+    decided.note(Decision("frames", f"by the column {(head.names or ())[chosen[0]]}", why=moments.why))
     return moments

@@ -96,7 +96,7 @@ def _ground(tags: dict[int, Any]) -> Ground:
         if matrix[0, 1] or matrix[1, 0]:
             raise InputError(
                 "the rows of the picture do not go from west to east",
-                hint="Resample the terrain to a grid along the axes",
+                hint="Resample the terrain to a grid whose rows go from west to east",
             )
         left, first, right, down = matrix[0, 3], matrix[1, 3], matrix[0, 0], matrix[1, 1]
     else:

@@ -27,17 +27,21 @@ class Stop:
 
     rule: str = param(
         "delta",
-        "When to stop dividing octants. delta: when few positions share a leaf; depth: at a level; "
-        "occupancy: when an octant holds few points",
+        "When Scan4D stops dividing octants. delta: when few positions share a leaf; depth: at a fixed "
+        "level; occupancy: when an octant holds few points",
         choices=STOPS,
         affects="derive",
     )
     delta: float = param(
-        0.05, "Share of the positions that may lack a leaf of their own", low=0, high=1, affects="derive"
+        0.05,
+        "Share of the positions that may lie in the same leaf as other positions",
+        low=0,
+        high=1,
+        affects="derive",
     )
     depth: int = param(10, "Level of the leaves", low=0, high=DEEPEST, affects="derive")
     occupancy: int = param(
-        8, "Octants with at most this many points are not divided", low=1, affects="derive"
+        8, "Scan4D does not divide octants with at most this many points", low=1, affects="derive"
     )
 
     def __post_init__(self) -> None:
@@ -84,7 +88,7 @@ def shortfall(octree: Octree, stop: Stop) -> str | None:
         return None
     return (
         f"the octree reached its deepest level, {octree.depth}: {octree.loss:.2%} of the positions still "
-        "lack a leaf of their own"
+        "share a leaf with other positions"
     )
 
 

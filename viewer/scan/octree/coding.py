@@ -40,7 +40,9 @@ def unpack(block: bytes, size: int, most: int = MOST_RATIO) -> Bytes:
     if len(block) == size:
         return np.frombuffer(block, np.uint8)
     if size > most * len(block):
-        raise InputError(f"{len(block)} bytes would unpack to {size}")
+        raise InputError(
+            f"a block of {len(block)} bytes would unpack to {size} bytes, which is suspiciously much"
+        )
     try:
         plain = lzma.LZMADecompressor(lzma.FORMAT_RAW, filters=[_LZMA]).decompress(block, size)
     except lzma.LZMAError as error:

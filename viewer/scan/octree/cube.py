@@ -56,7 +56,9 @@ class Cube(NamedTuple):
     def checked(self) -> Cube:
         """The cube with its edge made a number of few bits; raises InputError where it is none."""
         if not (math.isfinite(self.edge) and self.edge > 0 and np.isfinite(self.low).all()):
-            raise InputError(f"an octree's cube has an edge of {self.edge} from {self.low}")
+            raise InputError(
+                f"the cube of an octree has the unusable edge {self.edge}, starting at {self.low}"
+            )
         cell = 2**DEEPEST * _step(self.edge)
         return Cube(np.asarray(self.low, np.float64), math.ceil(self.edge / cell) * cell)
 

@@ -224,11 +224,13 @@ def _found(path: Path, size: int, changed: int) -> list[_Extent]:
             taken += header.stored
             check_count(len(extents) + 1, _MOST_POSES, "octrees")
             if extents and header.unit != extents[0].header.unit:
-                raise InputError(f"octree {len(extents)} has a different unit of length from the first")
+                raise InputError(
+                    f"octree {len(extents)} has a different unit of length than the first octree"
+                )
             extents.append(_Extent(offset, min(taken, end - offset), header))
             offset += taken
     counts = [0, *(extent.header.before for extent in extents)]
     for index, (above, here) in enumerate(pairwise(counts)):
         if here not in (0, above + 1) or here > index:
-            raise InputError(f"octree {index} depends on {here} before it, which are missing")
+            raise InputError(f"octree {index} depends on {here} octrees before it, which are missing")
     return extents

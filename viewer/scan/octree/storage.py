@@ -153,7 +153,8 @@ def to_bytes(
     """
     if len(unit.encode()) > _MOST_UNIT or octree.counts.max() >> 31:
         raise InputError(
-            f"an octree file has room for {_MOST_UNIT} bytes of the unit's name, and for 2^31 nodes per level"
+            f"an octree file can store at most {_MOST_UNIT} bytes for the name of the unit, and 2^31 "
+            "nodes per level"
         )
     can_tell = packed and previous is not None and chain <= MOST_BEFORE and _same_cube(octree, previous)
     blocks = _store(octree, previous if can_tell else None, packed)
@@ -200,7 +201,7 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     if _are_too_many(sum(whole), len(data)):
         raise InputError(f"claims {sum(whole):,} octants in {len(data):,} bytes, which is too many")
     if header.before and (previous is None or not _can_tell(header, previous, attributes)):
-        raise InputError("depends on the octree before it, which is missing")
+        raise InputError("this octree depends on the octree before it, which is missing")
     before = previous if header.before else None
     coder = MaskCoder(header.levels[0].nodes, before.masks if before else ())
     masks: list[Bytes] = []
@@ -232,7 +233,7 @@ def read_strays(data: bytes) -> Strays:
     places = coding.unpack(data[size:middle], 24 * entry.nodes).reshape(24, -1).T
     positions = np.ascontiguousarray(places).view("<f8").astype(np.float64)
     if not (np.abs(positions) < _LARGEST).all():
-        raise InputError("the points outside an octree are not finite")
+        raise InputError("some points outside an octree have coordinates that are not finite")
     found = Attributes()
     if header.width:
         values = coding.unpack(data[middle:end], header.width * entry.nodes)
@@ -243,13 +244,13 @@ def read_strays(data: bytes) -> Strays:
 def read_header(data: bytes) -> tuple[Header, int]:
     """The header at the beginning of the bytes, and its size. Raises InputError where it is none."""
     if not data.startswith(MAGIC):
-        raise InputError("an octree is missing where one should begin")
+        raise InputError("no octree begins where the file should contain one")
     if len(data) < _FIXED.size + _SECOND.size:
         raise CutShort("ends within the header of an octree")
     _, version, flags, before, depth, unit_size, _, *place = _FIXED.unpack_from(data)
     if version not in _VERSIONS:
         raise InputError(
-            f"holds octrees of version {version}",
+            f"contains octrees of format version {version}",
             hint=f"This version of Scan4D reads format versions up to {VERSION}",
         )
     predicted_attributes, *strays = _SECOND.unpack_from(data, _FIXED.size) if version > 1 else [0] * 5
@@ -269,7 +270,7 @@ def read_header(data: bytes) -> tuple[Header, int]:
         *kind, time, low, edge, points, distinct, unit, levels, predicted_attributes, Level(*strays)
     )
     if not _is_possible(header):
-        raise InputError("the header of an octree contradicts itself")
+        raise InputError("the numbers in the header of an octree contradict each other")
     return header, end + _CHECK.size
 
 
@@ -314,7 +315,7 @@ def _whole_levels(header: Header, data: bytes) -> Iterator[tuple[bytes, bytes]]:
             return
         middle, end = at + level.masks, at + level.masks + level.attributes
         if end > len(data):
-            raise InputError(f"ends within level {number} of an octree's {len(header.levels) - 1}")
+            raise InputError(f"ends within level {number} of {len(header.levels) - 1} of an octree")
         if zlib.crc32(data[at:end]) != level.check:
             raise InputError(f"level {number} of an octree is damaged")
         yield data[at:middle], data[middle:end]
@@ -385,7 +386,9 @@ def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> 
     if header.flags & _PACKED:
         masks = coder.restore(masks, predicted=bool(header.predicted >> level & 1))
     if np.bitwise_count(masks).sum(dtype=np.int64) != header.levels[level + 1].nodes:
-        raise InputError(f"level {level + 1} of an octree does not have as many nodes as its header says")
+        raise InputError(
+            f"level {level + 1} of an octree has a different number of nodes than the header states"
+        )
     return masks
 
 

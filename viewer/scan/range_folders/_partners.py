@@ -224,7 +224,7 @@ def pose_of_file(picture: DepthPicture) -> NDArray[np.float64]:
     except InputError as error:
         raise InputError(error.what, picture.pose, error.hint) from error
     except ValueError as error:
-        raise InputError("is not a pose: it contains other words than numbers", picture.pose) from error
+        raise InputError("is not a pose: it contains words that are not numbers", picture.pose) from error
 
 
 def _in_folders(folder: Path, names: Sequence[str], of_depth: str) -> Iterator[DepthPicture]:

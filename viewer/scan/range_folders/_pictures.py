@@ -58,7 +58,7 @@ def read_depth(path: Path, decided: Decided) -> NDArray:
     if path.suffix.lower() == ".exr":
         views = _views_of_exr(path, decided)
         if not isinstance(views, tuple):
-            raise InputError("holds points, but a depth picture is expected", path)
+            raise InputError("contains points, but Scan4D expects a depth picture here", path)
         return np.where(views[0].mask, views[0].depth, np.float32(np.nan))
     with opened_picture(path, ("PPM",) if path.suffix.lower() == ".pgm" else DEPTH_KINDS) as image:
         if image.format == "PNG" and not image.mode.startswith(_SIXTEEN_BITS):
@@ -79,7 +79,7 @@ def _views_of_exr(path: Path, decided: Decided) -> Scanned:
             views = None
         if views is None:
             raise
-    why = "The picture lies among depth pictures, and no channel of it is called depth"
+    why = "The picture lies among depth pictures, but none of its channels is called depth"
     decided.note(Decision("depth-channel", "R", "assumed", why=why, changes_numbers=True))
     return views
 
@@ -141,7 +141,7 @@ def depth_view(
     if files.mask is not None:
         mask = over_depth(read_numbers(files.mask), stored)
         if mask is None:
-            raise InputError("is a mask of another shape than its depth picture", files.mask)
+            raise InputError("the mask has a different shape than its depth picture", files.mask)
         measured &= mask_of(mask)
 
     confidence = None

@@ -36,8 +36,8 @@ GENERAL = True
 _DEPTH = "depth"  # in names
 _INNER = ("keyframes", "EXR_RGBD", "frames", "results")  # folders that recorders put all pictures into
 _HINT = (
-    'Put a camera.json beside them: {"fx": 525, "fy": 525, "cx": 319.5, "cy": 239.5, "depth_scale": 1000}, '
-    "or state it with --read camera=fx,fy,cx,cy"
+    'Put a camera.json beside the pictures: {"fx": 525, "fy": 525, "cx": 319.5, "cy": 239.5, "depth_scale": '
+    "1000}, or state the camera with --read camera=fx,fy,cx,cy"
 )
 
 
@@ -62,7 +62,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
         if not (camera.is_stated or pictures[0].camera or is_depth(first) or _is_no_png(first)):
             return None
         if not (camera.is_stated or pictures[0].camera or _say_depth(pictures, inner)):
-            raise InputError("holds 16-bit pictures, but no file states their camera", folder, _HINT)
+            raise InputError("contains 16-bit pictures, but no file states their camera", folder, _HINT)
     if any(picture.pose for picture in pictures) or states_a_pose(pictures[0]):
 
         def pose(index: int) -> NDArray[np.float64]:
@@ -128,5 +128,5 @@ def _has_scan_files(names: Iterable[str]) -> bool:
 def lacks(names: Sequence[str]) -> str:
     """The depth of a recording of Record3D that is only unpacked."""
     if {"metadata", "rgbd"} <= {*names}:
-        return "Record3D packs their depth in a form of its own. Export them as EXR with RGB-D in Record3D"
+        return "Record3D stores depth in its own format. In Record3D, export the recording as EXR with RGB-D"
     return ""

@@ -49,7 +49,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
 
 def lacks(names: Sequence[str]) -> str:
     """The disparity, where the calibration stands without."""
-    return f"the picture of disparity, NAME{_DISPARITY}, is missing" if _CALIBRATION in names else ""
+    return f"the disparity picture NAME{_DISPARITY} is missing" if _CALIBRATION in names else ""
 
 
 def _view(file: Path, left: Path | None, numbers: Sequence[float], decided: Decided) -> RangeView:

@@ -50,7 +50,9 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
         if poses is None:
             return UPRIGHT
         if index >= len(poses):
-            raise InputError(f"has no pose: {log} holds {len(poses)}", pictures[index].depth)
+            raise InputError(
+                f"has no camera pose: {log} contains only {len(poses)} poses", pictures[index].depth
+            )
         return from_camera_to_world(poses[index])
 
     beside = [folder / name for name in known]
@@ -69,7 +71,7 @@ def read_log(path: Path) -> NDArray[np.float64]:
     try:
         return np.array(words, np.float64).reshape(-1, _RECORD)[:, 3:].reshape(-1, 4, 4)
     except ValueError as error:
-        hint = "A record of the log is three whole numbers and a 4 x 4 matrix"
+        hint = "Each pose in the log is three whole numbers and a 4 x 4 matrix"
         raise InputError("is damaged, or is not a log of poses", path, hint) from error
 
 

@@ -43,7 +43,7 @@ TITLE = "a scanner's range images"
 FILE = "pods.json"
 
 _MOST_PODS = 64
-_FORM = 'Expected: {"unit": "mm", "pods": [{"name": "left", "range": "left_*.tif", "fx": ...}]}'
+_FORM = 'Example of such a file: {"unit": "mm", "pods": [{"name": "left", "range": "left_*.tif", "fx": ...}]}'
 _RANGE, _TEXTURE, _MASK, _CONFIDENCE = _IMAGES = ("range", "texture", "mask", "confidence")
 _ANY = "*"
 _NAME_BYTES = 1000  # of memory for a file that a pattern names
@@ -155,7 +155,9 @@ def _pattern(stored: dict[str, Any], image: str) -> str:
     """A file's name within the folder, with one star at most."""
     stated = stored.get(image)
     if not isinstance(stated, str) or stated.count(_ANY) > 1 or _ANY in os.path.dirname(stated):
-        raise InputError(f"has the {image} {shortened(stated)}, expected a file name with one {_ANY} at most")
+        raise InputError(
+            f"has the {image} {shortened(stated)}, but this must be a file name with at most one {_ANY}"
+        )
     named_inside(Path(), stated, None)
     return stated
 

@@ -40,7 +40,7 @@ def find(folder: Path, names: Sequence[str]) -> RangeFrames | None:
     if not found:
         return None
     if len(found) > 1:
-        raise InputError(f"has several files with the positions of scans: {', '.join(found)}")
+        raise InputError(f"contains several files with the positions of scans: {', '.join(found)}")
     (conf, lines) = found.popitem()
     check_count(len(lines), MOST_VIEWS, "scans to place")
     placed = [_placement(folder / conf, line) for line in lines]
@@ -66,7 +66,7 @@ def _placement(conf: Path, line: str) -> tuple[str, NDArray[np.float64]]:
     except ValueError:
         numbers = np.empty(0)
     if numbers.shape != (7,) or not np.isfinite(numbers).all():
-        hint = f"A line is {_SCAN}, a file, and 7 numbers: a translation and a quaternion x y z w"
+        hint = f"Each line is {_SCAN}, a file name and 7 numbers: a translation and a quaternion x y z w"
         raise InputError(f"'{shortened(line)}' does not describe a scan", conf, hint)
     rotation = rotation_of(numbers[3:])
     return name, rigid_matrix(rotation, -rotation @ numbers[:3])

@@ -68,7 +68,14 @@ def _view(file: Path, camera: NDArray[np.float64], turns: int, decided: Decided)
         fx, fy, cx, cy = fy, fx, depth.shape[0] - cy, cx
         depth, color = np.rot90(depth, -1), np.rot90(color, -1)
     pinhole = {"fx": fx, "fy": fy, "cx": cx, "cy": cy}
-    why = f"Scan4D turns the pictures by {90 * turns} degrees, as {_MOTION} states gravity" if turns else ""
+    why = (
+        (
+            f"Scan4D turns the pictures by {90 * turns} degrees, because {_MOTION} states the direction of "
+            "gravity"
+        )
+        if turns
+        else ""
+    )
     return RangeView(
         depth=np.ascontiguousarray(depth),
         mask=np.isfinite(depth),
@@ -100,7 +107,7 @@ def _quarter_turns(file: Path) -> int:
         gravity = np.array([(record["gravity_x"], record["gravity_y"]) for record in records], np.float64)
         right, up = gravity.sum(axis=0)  # none of an empty list
     except (ValueError, KeyError, TypeError) as error:
-        hint = "Without this file, Scan4D shows pictures in the sensor's orientation"
+        hint = "If you remove this file, Scan4D shows the pictures in the orientation of the sensor"
         raise InputError(f"has no usable gravity: {shortened(repr(error))}", file, hint) from error
     sides = (right, -up, -right, up)  # how far up the picture's top is, its left, its bottom, its right
     return sides.index(max(sides))
@@ -114,5 +121,5 @@ def _intrinsics(file: Path) -> NDArray[np.float64]:
     except (ValueError, KeyError, TypeError, ZeroDivisionError) as error:
         raise InputError(f"is not a calibration: {shortened(str(error))}", file) from error
     if not (np.isfinite(camera).all() and (camera > 0).all()):
-        raise InputError("is not a calibration: a number of its matrix is not above 0", file)
+        raise InputError("is not a calibration: numbers of its matrix must be above 0", file)
     return camera

@@ -56,7 +56,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
         if poses is None:
             return UPRIGHT
         if (words := poses[index]) is None:
-            what = f"has no pose: none of {_POSES} is within {_MOST_APART} s"
+            what = f"has no camera pose: no pose in {_POSES} is within {_MOST_APART} s of its time"
             raise InputError(what, pictures[index].depth)
         return _pose(words, folder / _POSES)
 
@@ -66,7 +66,7 @@ def find(folder: Path, names: Sequence[str], decided: Decided) -> RangeFrames | 
 
 def lacks(names: Sequence[str]) -> str:
     """The list of depth pictures, where poses stand without."""
-    return f"{_DEPTH}, the list of depth pictures, is missing" if _POSES in names else ""
+    return f"the list of depth pictures, {_DEPTH}, is missing" if _POSES in names else ""
 
 
 def nearest_once(times: NDArray[np.float64], others: NDArray[np.float64], most: float) -> NDArray[np.int64]:
@@ -126,7 +126,7 @@ def _time(words: list[str], path: Path, line: int) -> float:
         raise InputError(
             f"'{shortened(' '.join(words))}' is not a row of data",
             where,
-            "A row of the list is a time in seconds and the file name of a picture",
+            "Each row of the list is a time in seconds and the file name of a picture",
         )
     return time
 
@@ -141,6 +141,6 @@ def _pose(words: list[str], path: Path) -> NDArray[np.float64]:
     try:
         numbers = np.array(words, np.float64).reshape(7)
     except ValueError:
-        hint = "A row is a time in seconds, a translation and a quaternion: t tx ty tz qx qy qz qw"
+        hint = "Each row is a time in seconds, a translation and a quaternion: t tx ty tz qx qy qz qw"
         raise InputError(f"'{shortened(' '.join(words))}' is not a pose", path, hint) from None
     return from_camera_to_world(rigid_matrix(rotation_of(numbers[3:]), numbers[:3]))

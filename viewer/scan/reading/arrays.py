@@ -65,7 +65,7 @@ _MOST_OF_FRAMES = 12  # columns where the array has frames or rows as well
 _MOST_AXES = 4
 _FRONT = (3, 4, 6, 7, 9)  # coordinates, and what may stand beside them, of arrays with these in front
 _MOST_BESIDE = 16  # numbers of a point where there are so few rows
-_FORM = "Points are (N, 3), (N, C) with x y z first, (T, N, 3), (H, W, 3) or (S, H, W, 3)"
+_FORM = "The shape of points must be (N, 3), (N, C) with x y z first, (T, N, 3), (H, W, 3) or (S, H, W, 3)"
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def as_points(array: ArrayT, decided: Decided) -> ArrayT:
     """The array with the coordinates of a point last, where they stand in front, which the record says."""
     axis = _coordinates_first(array.shape) if array.dtype.names is None else 0
     if axis and 3 in (array.shape[0], array.shape[-3:][0]):
-        why = f"The array {array.shape} has the axis of coordinates before the axis of points"
+        why = f"In the array {array.shape}, the axis of coordinates comes before the axis of points"
         decided.note(Decision("columns", ["x", "y", "z"], "assumed", why=why, changes_numbers=True))
     return array.with_last(axis) if axis else array
 
@@ -147,7 +147,9 @@ def point_array(
     """
     shape = array.shape
     if array.dtype.hasobject:
-        raise InputError(f"array '{array.name}' holds pickled objects, which are refused")
+        raise InputError(
+            f"array '{array.name}' contains pickled Python objects, which Scan4D does not read for safety"
+        )
     if not may_be_points(array):
         raise InputError(f"array '{array.name}' has shape {shape}", hint=_FORM)
     if array.dtype.names is None and array.dtype.kind not in "fiu":
@@ -181,11 +183,14 @@ def decide(
     if corrections.get(KEY) in (ROWS, IMAGE):
         return Decision(KEY, corrections[KEY], "user", "--read")
     if says_picture(array.name, beside):
-        why = f"The name of the array says that it is a picture of {columns} x {rows} points"
+        why = f"The name of the array states that the array is a picture of {columns} x {rows} points"
         return Decision(KEY, IMAGE, "file", array.name, why, (), changes_numbers=True)
     is_size_of_picture = rows >= _LEAST_ROWS and columns >= _LEAST_COLUMNS and rows * columns <= _MOST_PIXELS
     if is_size_of_picture and may_be_organised(look(_FIRST_ROWS)) and is_organised(look(rows)):
-        why = f"Neighbours in the array of {columns} x {rows} points are neighbours in space"
+        why = (
+            f"Points that are neighbours in the array of {columns} x {rows} points are also neighbours in "
+            "space"
+        )
         return Decision(KEY, IMAGE, "assumed", "", why, (ROWS,), changes_numbers=True)
     return Decision(KEY, ROWS, "file", why="The first axis of the array counts frames")
 

@@ -48,7 +48,7 @@ def decide(remarks: Iterable[str], corrections: Corrections = NOTHING_CORRECTED)
     if (stated := stated_space(remarks)) is not None:
         space, remark = stated
         return Decision(KEY, space, "file", f"comment {remark}")
-    why = f"The file does not state its axes. Scan4D assumes {LPS} where landmark files need them"
+    why = f"The file does not state its axes. When a landmark file needs axes, Scan4D assumes {LPS}"
     return Decision(KEY, UNKNOWN, "assumed", why=why, alternatives=(LPS, RAS))
 
 

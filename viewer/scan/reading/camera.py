@@ -213,7 +213,10 @@ def camera_for(camera: StatedCamera, size: Size, of_color: Size | None = None) -
         if (camera.width, camera.height) == size:
             return camera
         if not have_same_aspect((camera.width, camera.height), size):
-            return f"the camera is for {camera.width} x {camera.height}, the picture has {_shown(size)}"
+            return (
+                f"the camera is for pictures of {camera.width} x {camera.height} pixels, but this picture "
+                f"has {_shown(size)}"
+            )
         return scaled(camera, size)
     if _is_inside(camera, size):
         return camera
@@ -249,9 +252,9 @@ def _pinhole(sources: CameraSources, size: Size, of_color: Size | None) -> tuple
     if sources.default is not None:
         default = camera_for(sources.default, size)
         if not isinstance(default, str):
-            why = f"No file states the camera, so Scan4D takes the default camera of {sources.kind}"
+            why = f"No file states the camera, so Scan4D uses the default camera of {sources.kind}"
             return default, _decision(default, sources.default, "assumed", "", why, (_as_text(guess),)), ""
-        why += f", as the default camera of {sources.kind} is for {_of(sources.default)}"
+        why += f", because the default camera of {sources.kind} is for {_of(sources.default)}"
     others = () if sources.default is None else (_as_text(scaled_alike(sources.default, size)),)
     return guess, _decision(guess, guess, "assumed", "", f"{why}. {_STATE_IT}", others), words
 
@@ -288,7 +291,7 @@ def _fitting(
     hint = (
         _STATE_IT
         if stated.width is not None
-        else (f"If this camera is right, state its width and height. {_STATE_IT}")
+        else (f"If this camera is right, state its width and height in pixels. {_STATE_IT}")
     )
     raise InputError(f"{reason}{f' ({stated.where})' if stated.where else ''}", hint=hint)
 
@@ -328,7 +331,7 @@ def _depth_scale(sources: CameraSources, is_whole: bool) -> tuple[float, Decisio
         return decided(MILLIMETRES, "folder", sources.kind)
     why = "Nothing states the unit of the depths"
     if sources.scale == MILLIMETRES:
-        why = "No file states the unit of the depths, and most recorders store millimetres"
+        why = "No file states the unit of the depths. Most recorders store millimetres"
     return decided(sources.scale, "assumed", "", why)
 
 

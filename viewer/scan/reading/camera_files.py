@@ -425,11 +425,13 @@ def _lens(stated: Mapping[str, Any]) -> tuple[float, ...]:
     if not any(lens):
         return ()
     if any(word in model for word in _FISHEYE):
-        raise InputError(f"the lens is of the kind {shortened(stated['model'])}, which Scan4D cannot undo")
+        raise InputError(
+            f"the lens model is {shortened(stated['model'])}, whose distortion Scan4D cannot correct"
+        )
     while len(lens) > max(_COUNTS) and lens[-1] == 0:
         lens = lens[:-1]
     if len(lens) not in _COUNTS:
-        raise InputError(f"has {len(lens)} coefficients of distortion, expected 4, 5 or 8")
+        raise InputError(f"has {len(lens)} distortion coefficients, expected 4, 5 or 8")
     return lens
 
 
@@ -437,7 +439,7 @@ def _words_of_lens(value: Any) -> Sequence[Any]:
     """A name of a model is no list of coefficients, and no error."""
     if isinstance(value, str):
         return ()
-    raise InputError("the distortion is not a list of numbers")
+    raise InputError("the distortion must be a list of numbers")
 
 
 def _kind(value: Any) -> DepthKind:
@@ -455,7 +457,7 @@ def _depth_scale(value: Any) -> float:
             "depth_scale is the number of depth steps in one unit, such as 1000 for millimetres where "
             "the unit is m"
         )
-        raise InputError(f"the depth_scale is {scale:g}", hint=hint)
+        raise InputError(f"the depth_scale is {scale:g}, but must be a finite number above 0", hint=hint)
     return float(f"{1 / scale:.6g}") if scale < 1 else scale
 
 

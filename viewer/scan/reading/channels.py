@@ -39,14 +39,14 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
     if KEY in corrections:
         stated = corrections[KEY]
         if stated not in names:
-            raise InputError(f"it has no channel {stated}", hint=f"Its channels: {', '.join(names)}")
+            raise InputError(f"the file has no channel {stated}", hint=f"Its channels: {', '.join(names)}")
         return DepthChannel(stated, Decision(KEY, stated, "user", "--read"))
     found = depth_channels(names)
     if found:
         return DepthChannel(found[0], Decision(KEY, found[0], "file", found[0]))
     others = [name for name in names if _word(name) not in _WITHOUT_DEPTH]
     if len(others) == 1 and _word(others[0]) in _ALONE:
-        why = f"Scan4D takes the only channel, {others[0]}, as depth"
+        why = f"Scan4D reads depth from the only channel, {others[0]}"
         return DepthChannel(others[0], Decision(KEY, others[0], "assumed", why=why, changes_numbers=True))
     return None
 

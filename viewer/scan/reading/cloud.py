@@ -63,7 +63,7 @@ def assemble(contents: PointContents, decided: Decided) -> PointCloud:
 
     chosen = _complete(_POSITIONS, columns)
     if not chosen:
-        raise InputError(f"no x, y and z among the columns: {listed(columns)}")
+        raise InputError(f"the columns do not include x, y and z: {listed(columns)}")
     positions = [_taken(columns, chosen)]
     attributes = _splats(columns, positions[0], decided) or _attributes(columns)
     used = [name for choices in (_NORMALS, _COLORS, _RADII) for name in _complete(choices, columns)]
@@ -168,7 +168,7 @@ def _by_role(contents: PointContents, decided: Decided) -> dict[str, NDArray]:
         decided.note(Decision("columns", list(columns), source, changes_numbers=True))
         return columns
     if len(stated) != len(columns):
-        what = f"--read columns has {len(stated)} roles, but the file has {len(columns)} columns"
+        what = f"--read columns names {len(stated)} columns, but the file has {len(columns)} columns"
         raise InputError(what, hint=f"Its columns: {listed(columns)}")
     decided.note(Decision("columns", list(stated), "user", "--read"))
     by_role = {role: columns.pop(name) for role, name in zip(stated, list(columns), strict=True)}

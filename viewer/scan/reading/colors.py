@@ -104,7 +104,9 @@ def settled_scale(colors: NDArray, decided: Decided, others: Callable[[], Iterab
 
     full: int = decided.settle(KEY, settle).value
     if contradicts(evidence, full):
-        decided.contradict(KEY, f"the colours reach {evidence.top:g}, but full brightness is {full}")
+        decided.contradict(
+            KEY, f"the colours of this frame reach {evidence.top:g}, but the scale of the scan ends at {full}"
+        )
     return full
 
 
@@ -125,7 +127,7 @@ def decide(evidence: Sequence[ColorEvidence], corrections: Corrections = NOTHING
     if (stated := corrections.get(KEY)) is not None:
         if stated != NONE and not evidence:
             raise InputError(
-                "holds no colours, so a scale of colours has no effect", hint="Leave out --read colors"
+                "contains no colours, so --read colors has no effect", hint="Leave out --read colors"
             )
         return Decision(KEY, stated if stated == NONE else int(stated), "user", "--read")
     if not evidence:
@@ -137,8 +139,8 @@ def decide(evidence: Sequence[ColorEvidence], corrections: Corrections = NOTHING
             KEY,
             scale.full,
             "file",
-            why="" if evidence[0].kind[1:] == "1" else f"The largest value is {top:g}",
+            why="" if evidence[0].kind[1:] == "1" else f"The largest colour value is {top:g}",
         )
     others = [str(other) for other in SCALES if other != scale.full and other >= top]
-    why = f"No colour exceeds {top:g}, so the scale may be larger"
+    why = f"The largest colour value is {top:g}, but the scale may be larger"
     return Decision(KEY, scale.full, "assumed", why=why, alternatives=(*others, NONE))

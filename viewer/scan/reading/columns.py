@@ -211,7 +211,7 @@ def decide(
     if (stated := corrections.decision(KEY)) is not None:
         if len(stated.value) != width:
             what = f"has {width} columns, but --read columns= names {len(stated.value)}"
-            raise InputError(what, hint="Give a role for each column, and '-' for one to leave out")
+            raise InputError(what, hint="Give a role for each column, and '-' for each column to leave out")
         return stated
     by_suffix = _BY_SUFFIX.get(suffix)
     if by_suffix is not None and width >= len(by_suffix):
@@ -272,9 +272,12 @@ def _fronts(table: NDArray[np.float64]) -> Iterator[tuple[list[str], str]]:
     first = table[:, 0]
     if first[0] in (0, 1) and first[1] - first[0] == 1 and (np.diff(first) == 1).all():
         if not any((first == table[:, at]).all() for at in range(1, width)):
-            yield ["number"], f"The first column counts {first[0]:g}, {first[1]:g}, {first[2]:g} and so on."
+            yield (
+                ["number"],
+                (f"The first column numbers the rows: {first[0]:g}, {first[1]:g}, {first[2]:g} and so on."),
+            )
     elif width >= 5 and _is_grid(table):
-        yield ["row", "column"], "The first two columns count the rows and columns of a grid."
+        yield ["row", "column"], "The first two columns number the rows and columns of a grid."
     elif count >= _LEAST_INCREASING and _increases(first) and not _is_profile(table[:, 1:4]):
         is_whole = bool((first == np.rint(first)).all())
         yield ["number" if is_whole else "time"], "The first column increases from row to row."
@@ -330,7 +333,10 @@ def _behind(front: list[str], table: NDArray[np.float64], intensity_first: bool)
     return _Candidate(roles, " ".join(dict.fromkeys(whys)), is_complete)
 
 
-_WEAK = ("Three numbers with signs are normals.", "Numbers up to 1 are normals.")  # of any length
+_WEAK = (
+    "Scan4D takes three columns of positive and negative numbers as normals.",
+    "Scan4D takes three columns of numbers up to 1 as normals.",
+)  # of any length
 
 
 def _block(three: NDArray[np.float64], width: int) -> tuple[str | None, str]:
@@ -341,15 +347,15 @@ def _block(three: NDArray[np.float64], width: int) -> tuple[str | None, str]:
     length = np.sqrt(np.einsum("ij,ij->i", some_rows, some_rows))
     some = length > 0
     if some.any() and (np.abs(length[some] - 1) <= _UNIT_WITHIN).mean() >= _UNIT_SHARE and some.mean() > 0.5:
-        return "nx", "Rows of length 1 are normals."
+        return "nx", "Three columns contain vectors of length 1, which are normals."
     low, high = three.min(), three.max()
     is_whole = bool((some_rows == np.rint(some_rows)).all())
     if low >= 0 and high <= 255 and is_whole and high > 0:
-        return "r", "Whole numbers up to 255 are colors."
+        return "r", "Scan4D takes three columns of whole numbers up to 255 as colours."
     if low >= 0 and high <= 1 and not is_whole:
-        return "r", "Numbers between 0 and 1 are colors."
+        return "r", "Scan4D takes three columns of numbers from 0 to 1 as colours."
     if low >= 0 and 1.001 < high <= 65535 and width == 6 and (is_whole or high <= 255):
-        return "r", "Numbers of 0 and more are colors."
+        return "r", "Scan4D takes three columns without negative numbers as colours."
     if np.abs(three).max() <= 1.001 or width == 6:
         return "nx", _WEAK[0] if low < 0 else _WEAK[1]
     return None, ""
@@ -446,7 +452,8 @@ def moments_of(
         stated,
         numbers,
         None if ids is None else ids[order],
-        f"The {len(key)} rows have {len(numbers)} {'times' if frame is None else 'frames'}.",
+        f"The table has {len(key)} rows with {len(numbers)} different "
+        f"{'times' if frame is None else 'frames'}.",
     )
 
 

@@ -136,9 +136,9 @@ CORRECTED = {
     "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number", ("none", "0,0,0")),
     "texture": Key(_texture, "vertices, dense, dense:500000 or none", ("vertices", "dense", "none")),
     "splats": _words("yes or no", "yes", "no"),
-    "camera": Key(_camera, "fx,fy,cx,cy in pixels, then 4, 5 or 8 lens coefficients or none; or a file"),
+    "camera": Key(_camera, "fx,fy,cx,cy in pixels, optionally with 4, 5 or 8 lens coefficients; or a file"),
     "extrinsics": _words("to-camera or to-world", "to-camera", "to-world"),
-    "depth-scale": Key(_positive, "a number of steps in one unit, above 0"),
+    "depth-scale": Key(_positive, "the number of depth steps in one unit, above 0"),
     "depth-channel": Key(str, "a channel of the EXR file"),
     "axes": Key(
         _axes, "LPS, RAS, unknown, or three signed axes such as '+x -z +y'", ("LPS", "RAS", "unknown")
@@ -146,7 +146,7 @@ CORRECTED = {
     "ground": _words("degrees or lengths", "degrees", "lengths"),
     "unit": Key(checked_unit, "a short word such as mm", ("mm", "cm", "m")),
     "frames": Key(
-        str, "a pattern such as '*.ply', a list such as 'b.ply;a.ply', or rows, image or cloud for an array"
+        str, "a pattern such as '*.ply', a list such as 'b.ply;a.ply', or for an array: rows, image or cloud"
     ),
     "take": Key(str, "a name, or all", ("all",)),
     "times": Key(_times, "names, index, fps:50, column:NAME, or a file", ("names", "index")),
@@ -220,7 +220,7 @@ def _value(key: str, text: str) -> Any:
             raise ValueError
         return CORRECTED[key].parse(text)
     except (ValueError, OverflowError) as error:
-        what = f"'{shortened(text)}' is not a value of {key}"
+        what = f"'{shortened(text)}' is not a possible value of {key}"
         raise InputError(what, hint=f"Give {CORRECTED[key].form}") from error
 
 
@@ -228,6 +228,8 @@ def parsed_pair(pair: str) -> tuple[str, str]:
     """Key and text of `KEY=VALUE`. Raises InputError where there is no sign between them, or no such key."""
     key, sign, text = pair.partition("=")
     if not sign:
-        raise InputError(f"'{shortened(pair)}' is not KEY=VALUE", hint="For example: decimal=,")
+        raise InputError(
+            f"'{shortened(pair)}' does not have the form KEY=VALUE", hint="For example: decimal=,"
+        )
     _value(key.strip(), text.strip())
     return key.strip(), text.strip()

@@ -70,7 +70,7 @@ def lying_over(image: NDArray, depth: NDArray, what: str, decided: Decided) -> N
     if (fitting := over_depth(image, depth)) is None:
         sizes = f"{_shown(image)} pixels, but its depth picture has {_shown(depth)}"
         decided.note_unused(f"{what} of {sizes}")
-        decided.report("camera", f"Scan4D leaves out the {what}: a picture has {sizes}")
+        decided.report("camera", f"Scan4D does not use the {what}, because a picture has {sizes}")
     return fitting
 
 

@@ -23,7 +23,7 @@ _REFERENCE = re.compile(
 )
 _NO_SCANS = (".", "~")  # hidden files, and the lock files of other programs, begin so
 _ALL = "*"
-USE_ALL = f" Use them with --read {KEY}='{_ALL}'"  # how, on the command line
+USE_ALL = f" To use these files too, add --read {KEY}='{_ALL}'"  # how, on the command line
 LIST = ";"  # between the files that a correction lists, in the order in which they play
 
 _WORDS = r"copy|copie|kopie|copia|cópia|kopia|kopija|duplicate|コピー|副本"
@@ -120,7 +120,7 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
     used = in_order([name for name in rest if name not in odd])
     if not aside:
         return FrameFiles(used, Decision(KEY, counted(used), "folder"), ())
-    why = f"Scan4D leaves aside {', '.join(row.file for row in aside[:3])}, by the names"
+    why = f"Because of their names, Scan4D does not play {', '.join(row.file for row in aside[:3])}"
     return FrameFiles(used, Decision(KEY, counted(used), "assumed", why=why, alternatives=(_ALL,)), aside)
 
 
@@ -154,4 +154,4 @@ def message_of_files(frames: FrameFiles) -> str:
         return ""
     listed = ", ".join(f"{row.file} ({row.why})" for row in frames.aside[:3])
     more = f" and {len(frames.aside) - 3} more" if len(frames.aside) > 3 else ""
-    return f"Scan4D leaves aside {listed}{more}.{USE_ALL}"
+    return f"Scan4D does not play {listed}{more}.{USE_ALL}"

@@ -27,7 +27,10 @@ def decide_ground(
         return Decision(KEY, stated, "file")
     if are_degrees(corner, size, span):
         found, other = DEGREES, LENGTHS
-        why = "The edges are possible degrees, and lengths would make cliffs of the heights"
+        why = (
+            "The edges can be degrees of longitude and latitude. As lengths, they would make the terrain "
+            "far too steep"
+        )
     else:
         found, other = LENGTHS, DEGREES
         why = "The file does not state the unit of its ground coordinates"

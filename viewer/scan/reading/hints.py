@@ -11,10 +11,12 @@ from typing import NamedTuple
 _CLOUDCOMPARE = "Convert it into PLY with CloudCompare"
 _MESHLAB = "Convert it into PLY or OBJ with MeshLab or Blender"
 _PARAVIEW = "Convert it into PLY with ParaView"
-_VOLUMES = "The file holds a volume, no points. Make a surface in 3D Slicer, and save the surface as PLY"
-_RECORDING = "The file holds a recording. Export its depth pictures and camera into a folder with"
+_VOLUMES = (
+    "The file contains a volume, but no points. Create a surface in 3D Slicer, and save this surface as PLY"
+)
+_RECORDING = "The file contains a recording. Export its depth pictures and camera into a folder with"
 _ARCHIVE = "The file is an archive. Unpack it, and open the folder"
-_SPLATS = "The file holds packed Gaussian splats. Convert it into PLY with SuperSplat"
+_SPLATS = "The file contains packed Gaussian splats. Convert it into PLY with SuperSplat"
 
 _DEPTH = "Scan4D reads depth from 16-bit PNG files with a camera.json beside them"
 _DICOM_AT, _DICOM = 128, b"DICM"  # the mark of DICOM files, which often have no suffix
@@ -26,9 +28,14 @@ _HINTS = {
     ".bpf": ("BPF", "Convert it with 'pdal translate FILE.bpf FILE.ply'"),
     ".ptx": ("PTX", "Convert it with 'pdal translate FILE.ptx FILE.ply', or with CloudCompare"),
     **dict.fromkeys((".fls", ".lsproj", ".fws"), ("FARO scans", _CLOUDCOMPARE)),
-    **dict.fromkeys((".rcp", ".rcs"), ("ReCap projects", "Export E57 or PTS in ReCap, then convert it")),
+    **dict.fromkeys((".rcp", ".rcs"), ("ReCap projects", 
+        "In ReCap, export E57 or PTS, then convert that file"
+    )),
     **dict.fromkeys((".zfs", ".zfprj", ".ptg"), ("this scanner's format", _CLOUDCOMPARE)),
-    ".bin": ("BIN", "Save .bin of CloudCompare as PLY. Convert one of COLMAP with 'colmap model_converter'"),
+    ".bin": ("BIN", 
+        "If the file is from CloudCompare, save it there as PLY. If it is from COLMAP, convert it with "
+        "'colmap model_converter'"
+    ),
     **dict.fromkeys(
         (".stl", ".off", ".3mf", ".3ds", ".dae", ".fbx", ".wrl", ".x3d"), ("this mesh format", _MESHLAB)
     ),
@@ -41,7 +48,7 @@ _HINTS = {
     **dict.fromkeys((".bag",), ("bags", f"{_RECORDING} 'rs-convert' (RealSense) or ROS")),
     **dict.fromkeys((".db3", ".mcap"), ("bags", f"{_RECORDING} ROS")),
     ".mkv": ("MKV", f"{_RECORDING} Open3D's 'azure_kinect_mkv_reader.py'"),
-    ".r3d": ("R3D", "The file is a zip archive of Record3D. Export PLY or EXR with RGB-D in Record3D"),
+    ".r3d": ("R3D", "The file is a zip archive of Record3D. In Record3D, export PLY, or EXR with RGB-D"),
     ".oni": ("ONI", f"{_RECORDING} OpenNI"),
     ".svo2": ("recordings of ZED", f"{_RECORDING} the ZED SDK"),
     **dict.fromkeys((".dcm", ".dicom", ".ima"), ("DICOM", _VOLUMES)),
@@ -50,12 +57,18 @@ _HINTS = {
     **dict.fromkeys((".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz"), ("archives", _ARCHIVE)),
     **dict.fromkeys((".xlsx", ".xls", ".ods"), ("spreadsheets", "Save the sheet as CSV")),
     **dict.fromkeys((".mat", ".h5", ".hdf5", ".pkl", ".pt"), ("this array format", "Save the arrays as NPZ")),
-    **dict.fromkeys((".mp4", ".mov", ".avi"), ("films", "A film holds no depth. Open the scan's own files")),
+    **dict.fromkeys((".mp4", ".mov", ".avi"), ("films", 
+        "A film contains no depth. Open the files of the scan instead"
+    )),
     **dict.fromkeys(
         (".png", ".jpg", ".jpeg", ".bmp"),
-        ("a picture alone", "Open the folder of the picture: depth pictures need the camera beside them"),
+        ("a picture alone", 
+            "Open the folder that contains the picture: depth pictures need the camera file in this folder"
+        ),
     ),
-    **dict.fromkeys((".c3d", ".trc"), ("marker recordings", "Import the landmarks in the window")),
+    **dict.fromkeys((".c3d", ".trc"), ("marker recordings", 
+        "Open a scan, then import these landmarks in the window"
+    )),
 }  # fmt: skip
 
 

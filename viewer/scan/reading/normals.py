@@ -25,7 +25,7 @@ _IN_A_LINE = 1e-4  # variance across a line as a part of that along it
 _LEAST_LENGTH = 1e-30
 _REPORTS = {
     DROPPED: "all stored normals are zero or not finite, so Scan4D estimates them",
-    PARTLY: "some stored normals are zero or not finite: Scan4D estimates these from the points around",
+    PARTLY: "some stored normals are zero or not finite, so Scan4D estimates them from neighbouring points",
 }
 
 
@@ -73,7 +73,9 @@ def decide(found: NormalsFound | None, corrections: Corrections = NOTHING_CORREC
     """Decide what becomes of the normals of a file. found: None where it has none: the value is null."""
     decision = _of_file(found)
     if KEY in corrections and corrections[KEY] == STORED and decision.value == PARTLY:
-        decision = replace(decision, value=STORED, why="Normals that are zero or not finite count as none")
+        decision = replace(
+            decision, value=STORED, why="Points whose normal is zero or not finite stay without a normal"
+        )
     if corrections.get(KEY) == NONE:
         return Decision(KEY, NONE, "user", "--read", "Scan4D estimates normals instead")
     return replace(decision, source="user", where="--read") if KEY in corrections else decision
@@ -87,8 +89,8 @@ def _of_file(found: NormalsFound | None) -> Decision:
         return Decision(KEY, DROPPED, "file", why=why)
     if found.bad:
         why = (
-            f"{found.bad:,} of {found.points:,} normals are zero or not finite: Scan4D estimates these from "
-            "the points around"
+            f"{found.bad:,} of {found.points:,} normals are zero or not finite, so Scan4D estimates them "
+            "from neighbouring points"
         )
         return Decision(KEY, PARTLY, "assumed", why=why, alternatives=(STORED, NONE))
     return Decision(KEY, STORED, "file")

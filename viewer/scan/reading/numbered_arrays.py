@@ -68,7 +68,7 @@ def arrays_of_frames(
 
 
 def _decision(source: str, names: Sequence[str]) -> Decision:
-    value, why = f"arrays {names[0]} to {names[-1]}", f"Each of {len(names)} arrays is a frame"
+    value, why = f"arrays {names[0]} to {names[-1]}", f"Each of the {len(names)} arrays is a frame"
     if source.lower() in _FRAMES | {*POINT_ARRAYS, *IMAGE_ARRAYS}:
         return Decision(KEY, value, "file", source, why)
     return Decision(KEY, value, "assumed", why=why, alternatives=(CLOUD,), changes_numbers=True)

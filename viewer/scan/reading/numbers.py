@@ -171,7 +171,7 @@ class Dialect:
         separator = Decision("separator", self.separator)
         decimal = Decision("decimal", self.decimal, why=_WHY[self.decimal])
         if not self.is_certain:
-            why = "Each comma stands before three digits. It could also separate thousands."
+            why = "Three digits follow each comma, so the commas could also separate thousands."
             decimal = Decision("decimal", ",", "assumed", "", why, (".",), changes_numbers=True)
         user = [Decision(one.key, one.value, "user", "--read") for one in (separator, decimal)]
         return (
@@ -181,7 +181,7 @@ class Dialect:
 
 
 PLAIN = Dialect()
-_WHY = {".": "", ",": "All rows have the same number of values only with decimal commas."}
+_WHY = {".": "", ",": "Only with decimal commas do all rows have the same number of values."}
 _CANDIDATES = (
     Dialect("semicolon"), Dialect("semicolon", ","), Dialect("tab"), Dialect("tab", ","),
     Dialect("comma"), Dialect("comma", ","), Dialect("bar"), Dialect("bar", ","), Dialect(),
@@ -342,10 +342,10 @@ def check_commas(rows: Iterable[Sequence[str]], is_twice: bool = False) -> None:
     same = all(len({len(word) for word in column}) == 1 for column in columns)
     if is_twice or (same and any(len(word) > 1 and word.startswith("0") for word in behind)):
         raise InputError(
-            "uses commas as separators and, it seems, as decimal marks too",
+            "seems to use commas both as separators and as decimal marks",
             hint=(
-                "Export the file with semicolons or blanks between the values, or state what separates "
-                "them, such as --read decimal=. --read separator=comma"
+                "Export the file with semicolons or blanks between the values, or state the two marks, "
+                "such as --read decimal=. --read separator=comma"
             ),
         )
 
@@ -531,7 +531,9 @@ def _parse_row(
     last = max(columns, default=0)
     if len(words) <= last:
         if len(words) < 3 or dialect.delimiter is None:
-            raise InputError(f"row {number:,} has {len(words)} values, but column {last + 1} is read")
+            raise InputError(
+                f"row {number:,} has only {len(words)} values, but Scan4D needs column {last + 1}"
+            )
         words = [*words, *[""] * (last + 1 - len(words))]  # programs leave out empty cells at the end
     return [_number(words[column], dialect.decimal, number, column + 1) for column in columns]
 
@@ -554,7 +556,7 @@ def _number(word: str, decimal: str, row: int, column: int) -> float:
         what = f"row {row:,}, column {column}: {shortened(word)!r} is not a number"
         other = "," if decimal == "." else "."
         is_other = is_numeral(word, other)
-        hint = f"If it is one, read the file with --read decimal={other}" if is_other else None
+        hint = f"If this is a number, read the file with --read decimal={other}" if is_other else None
         raise InputError(what, hint=hint) from None
 
 

@@ -25,8 +25,8 @@ _SHOWN = 40  # lines of a preview
 _SPARSE = ["POINT3D_ID", "X", "Y", "Z", "R", "G", "B", "ERROR"]  # of COLMAP, before the track
 UNREAD = ("-", "label")  # roles of columns that are not read
 NAMES_HELP = (
-    "If the numbers are points, put a line of names above them, such as: x y z, or state them with "
-    "--read columns='x y z'"
+    "If the numbers are points, write a line with the names of the columns above them, such as x y z, or "
+    "add --read columns='x y z'"
 )
 _FIRST_WORDS = {  # of files of another format -> what they are, and their suffix
     "ply": ("a PLY file", ".ply"), "off": ("an OFF mesh", ".off"), "solid": ("an STL mesh", ".stl"),
@@ -149,9 +149,9 @@ class _Search:
             self.above.append(line.strip())
         if self.unnamed is not None and not self.names:
             raise InputError(_not_names(*self.unnamed), hint=NAMES_HELP)
-        what = f"holds no rows of numbers in its first {MOST_ABOVE:,} lines"
+        what = f"contains no rows of numbers in its first {MOST_ABOVE:,} lines"
         if self.promised:
-            raise InputError(f"{what}, but the count above the rows is {self.promised:,}")
+            raise InputError(f"{what}, but a line states {self.promised:,} points")
         raise EmptyFrame(what)
 
     def _take_comment(self, line: str) -> None:
@@ -228,7 +228,7 @@ class _Search:
             tuple(self.above[-_SHOWN:]),
             tuple(map(tuple, rows)),
             instead,
-            NAMES_HELP if other is None else f"Give it the suffix {other[1]}",
+            NAMES_HELP if other is None else f"Rename the file with the suffix {other[1]}",
             tuple(doubts),
             () if names is None else tuple(name for at, name in enumerate(names) if at not in columns),
         )
@@ -244,7 +244,9 @@ class _Search:
         if (stated := self.corrections.get("columns")) is not None:
             if len(stated) != len(words):
                 what = f"has {len(words)} columns, but --read columns= names {len(stated)}"
-                raise InputError(what, hint="Give a role for each column, and '-' for one to leave out")
+                raise InputError(
+                    what, hint="Give a role for each column, and '-' for each column to leave out"
+                )
             return [at for at, role in enumerate(stated) if role not in UNREAD]
         width = max(map(len, rows)) if self.dialect.delimiter else len(words)
         width = width if names is None else len(names)
@@ -303,8 +305,12 @@ def _fitted(names: list[str], rows: Sequence[Sequence[str]], dialect: Dialect) -
         numbers.check_commas([row for row in rows if len(row) > 1], is_twice=width == 2 * len(names))
     if width in (len(names), 0) or (width < len(names) and not any(names[width:])):
         return names, ""
-    which = "Scan4D reads those with names" if width > len(names) else "Check which columns are there"
-    return names, f"there are {len(names)} names of columns, but the rows have {width} values. {which}"
+    which = (
+        ("Scan4D reads only the columns with names")
+        if width > len(names)
+        else "Check which column is missing"
+    )
+    return names, f"the table names {len(names)} columns, but the rows have {width} values. {which}"
 
 
 def _is_unnamed_front(front: Sequence[str], dialect: Dialect) -> bool:
@@ -321,7 +327,10 @@ def _uneven_rows(rows: Sequence[Sequence[str]]) -> str:
     widths = _widths(rows)
     if not widths or min(widths) == max(widths):
         return ""
-    return f"the rows have {min(widths)} to {max(widths)} values. Scan4D reads as many as the first row has"
+    return (
+        f"the rows have {min(widths)} to {max(widths)} values. Scan4D reads as many values of each row as "
+        "the first row has"
+    )
 
 
 def split_names(line: str) -> list[str]:
@@ -367,7 +376,7 @@ def _not_names(number: int, line: str, words: Sequence[str]) -> str:
     twice = next((word for at, word in enumerate(lower) if word in lower[:at]), None)
     if {"x", "y", "z"} & {*lower} and twice:
         return f"line {number} names '{shortened(twice)}' twice, and lacks x, y or z"
-    return f"line {number} is neither numbers nor names with x, y, z: {line.strip()[:60]!r}"
+    return f"line {number} contains neither numbers nor the names x, y and z: {line.strip()[:60]!r}"
 
 
 # --- what the dialog of tables shows ------------------------------------------------------------

@@ -94,7 +94,7 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
     found = takes_in(names)
     if not found:
         if wanted not in (None, ALL):
-            hint = "Leave out --take: the files are frames of one scan"
+            hint = "Leave out --take, because all files are frames of one scan"
             raise InputError(f"there is no take '{shortened(wanted)}'", hint=hint)
         return Takes(in_order(names), Decision(KEY, None, "folder"), (), ())
     short = take_names(list(found))
@@ -111,7 +111,7 @@ def decide(names: Sequence[str], corrections: Corrections = NOTHING_CORRECTED) -
         for name in found[take.pattern]
     )
     if wanted is None:
-        why = f"The folder holds {len(takes)} takes: {', '.join(take.pattern for take in takes)}"
+        why = f"The folder contains {len(takes)} takes: {', '.join(take.pattern for take in takes)}"
         others = tuple(take.name for take in takes[1:])
         decision = Decision(KEY, chosen.name, "assumed", why=why, alternatives=(*others, ALL))
     else:
@@ -126,7 +126,7 @@ def _named(wanted: str, takes: Sequence[Take]) -> Take:
     found = exact or near
     if len(found) != 1:
         hint = f"Takes: {', '.join(take.name for take in takes)}, or {ALL}"
-        raise InputError(f"there is no single take '{shortened(wanted)}'", hint=hint)
+        raise InputError(f"the name '{shortened(wanted)}' does not select exactly one take", hint=hint)
     return found[0]
 
 
@@ -136,8 +136,8 @@ def message_of_takes(takes: Takes) -> str:
         return ""
     listed = ", ".join(f"{take.pattern} ({take.frames})" for take in takes.takes)
     return (
-        f"The folder holds {len(takes.takes)} takes: {listed}. Scan4D opens {takes.decision.value}. Choose "
-        f"another one with --take {takes.takes[1].name}, or {ALL}"
+        f"The folder contains {len(takes.takes)} takes: {listed}. Scan4D opens {takes.decision.value}. To "
+        f"open another take, use --take {takes.takes[1].name}, or {ALL}"
     )
 
 

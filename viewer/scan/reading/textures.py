@@ -127,15 +127,17 @@ def _decide(contents: PointContents, frame: _Frame) -> Decision:
         return Decision(KEY, value, "user", "--read", _counts(count, len(plan.between)))
     if _differ(contents):
         decided.note_unused(f"texture {names}")
-        why = "The vertices have colors of their own"
+        why = "The vertices already have their own colours"
         return Decision(KEY, NONE, "assumed", names, why, (VERTICES, DENSE))
     finer = float(frame.covered.sum()) / count
     if finer > _FINER and count < most:
-        why = f"{_counts(count, len(frame.plan(most).between))}. The texture has {finer:,.0f} texels a vertex"
+        why = (
+            f"{_counts(count, len(frame.plan(most).between))}. The texture has {finer:,.0f} texels per vertex"
+        )
         return Decision(KEY, DENSE, "assumed", names, why, (VERTICES, NONE))
     if texture.is_named:
         return Decision(KEY, VERTICES, "neighbour", names, _counts(count, 0))
-    why = "The file names no picture, and this one has its name"
+    why = "The file names no picture, but this picture has the same name as the file"
     return Decision(KEY, VERTICES, "assumed", names, why, (DENSE, NONE))
 
 
@@ -144,7 +146,7 @@ def _without_pictures(texture: TextureContents) -> Decision:
     why = "Scan4D cannot read the pictures of the materials"
     if len({material.color for material in texture.materials if material.color is not None}) < 2:
         return Decision(KEY, NONE, "assumed", _names(texture), why)
-    why += ", and uses the colors of the materials"
+    why += ", and uses the colours of the materials"
     return Decision(KEY, VERTICES, "assumed", _names(texture), why, (NONE,))
 
 
@@ -155,8 +157,10 @@ def _names(texture: TextureContents) -> str:
 
 def _counts(points: int, added: int) -> str:
     if not added:
-        return f"The file holds {points:,} points. Each has the color of the texture there"
-    return f"The file holds {points:,} points. Scan4D adds {added:,} between them"
+        return (
+            f"The file contains {points:,} points. Each point gets the colour of the texture at its position"
+        )
+    return f"The file contains {points:,} points. Scan4D adds {added:,} points between them"
 
 
 def _most_points(decided: Decided) -> int:
@@ -205,7 +209,7 @@ def _report(image: Path, error: InputError, decided: Decided) -> None:
     elif decided.shared((KEY, "missing"), None, lambda: image) == image:
         decided.contradict(KEY, what)
     else:
-        decided.contradict(KEY, "Scan4D cannot read a texture, and uses the color of its material")
+        decided.contradict(KEY, "Scan4D cannot read a texture, and uses the colour of its material")
 
 
 def _scaled(texels: NDArray[np.float64], materials: Sequence[Material]) -> NDArray[np.float64]:

@@ -80,9 +80,9 @@ def _assumed(labels: Sequence[str], count: int | None) -> Times:
     if len(seconds) < 2:
         return Times(seconds, Decision(KEY, None, "file"))
     counted = "frame numbers" if frame_counts(labels) else "frames"
-    why = f"Nothing states the times. Scan4D assumes {DEFAULT_FPS:g} {counted} per second"
+    why = f"No file states the times of the frames. Scan4D assumes {DEFAULT_FPS:g} {counted} per second"
     if are_dates(labels):
-        why = f"The names are dates. Scan4D assumes {DEFAULT_FPS:g} frames per second"
+        why = f"The file names are dates without times. Scan4D assumes {DEFAULT_FPS:g} frames per second"
     others = (NAMES,) if times_in_names(labels) is not None else ()
     others = (*others, INDEX) if counted == "frame numbers" else others
     alternatives = (*others, f"{_FPS}30", f"{_FPS}50")
@@ -99,8 +99,10 @@ def _as_stated(labels: Sequence[str], folder: Path | None, stated: str, count: i
     if stated == NAMES:
         seconds = times_in_names(labels)
         if seconds is None:
-            hint = "Give fps:25, index, or a file of times"
-            raise InputError("the names of the files give no times that increase", hint=hint)
+            hint = "Use fps:25, index, or the name of a file with times"
+            raise InputError(
+                "the file names do not contain times that increase from frame to frame", hint=hint
+            )
         return Times(seconds, decision)
     if stated == INDEX:
         return Times(np.arange(len(labels) if count is None else count) / DEFAULT_FPS, decision)
@@ -108,7 +110,8 @@ def _as_stated(labels: Sequence[str], folder: Path | None, stated: str, count: i
         return Times(counted_times(labels, float(stated.removeprefix(_FPS)), count), decision)
     if stated.startswith(_COLUMN):
         raise InputError(
-            f"there is no column for '{shortened(stated)}'", hint="Use a column name for a table of frames"
+            f"the scan has no column for '{shortened(stated)}'",
+            hint="Use 'column:NAME' only for a table with all frames",
         )
     path = Path(stated) if folder is None or Path(stated).is_absolute() else folder / stated
     return Times(read_times_csv(path, labels).seconds, decision, is_measured=True)

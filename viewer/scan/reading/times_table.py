@@ -61,8 +61,8 @@ _CLOCK = re.compile(
 _EPOCHS = ((1e8, 1e11, 1.0), (1e11, 1e14, 1e-3), (1e14, 1e17, 1e-6), (1e17, 1e20, 1e-9))
 _LONG_STEP = 10.0  # seconds between frames, beyond which another unit is as likely
 _HINT = (
-    "A row needs a frame (a file name, or an index from 0) and a time that increases, in seconds or in the "
-    "unit that the first row names, such as time_ms"
+    "Each row needs a frame (a file name, or an index from 0) and a time. Times increase, and are in "
+    "seconds or in the unit of the column's name, such as time_ms"
 )
 
 
@@ -126,13 +126,15 @@ def read_times_csv(path: Path, labels: Sequence[str]) -> StatedTimes:
         if frame is None:
             continue
         if lines[frame]:
-            what = f"has a second time for '{labels[frame]}', which line {lines[frame]} already has"
+            what = f"states a second time for '{labels[frame]}', after line {lines[frame]}"
             raise _bad_row(path, row.line, what)
         times[frame], lines[frame] = number, row.line
     if np.isnan(times).any():
         missing = labels[int(np.isnan(times).argmax())]
         raise InputError(
-            f"no time for '{missing}'", path, "Add a row for the frame, or move the frame to another folder"
+            f"contains no time for '{missing}'",
+            path,
+            "Add a row for the frame, or move the frame to another folder",
         )
     for before, after in pairwise(range(len(labels))):
         if times[before] >= times[after]:
@@ -148,8 +150,8 @@ def doubt_of(times: NDArray[np.float64], what: str) -> str:
     if step <= _LONG_STEP:
         return ""
     return (
-        f"No unit is stated, and {step:g} seconds between frames are long. If these are milliseconds, call "
-        f"the {what} time_ms"
+        f"The times have no unit, and {step:g} seconds between frames are long. If the times are "
+        f"milliseconds, rename the {what} to time_ms"
     )
 
 
@@ -179,7 +181,7 @@ def _rows_of(path: Path) -> tuple[list[_Row], str | None]:
         return [row for row in rows if not is_comment(row.cells[0])], separator
     except (OSError, csv.Error) as error:
         raise InputError(
-            f"cannot be read ({error})", path, "A table of times is comma-separated text"
+            f"cannot be read ({error})", path, "Write the table of times as comma-separated text"
         ) from error
 
 
@@ -216,7 +218,7 @@ def _columns_of(path: Path, rows: list[_Row], labels: Sequence[str]) -> tuple[_C
     if not times:
         frame = _named_frames(rows, labels)
         if frame is None and len(names) == 1:
-            return _Columns(None, 0, why="Each row is the next frame."), rows
+            return _Columns(None, 0, why="Scan4D assigns the rows to the frames in order."), rows
         frame = frame or 0
         return _Columns(frame, 0 if frame else 1), rows
     unit = next((_UNITS[word] for word in reversed(_words(names[times[0]])) if word in _UNITS), None)
@@ -227,7 +229,7 @@ def _columns_of(path: Path, rows: list[_Row], labels: Sequence[str]) -> tuple[_C
         for at, name in enumerate(names):
             if at not in times and {*_words(name)} & words:
                 return _Columns(at, times[0], unit, has_numbers, why), rows
-    return _Columns(None, times[0], unit, why=f"{why} Each row is the next frame."), rows
+    return _Columns(None, times[0], unit, why=f"{why} Scan4D assigns the rows to the frames in order."), rows
 
 
 def _named_frames(rows: Sequence[_Row], labels: Sequence[str]) -> int | None:
@@ -271,7 +273,7 @@ def _frames_of(
     if columns.frame is None:
         if len(rows) != len(labels):
             what = f"has {len(rows)} times for {len(labels)} frames"
-            raise InputError(what, path, "Add a column 'file' with the name of the file of each time")
+            raise InputError(what, path, "Add a column 'file' with the file name of each frame")
         return [*range(len(rows))]
     cells = [row.cells[columns.frame] for row in rows]
     named = _names_of(labels)
@@ -381,7 +383,7 @@ def _check_decimals(path: Path, rows: Sequence[_Row], behind: int) -> None:
     """
     cells = [row.cells[behind - 1 :] for row in rows]
     if rows and all(len(pair) == 2 and all(map(str.isdecimal, pair)) for pair in cells):
-        raise _bad_row(path, rows[0].line, "uses commas as separators and, it seems, as decimal marks too")
+        raise _bad_row(path, rows[0].line, "seems to use commas both as separators and as decimal marks")
 
 
 def _bad_row(path: Path, line: int, what: str) -> InputError:

@@ -69,7 +69,11 @@ def camera_trajectory(name: str, text: str) -> CameraTrajectory | None:
         return _of_rows(text, name.lower().endswith(_SUFFIX))
     except (ValueError, KeyError, TypeError, IndexError) as error:
         what = f"is not a list of camera poses: {shortened(str(error))}"
-        raise InputError(what, hint="Rename the file, and each view stays in its camera's space") from error
+        raise InputError(
+            what,
+            hint="If you rename the file, Scan4D ignores it, and each view stays in the coordinates of its "
+            "camera",
+        ) from error
 
 
 def _of_object(stored: Mapping[str, Any]) -> CameraTrajectory | None:

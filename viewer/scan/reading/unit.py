@@ -78,7 +78,7 @@ def note_in_frame(contents: PointContents, decided: Decided) -> None:
         decided.replace(found)
     elif known.source == "file" and known.value != found.value:
         decided.contradict(
-            KEY, f"the unit of the file is {found.value}, but that of the scan is {known.value}"
+            KEY, f"the unit of the file is {found.value}, but the unit of the scan is {known.value}"
         )
 
 

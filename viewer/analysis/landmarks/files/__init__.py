@@ -97,7 +97,9 @@ def write_landmarks(path: Path | str, landmarks: LandmarkSet, axes: str = "LPS")
     module = _module_of(path)
     if module is None or not hasattr(module, "write"):
         known = ", ".join(landmark_suffixes(written=True))
-        raise InputError(f"cannot write landmarks as '{_suffix_of(path)}'", path, f"Known: {known}")
+        raise InputError(
+            f"Scan4D cannot write landmarks to a '{_suffix_of(path)}' file", path, f"Known: {known}"
+        )
     if not path.parent.is_dir():
         raise InputError(f"there is no folder '{path.parent}'", path, "Create it first")
     if getattr(module, "AXES", axes) != axes:
@@ -106,7 +108,8 @@ def write_landmarks(path: Path | str, landmarks: LandmarkSet, axes: str = "LPS")
         if len(landmarks) > 1 and getattr(module, "ONE_MOMENT", False):
             hint = f"Write one file per frame, such as '{_series_name(path)}', or use .c3d or .csv"
             raise InputError(
-                f"{module.TITLE} files hold one frame, but the landmarks have {len(landmarks)} frames",
+                f"{module.TITLE} files contain a single frame, but the landmarks have {len(landmarks)} "
+                "frames",
                 path,
                 hint,
             )
@@ -131,7 +134,9 @@ def _read(path: Path, unit: str | None, axes: str, frame: int | None) -> Landmar
     with _one_message_of(path, module):
         found: LandmarkSet = module.read(path)
         if frame is not None and len(found) > 1:
-            raise InputError(f"holds {len(found)} frames, but each file of a series must hold one frame")
+            raise InputError(
+                f"contains {len(found)} frames, but each file of a series must contain one frame"
+            )
     if found.axes not in (None, axes):
         found = found.turned()
     found = found.in_unit(unit)
@@ -169,7 +174,7 @@ def _joined(parts: list[LandmarkSet], path: Path) -> LandmarkSet:
     column = {name: number for number, name in enumerate(names)}
     units = {part.unit for part in parts}
     if len(units) > 1:
-        raise InputError(f"the files of the series use several units: {', '.join(map(str, units))}", path)
+        raise InputError(f"the files of the series have different units: {', '.join(map(str, units))}", path)
     for row, part in enumerate(parts):
         columns = [column[name] for name in part.names]
         positions[row, columns], known[row, columns] = part.positions[0], part.known[0]
@@ -254,7 +259,7 @@ def _readable_module(path: Path) -> ModuleType:
     if module is None:
         known = ", ".join(landmark_suffixes())
         raise InputError(
-            f"unknown file suffix '{shortened(path.suffix)}' for landmarks", path, f"Known: {known}"
+            f"Scan4D does not read landmarks from '{shortened(path.suffix)}' files", path, f"Known: {known}"
         )
     if is_empty:
         raise InputError("is empty (0 bytes)", path, "Copy or export the file again")

@@ -47,7 +47,7 @@ _SEPARATORS = ";\t|,"
 _FRAMES = ("frame", "frames", "bild", "bildnummer", "image", "trame")
 _TIMES = ("time", "seconds", "t", "zeit")
 _UNDEFINED = {"0", "false"}
-_HINT = "Give each row one value for each column that the first line names"
+_HINT = "Write a value for each column of the first line into each row"
 
 
 def has_columns(head: str) -> bool:
@@ -127,7 +127,8 @@ def read_table(path: Path) -> LandmarkSet:
     if columns := _wide_columns(head):
         return _wide(rows, names, columns, _unit_of(head))
     raise at_line(
-        "has neither the columns x, y and z nor NAME_x, NAME_y and NAME_z",
+        "the table has neither the columns x, y and z, nor three columns NAME_x, NAME_y and NAME_z for "
+        "each landmark",
         line,
         "The first line must name the columns, such as x, y and z, or l, p and s, or r, a and s",
     )
@@ -165,7 +166,9 @@ def _rows(text: str, separator: str, above: int) -> Iterator[tuple[int, list[str
             if any(cell.strip() for cell in row):
                 yield above + reader.line_num, row
     except csv.Error as error:
-        raise at_line(f"is not a row of the table: {error}", above + reader.line_num) from error
+        raise at_line(
+            f"Scan4D cannot read this row of the table: {error}", above + reader.line_num
+        ) from error
 
 
 def _first(names: Sequence[str], wanted: Sequence[str]) -> int | None:
@@ -189,7 +192,11 @@ class _Units:
             self.unit = word
         factor = conversion(word, self.unit)
         if factor is None:
-            raise at_line(f"lengths are in '{shortened(word)}', but in '{self.unit}' in the rows above", line)
+            raise at_line(
+                f"lengths in this row are in '{shortened(word)}', but lengths in the rows above are in "
+                f"'{self.unit}'",
+                line,
+            )
         return factor
 
 
@@ -232,7 +239,7 @@ def _long(
             continue
         frame = 0 if frame_at is None else _frame(row[frame_at], line)
         if frame < 0 and kind_at is not None:
-            raise at_line("names frame 0, but in tables of Scan4D frames are counted from 1", line)
+            raise at_line("names frame 0, but tables of Scan4D count frames from 1", line)
         name = str(len(numbers) + 1) if name_at is None else text_of_cell(row[name_at].strip())
         factor = 1.0 if unit_at is None else units.factor(row[unit_at], line)
         place = [number_of(row[axis], line) * factor for axis in axes]
@@ -260,7 +267,7 @@ def _long(
     if len(first) < len(at):
         again = np.setdiff1d(np.arange(len(at)), first)[0]
         name = list(numbers)[number_of_row[again]]
-        what = f"'{shortened(name)}' appears twice in one frame"
+        what = f"the landmark '{shortened(name)}' appears twice in one frame"
         raise at_line(what, int(lines[again]), "Give each landmark its own name")
     values, known = np.full((len(frames) * len(numbers), 4), np.nan), np.zeros(len(frames) * len(numbers))
     values[at], known[at] = np.array(numerals).reshape(-1, 4), states
@@ -317,7 +324,8 @@ def _wide(
         frames.append(len(frames) if frame_at is None else _frame(row[frame_at], line))
         if len(frames) > 1 and frames[-1] <= frames[-2]:
             raise at_line(
-                f"the frame of this row is {frames[-1] + 1}, but that of the row above is {frames[-2] + 1}",
+                f"this row belongs to frame {frames[-1] + 1}, but the row above belongs to frame "
+                f"{frames[-2] + 1}",
                 line,
                 "Sort the rows by frame",
             )

@@ -33,7 +33,7 @@ def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
         held = os.fstat(stream.fileno()).st_size  # Python takes memory for all that it is asked for
         data = stream.read(min(held, most) + 1)
     if len(data) > most:
-        raise InputError(f"is longer than the {most:,} bytes that a file of landmarks may have")
+        raise InputError(f"is longer than {most:,} bytes, the limit for a file of landmarks")
     return data
 
 
@@ -150,7 +150,7 @@ def without_states(landmarks: LandmarkSet, title: str) -> str | None:
     """The remark of a format that has no states, where the landmarks have some."""
     if (landmarks.known == Known.TRACKED).any() or np.isfinite(landmarks.sigmas).any():
         return (
-            f"{title} files store no uncertainty, and not which landmarks were tracked. If you read "
-            "the file, Scan4D takes all landmarks as placed"
+            f"{title} files do not store uncertainties, nor which landmarks Scan4D tracked. If you import "
+            "the file, Scan4D treats all its landmarks as placed"
         )
     return None

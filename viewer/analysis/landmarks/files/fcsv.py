@@ -44,10 +44,10 @@ def read(path: Path) -> LandmarkSet:
         try:
             (row,) = csv.reader(StringIO(text))
         except csv.Error as error:
-            raise at_line(f"is not a row of the table: {error}", line) from error
+            raise at_line(f"Scan4D cannot read this row of the table: {error}", line) from error
         values = dict(zip(columns, row, strict=False))
         if not {"x", "y", "z"} <= values.keys():
-            raise at_line(f"has {len(row)} values, too few for a fiducial", line)
+            raise at_line(f"has only {len(row)} values, too few for a landmark", line)
         position = three_numbers([values["x"], values["y"], values["z"]], line)
         state = _STATES.get(values.get("positionStatus", "").strip())
         if state is None:

@@ -47,18 +47,21 @@ def read(path: Path) -> LandmarkSet:
     except ValueError as error:
         raise InputError(f"is not JSON ({error})") from error
     if not isinstance(data, dict) or not isinstance(data.get("markups"), list):
-        raise InputError("has no list of markups (landmarks)", hint="Save the file as .mrk.json in 3D Slicer")
+        raise InputError(
+            "contains no list 'markups' with landmarks",
+            hint="Save the landmarks again in 3D Slicer as a .mrk.json file",
+        )
     schema = data.get("@schema", _SCHEMA)
     if not isinstance(schema, str) or not _READ.search(schema):
-        raise InputError(f"has the schema '{shortened(schema)}', but Scan4D reads markups 1.x")
+        raise InputError(f"has the schema '{shortened(schema)}', but Scan4D reads only markups of version 1")
     parts = [_markup(markup, f"markup {number}") for number, markup in enumerate(data["markups"], 1)]
     parts = [part for part in parts if part["names"]]
     if not parts:
         raise InputError("holds no landmarks")
     if len({part["axes"] for part in parts}) > 1 or len({part["unit"] for part in parts}) > 1:
         raise InputError(
-            "the markups of the file are in several coordinate systems or units",
-            hint="Save each markup to its own file",
+            "the markups of the file have different coordinate systems or units",
+            hint="In 3D Slicer, save each markup to its own file",
         )
     own = _own(data)
     unit = _word(own["unit"]) if "unit" in own else parts[0]["unit"]
@@ -116,13 +119,13 @@ def _markup(markup: Any, where: str) -> dict[str, Any]:
     remarks = []
     if lost:
         remarks.append(
-            f"{len(lost)} points have no position, although the file marks them as defined, such as "
+            f"The file marks {len(lost)} points as defined, but gives them no position, such as "
             f"'{shortened(lost[0])}'"
         )
     if previews:
         are = "point is a preview" if len(previews) == 1 else "points are previews"
         remarks.append(
-            f"{len(previews)} {are}, which nobody has confirmed in 3D Slicer, such as "
+            f"{len(previews)} {are} that nobody has confirmed in 3D Slicer, such as "
             f"'{shortened(previews[0])}'"
         )
     name = _word(markup.get("name"))
@@ -156,7 +159,7 @@ def _position(value: Any, where: str) -> list[float]:
         return [math.nan] * 3
     fits = isinstance(value, list) and len(value) == 3
     if not fits or not all(isinstance(one, int | float) and not isinstance(one, bool) for one in value):
-        raise InputError(f"position is {shortened(value)} instead of three numbers", where)
+        raise InputError(f"position is {shortened(value)}, but must be three numbers", where)
     return [float(one) if abs(one) < 1e300 else math.nan for one in value]
 
 

@@ -60,7 +60,9 @@ def read(path: Path) -> LandmarkSet:
             current = sections[name] = []
         elif current is None:
             raise at_line(
-                f"is outside any section: '{shortened(text)}'", line, "Start the file with [individuals]"
+                f"the line '{shortened(text)}' does not belong to any section",
+                line,
+                "Start the file with [individuals]",
             )
         else:
             current.append((line, text))
@@ -71,8 +73,8 @@ def read(path: Path) -> LandmarkSet:
     places = [(line, text) for line, text in raw if not text.startswith("'")]
     if len(places) != individuals * count:
         what = (
-            f"holds {len(places)} positions, but [individuals] and [landmarks] announce {individuals} "
-            f"times {count}"
+            f"contains {len(places)} positions, but according to [individuals] and [landmarks] there "
+            f"should be {individuals} x {count}"
         )
         raise InputError(what, "[rawpoints]")
     own: dict[str, Any] = {}
@@ -86,7 +88,7 @@ def read(path: Path) -> LandmarkSet:
     left_out = dict.fromkeys(_LEFT_OUT[name] for name in sections if name in _LEFT_OUT)
     remarks = [f"Scan4D leaves out these parts of the file: {' and '.join(left_out)}"] if left_out else []
     if flat:
-        remarks.append("The landmarks of the file have two coordinates: Scan4D sets z to 0")
+        remarks.append("The landmarks in the file have only two coordinates: Scan4D sets z to 0")
     frames = _listed(own.get("frames"), individuals)
     names = own_names(own, count)
     if names is None:
@@ -102,7 +104,7 @@ def read(path: Path) -> LandmarkSet:
 
 def _count(sections: dict[str, list[tuple[int, str]]], name: str) -> int:
     if not sections.get(name):
-        raise InputError(f"has no number in the section [{name}]")
+        raise InputError(f"the section [{name}] contains no number")
     line, text = sections[name][0]
     return count_of(text, line, f"[{name}]")
 

@@ -45,7 +45,7 @@ def read(path: Path) -> LandmarkSet:
 
     data = read_bytes(path, _MOST_BYTES)
     if len(data) < 2 * _BLOCK or data[1] != _MAGIC:
-        raise InputError("is not a C3D file, or is cut short")
+        raise InputError("is not a C3D file, or is not complete")
     with _library():
         reader = Reader(BytesIO(data))
         count, frames, first = int(reader.point_used), int(reader.frame_count), int(reader.first_frame)
@@ -55,7 +55,7 @@ def read(path: Path) -> LandmarkSet:
     if not count:
         raise InputError("holds no points")
     if frames < 1 or frames * (4 * count + analog) * words > held:
-        raise InputError(f"announces {frames:,} frames of {count:,} points, but ends earlier")
+        raise InputError(f"should contain {frames:,} frames of {count:,} points, but ends earlier")
     check_cells(frames, count)
     with _library():
         values = np.stack([points for _, points, _ in reader.read_frames(analog_transform=False)])
@@ -71,7 +71,7 @@ def read(path: Path) -> LandmarkSet:
         notes=LandmarkNotes(
             _unit(reader),
             _texts(reader, "DESCRIPTIONS", count),
-            remarks=[] if labels else ["The points of the file have no names: Scan4D numbers them"],
+            remarks=[] if labels else ["The points in the file have no names, so Scan4D numbers them"],
         ),
     )
 
@@ -129,7 +129,7 @@ def write(path: Path, landmarks: LandmarkSet) -> str | None:
     landmarks = landmarks.even_rows()
     count = len(landmarks.names)
     if count > _MOST_POINTS:
-        raise InputError(f"C3D holds at most {_MOST_POINTS} points", hint="Use .csv")
+        raise InputError(f"C3D files can contain at most {_MOST_POINTS} points", hint="Use .csv")
     rate, is_even = _rate(landmarks)
     longest = min(_LONGEST, _TEXTS // count)
     labels = _labels(landmarks.names, longest)
@@ -203,13 +203,12 @@ def _remark(landmarks: LandmarkSet, labels: Sequence[bytes], longest: int, is_ev
     """Losses of the file, in words."""
     lost = []
     if any(label.decode() != name for label, name in zip(labels, landmarks.names, strict=True)):
-        lost.append(f"names are cut after {longest} bytes")
+        lost.append(f"Scan4D cuts names after {longest} bytes")
     if not is_even:
-        lost.append("the frames get evenly spaced times from 0 s, because C3D stores only a frame rate")
+        lost.append("C3D stores only a frame rate, so the file gives the frames evenly spaced times from 0 s")
     points = landmarks.positions[landmarks.is_defined]
     if len(points):
         off = np.abs(points.astype(np.float32) - points).max()
         if off > _ROUNDED * max(float(np.ptp(points, axis=0).max()), 1e-300):
-            lost.append(f"coordinates are rounded by up to {off:.2g}")
-    remarks = [f"In C3D, {'; '.join(lost)}"] if lost else []
-    return ". ".join(filter(None, [*remarks, without_states(landmarks, TITLE)])) or None
+            lost.append(f"C3D rounds coordinates by up to {off:.2g}")
+    return ". ".join(filter(None, [*lost, without_states(landmarks, TITLE)])) or None

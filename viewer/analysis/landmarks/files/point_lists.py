@@ -66,7 +66,7 @@ def read(path: Path) -> LandmarkSet:
         words = _words(text, dialect)
         first = _place_in(words)
         if waiting is not None and first != 0:
-            raise at_line(f"'{shortened(waiting[1])}' has no coordinates", waiting[0])
+            raise at_line(f"the landmark '{shortened(waiting[1])}' has no coordinates", waiting[0])
         if first is None:
             waiting = line, text
             continue
@@ -74,15 +74,15 @@ def read(path: Path) -> LandmarkSet:
         names.append(" ".join(words[:first]) if first else waiting[1] if waiting else "")
         waiting = None
     if waiting is not None:
-        raise at_line(f"'{shortened(waiting[1])}' has no coordinates", waiting[0])
+        raise at_line(f"the landmark '{shortened(waiting[1])}' has no coordinates", waiting[0])
     if promised is not None and promised[0] != len(rows):
-        raise at_line(f"announces {promised[0]} landmarks, but {len(rows)} follow", promised[1])
+        raise at_line(f"announces {promised[0]} landmarks, but the file contains {len(rows)}", promised[1])
     if not any(names):
         names = [str(number) for number in range(1, len(rows) + 1)]
         if _are_numbered(rows):
             names, rows = [str(int(row[0])) for row in rows], [row[1:] for row in rows]
     flat = sum(len(row) == 2 for row in rows)
-    remarks = [f"{flat} landmarks have two coordinates: Scan4D sets z to 0"] if flat else []
+    remarks = [f"{flat} landmarks have only two coordinates: Scan4D sets z to 0"] if flat else []
     places = [_place(row, has_flags) for row in rows]
     return LandmarkSet.of(names, np.array([places]), notes=LandmarkNotes(remarks=remarks))
 

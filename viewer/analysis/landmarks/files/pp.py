@@ -23,7 +23,8 @@ def read(path: Path) -> LandmarkSet:
     """The points; those that are not active are gaps. Raises InputError."""
     text = read_all(path)
     if "<!ENTITY" in text:
-        raise InputError("defines entities of XML, which Scan4D does not read")
+        hint = "Save the points again in MeshLab"
+        raise InputError("defines XML entities, which Scan4D does not read", hint=hint)
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:

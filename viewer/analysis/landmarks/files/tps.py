@@ -61,7 +61,7 @@ def read(path: Path) -> LandmarkSet:
         match = _KEY.fullmatch(text)
         if match is None:
             raise at_line(
-                "is neither KEY=VALUE nor one of the positions that LM= announces",
+                "the line is neither KEY=VALUE nor one of the positions after LM=",
                 line,
                 "Check the number after LM= or LM3=",
             )
@@ -90,12 +90,14 @@ def _points(
 ) -> tuple[list[list[float]], int]:
     """The coordinates of a specimen, and the row after them. A place in two dimensions has z = 0."""
     if count > len(lines) - row:
-        raise at_line(f"announces {count} landmarks, but {len(lines) - row} lines follow", line)
+        raise at_line(
+            f"announces {count} landmarks, but the file has only {len(lines) - row} more lines", line
+        )
     points: list[list[float]] = []
     for number, text in lines[row : row + count]:
         words = text.split()
         if "=" in text:
-            what = f"announces {count} landmarks, but {len(points)} follow"
+            what = f"announces {count} landmarks, but only {len(points)} follow"
             raise at_line(what, line)
         points.append(three_numbers([*words[:2], "0"] if is_flat and len(words) >= 2 else words, number))
     return points, row + count
@@ -113,9 +115,9 @@ def _frames(specimens: list[_Specimen], curves: int) -> LandmarkSet:
     own = specimens[0].own
     remarks = []
     if curves:
-        remarks.append(f"Scan4D leaves out {curves} curves")
+        remarks.append(f"Scan4D does not read the {curves} curves of the file")
     if any(specimen.is_flat for specimen in specimens):
-        remarks.append("The landmarks of the file have two coordinates: Scan4D sets z to 0")
+        remarks.append("The landmarks in the file have only two coordinates: Scan4D sets z to 0")
     names = own_names(own, count)
     if names is None:
         names = [str(number) for number in range(1, count + 1)]

@@ -66,13 +66,13 @@ def _section(surface: PoseSurface, positions: NDArray[np.float64], options: Opti
     patch = surface.patch(beyond)
     lines = _contours(patch, center, normal, local[0], options)
     if not lines:
-        return Refused("the plane through the landmarks meets no surface")
+        return Refused("the plane through the landmarks does not cut the surface")
     if options.get("lines") != "all" and _ends_at_opening(
         surface, lines[0], plane_section(patch, center, normal)
     ):
         return Refused(
-            "the line of the section ends at an opening in the surface. Fill the opening, or measure along "
-            "all lines (option lines = all)"
+            "the line where the plane cuts the surface ends at an opening. Fill the opening, or measure "
+            "all parts of the line (option lines = all)"
         )
     gradient = np.zeros_like(positions)
     step = _STEP * surface.spacing
@@ -127,11 +127,13 @@ def _ends_at_opening(surface: PoseSurface, line: Line, lines: Sequence[Line]) ->
 KINDS = (
     MeasureKind(
         "path", "Path along the surface",
-        "length of the shortest path on the surface from each landmark to the next",
+        "length of the shortest path along the surface, from each landmark to the next",
         "length", 2, None, _path, True, {"closed": ("no", "yes")},
     ),
     MeasureKind(
-        "section", "Cross-section", "length of the line where the landmarks' plane cuts the surface",
+        "section", "Cross-section", 
+            "length of the line where the plane through the landmarks cuts the surface"
+        ,
         "length", 3, None, _section, True, {"lines": ("nearest", "all"), "plane": PLANES},
     ),
 )  # fmt: skip

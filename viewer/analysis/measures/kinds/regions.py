@@ -171,17 +171,17 @@ def _pulled(edges: list[Line]) -> list[NDArray[np.float64]]:
 KINDS = (
     MeasureKind(
         "area", "Area of a region",
-        "area of the surface inside an outline that follows the surface between landmarks",
+        "area of the surface inside an outline, which runs along the surface from landmark to landmark",
         "area", 3, None, _area, True, {"depth": DEPTHS},
     ),
     MeasureKind(
         "perimeter", "Perimeter of a region",
-        "length of an outline that follows the surface between landmarks",
+        "length of an outline, which runs along the surface from landmark to landmark",
         "length", 3, None, _perimeter, True, {"depth": DEPTHS},
     ),
     MeasureKind(
         "volume", "Volume above the outline's plane",
-        "volume between a region and the plane of the outline; negative below the plane",
+        "volume between the surface inside an outline and the plane of the outline; negative below the plane",
         "volume", 3, None, _volume, True,
     ),
 )  # fmt: skip

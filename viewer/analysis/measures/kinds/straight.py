@@ -11,8 +11,8 @@ from . import MeasureKind, Options
 
 _BETWEEN = 32  # places on a curve from one landmark to the next
 _PLANE = (
-    "the other landmarks define the plane: the plane fits three or more landmarks, or lies halfway "
-    "between the two landmarks of each pair"
+    "the other landmarks define the plane, which fits three or more landmarks or lies halfway between "
+    "the two landmarks of each pair"
 )
 
 Positions = NDArray[np.float64]  # (T, K, 3)
@@ -130,7 +130,9 @@ KINDS = (
         "length", 4, None, _plane_distance, choices={"plane": PLANES}, lines=_plane_distance_lines,
     ),
     MeasureKind(
-        "curve", "Curve", "length of a smooth or straight line through all landmarks, not along the surface",
+        "curve", "Curve", 
+            "length of a smooth or straight line through all landmarks, which does not follow the surface"
+        ,
         "length", 2, None, _curve, choices={"shape": ("smooth", "straight"), "closed": ("no", "yes")},
         lines=_curve_lines,
     ),

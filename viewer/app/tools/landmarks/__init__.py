@@ -47,7 +47,7 @@ class Settings:
     """Choices that come back at the next start."""
 
     follow: bool = param(True, "Track landmarks through all frames as soon as you place them")
-    names: bool = param(True, "Show names in the view, where there is room")
+    names: bool = param(True, "Show the names of landmarks in the view, where there is room")
     loupe: bool = param(True, "Show a magnifier under the mouse while you place landmarks")
 
 
@@ -203,12 +203,15 @@ class Tool:
         target, names = self.target, [one.name for one in self.made.listed]
         if target is not None and target.state == "not placed":
             number = names.index(target.name) + 1
-            return f"{target.title}, {number} of {len(names)}: click it."
+            return f"{target.title}, {number} of {len(names)}: click its position."
         if target is not None:
-            return f"{target.title}: click it in {frame_in_words(self.frame)}."
+            return f"{target.title}: click its position in {frame_in_words(self.frame)}."
         if self.is_free:
             return f"{self.made.free_name()}: click its position."
-        return f"{placed_words(self.made.listed)}: drag one to correct it, or choose one in the list."
+        return (
+            f"{placed_words(self.made.listed)}: drag a landmark to correct it, or choose a landmark in the "
+            "list."
+        )
 
     def on_click(self, click: Click) -> bool:
         """Set the next one at what was clicked; raises InputError where it cannot be."""
@@ -231,7 +234,9 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         point = SurfacePoint.of(click.picked, click.pose, place=click.motion)
         if click.through_gap:
-            self.context.note("No point at the click: Scan4D used the nearest surface in front of it.")
+            self.context.note(
+                "You clicked on a gap between points. Scan4D used the nearest surface in front of the gap."
+            )
         self.corrects = self.corrects and bool(landmark.keys)
         self.selected, self._arrows_in = landmark.name, point.frame
         self.context.change(name, self.made.with_landmark(landmark.with_key(point)), merge=merge)
@@ -282,7 +287,9 @@ class Tool:
         """Set the next one where the mirror image of its partner is, on the surface that is seen there."""
         target, proposal, pose = self.target, self.proposal, self.context.pose
         if target is None or proposal is None or pose is None:
-            raise InputError("No mirror position yet: place its mirror partner and a few other pairs first.")
+            raise InputError(
+                "The mirror position is not known yet: first place the mirror partner and a few other pairs."
+            )
         position = self.context.motion(pose).points(proposal.position)
         click = self.context.seen_at(vector(position))
         deviations, share = _OFF
@@ -390,7 +397,7 @@ class Tool:
         if landmark.key_at(self.frame) is None:
             return f"You did not place {landmark.name} in {frame_in_words(self.frame)}"
         if len(landmark.keys) == 1:
-            return f"{landmark.name} is placed in this frame only: Delete removes the landmark"
+            return f"You placed {landmark.name} only in this frame. To remove the landmark, press Delete"
         return ""
 
     # --- in the window ----------------------------------------------------------------

@@ -48,18 +48,21 @@ class Exchange:
         written = [suffix for suffix in landmark_suffixes(written=True) if suffix != _USUAL]
         redraw = context.redraw
         self._saving = FileDialog(
-            SAVE, "Export landmarks", f"The suffix sets the format: {_USUAL}, {', '.join(written)}",
+            SAVE, "Export landmarks",
+            f"The suffix of the file name sets the format: {_USUAL}, {', '.join(written)}",
             (_USUAL, *written), self._save, redraw,
         )  # fmt: skip
         self._reading = FileDialog(
             OPEN, "Import landmarks", "A file of landmarks, or a template",
             (".json", *landmark_suffixes()), self._read, redraw,
         )  # fmt: skip
-        about = "Saves the landmarks' names, mirror partners and measures, for use in other scans"
+        about = (
+            "A template stores the names, mirror partners and measures of landmarks, for use in other scans"
+        )
         self._template_saving = FileDialog(
             SAVE, "Save template", about, (".json",), self._save_template, redraw
         )
-        about = "A file that 'Save as template...' has written"
+        about = "A file that you saved with 'Save as template...'"
         self._template_reading = FileDialog(
             OPEN, "Choose template", about, (".json",), self._read_template, redraw
         )

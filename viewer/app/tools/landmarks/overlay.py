@@ -85,7 +85,7 @@ def _draw_under_way(tool: Tool, canvas: Canvas, view: ScreenView) -> None:
         if there is not None:
             canvas.ring(there, _GHOST, 0.9)
             label = Label(
-                ["mirror position: press A to place it here"],
+                ["mirror position: press A to place the landmark here"],
                 np.array([(there.x, there.y)]),
                 _GHOST,
                 faint=True,

@@ -33,7 +33,7 @@ def draw(tool: Tool, ui: Ui) -> None:
     imgui.begin_disabled(not tool.is_active)
     if row.button():
         tool.skip()
-    ui.tooltip("Skip the next landmark, or place a skipped one after all", "skip_landmark")
+    ui.tooltip("Skip the next landmark, or place a skipped landmark after all", "skip_landmark")
     if row.button():
         tool.set_missing()
     ui.tooltip("Mark the landmark as not visible in this frame", "missing_landmark")
@@ -42,7 +42,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         if ui.row("Place from mirror partner").button():
             tool.take_mirrored()
         ui.tooltip(
-            f"Place {tool.target.name} where the mirror image of {tool.target.partner} lies",
+            f"Place {tool.target.name} at the mirror image of {tool.target.partner}",
             "mirrored_landmark",
         )
     if tool.is_active and tool.target is not None and tool.target.about:
@@ -72,7 +72,7 @@ def draw(tool: Tool, ui: Ui) -> None:
 def _draw_template(tool: Tool) -> None:
     known = tool.exchange.templates
     titles = {"": _FREE, **{name: template.title for name, template in known.items()}}
-    widgets.label("Template", "The list of landmarks to place, in order")
+    widgets.label("Template", "Names and order of the landmarks to place")
     chosen = tool.made.template
     if imgui.begin_combo("##template", widgets.unhidden(titles.get(chosen, chosen))):
         for name, title in titles.items():
@@ -168,7 +168,9 @@ def _draw_selected(tool: Tool, ui: Ui) -> None:
     if row.button():
         tool.take_key_away()
     imgui.end_disabled()
-    about = "Remove the position that you set in this frame. Tracking finds the landmark again"
+    about = (
+        "Remove the position that you set in this frame. Scan4D then tracks the landmark through this frame"
+    )
     ui.tooltip(reason or about, "landmark_key")
     if row.button():
         tool.delete()

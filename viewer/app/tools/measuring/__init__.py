@@ -65,9 +65,9 @@ class Tool:
     def __init__(self, context: ToolContext) -> None:
         self.context = context
         self.filled = False
-        about = "All distances, as a table of comma separated values"
+        about = "Table of all distances (comma-separated values)"
         self.saving = FileDialog(SAVE, "Export distances", about, (".csv",), self._save, context.redraw)
-        about = "A table that 'Export distances...' has written for this scan"
+        about = "A table that you saved with 'Export distances...' for this scan"
         self.reading = FileDialog(OPEN, "Import distances", about, (".csv",), self._read, context.redraw)
         self.begun: SurfacePoint | None = None
 
@@ -125,7 +125,9 @@ class Tool:
             raise InputError("No surface here: click on the scan.")
         end = SurfacePoint.of(click.picked, click.pose, filled=self.filled, place=click.motion)
         if click.through_gap:
-            self.context.note("No point at the click: Scan4D used the nearest surface in front of it.")
+            self.context.note(
+                "You clicked on a gap between points. Scan4D used the nearest surface in front of the gap."
+            )
         log.debug("end at %r, point %s, frame %d", end.position, end.id, end.frame)
         self.set_end(end)
         return True
@@ -229,7 +231,9 @@ class Tool:
 
     def _read(self, file: Path) -> None:
         if not self.on_file(file):
-            raise InputError("holds no distances", file, "Choose a table that 'Export distances...' wrote")
+            raise InputError(
+                "holds no distances", file, "Choose a table that you saved with 'Export distances...'"
+            )
 
     def on_file(self, path: Path) -> bool:
         """Add the distances of a table that was saved of this scan, but those that are there; whether the
@@ -250,7 +254,11 @@ class Tool:
         if new:
             self.context.change("Import distances", made)
             self.context.reveal()
-        there = f", {len(read) - len(new)} exist already" if len(new) < len(read) else ""
+        there = (
+            f". The scan already has {len(read) - len(new)} of the distances in the file"
+            if len(new) < len(read)
+            else ""
+        )
         self.context.note(f"Imported {len(new)} distances{there}.")
 
 

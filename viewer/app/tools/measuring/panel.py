@@ -25,9 +25,12 @@ def draw(tool: Tool, ui: Ui) -> None:
         tool.toggle()
     ui.tooltip("Click two points in the view to measure their distance", "measure")
     tool.filled = imgui.checkbox("Allow clicks on filled holes", tool.filled)[1]
-    widgets.tooltip("Also measure where the renderer has filled a hole, and the scanner measured no point")
+    widgets.tooltip(
+        "Also accept clicks where the renderer has filled a hole, because the scanner measured no points "
+        "there"
+    )
     if not tool.made.distances:
-        widgets.faint("No distances yet. Press Measure distance, then click two points on the surface.")
+        widgets.faint("No distances yet. Press 'Measure distance', then click two points on the surface.")
         return
     for number, row_of in enumerate(tool.rows()):
         imgui.push_id(number)
@@ -40,7 +43,9 @@ def draw(tool: Tool, ui: Ui) -> None:
     widgets.tooltip("Copy all distances as a table")
     if row.button():
         tool.ask_to_save()
-    widgets.tooltip("Save all distances to a file. Open or drop the file to load them again")
+    widgets.tooltip(
+        "Save all distances to a file. To load the distances again, open the file or drop it onto the window"
+    )
     if row.button():
         tool.clear()
     widgets.tooltip("Delete all distances. Undo restores them")
@@ -53,9 +58,15 @@ def _draw_row(tool: Tool, one: DistanceRow) -> bool:
     imgui.align_text_to_frame_padding()
     text = one.words(scale)
     imgui.text(widgets.fitted(text, button - imgui.get_cursor_pos_x()))
-    about = "± holds the true distance in 95 % of cases. ± includes point spacing, pixel size and tracking"
+    about = (
+        "In 95 % of cases, the true distance lies within ±. The value of ± includes point spacing, pixel "
+        "size and tracking"
+    )
     if any(end.covariance is None for end in one.ends):
-        about = "The uncertainty of this distance is not known: measure the distance again"
+        about = (
+            "The uncertainty of this distance is unknown. Measure the distance again to compute its "
+            "uncertainty"
+        )
     widgets.tooltip("\n".join([text, *(_end_words(end, scale) for end in one.ends), about]))
     imgui.same_line(button)
     is_deleted = widgets.icon_button(icons.ICON_FA_TRASH, "Delete")

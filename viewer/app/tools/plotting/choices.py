@@ -51,7 +51,9 @@ class Settings:
     order: str = param(
         VALUE, "Values of the measures, or their rate of change", choices=ORDERS, words=ORDER_WORDS
     )
-    bands: bool = param(True, "Band around a curve that covers the true value in 95 % of cases", title="±")
+    bands: bool = param(
+        True, "Band around each curve, which contains the true value in 95 % of cases", title="±"
+    )
     seconds: float = param(
         0.3, (
             "Width of the window, in seconds, that smooths speeds, accelerations and the numbers under "
@@ -61,22 +63,22 @@ class Settings:
     )  # fmt: skip
     lines: bool = param(True, "Draw each measure in the view, with its value", title="In the view")
     least: float = param(
-        0.5, "Smallest height of a repeat's peak, as a share of the curve's range",
+        0.5, "Smallest peak that counts as a repeat, as a share of the curve's range",
         low=0.05, high=1.0, title="Smallest repeat",
     )  # fmt: skip
     trajectories: bool = param(
         True, "Draw the paths of the landmarks that are ticked", title="Show paths", basic=True
     )
     coordinates: str = param(
-        SCAN, "Show paths as recorded, or without the motion of the rigid references",
+        SCAN, "Show paths as recorded, or without head motion (the motion of the rigid references)",
         choices=(SCAN, ANCHORS), words={SCAN: "As recorded", ANCHORS: "With head motion removed"}, basic=True,
     )  # fmt: skip
     hold: bool = param(
-        False, "Show the scan itself without the motion of the rigid references",
+        False, "Show the scan itself without head motion (the motion of the rigid references)",
         title="Remove head motion", basic=True,
     )  # fmt: skip
     by_speed: bool = param(
-        True, "Colour paths by speed. If off, each landmark has its own colour",
+        True, "Colour paths by speed. If this option is off, each landmark has its own colour",
         title="Colour by speed", basic=True,
     )  # fmt: skip
 

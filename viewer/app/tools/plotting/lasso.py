@@ -75,7 +75,7 @@ class Lasso:
         ]
         found = [point for point in points if point is not None]
         if len(found) < 3:
-            raise InputError("No surface inside that outline.")
+            raise InputError("There is no surface inside this outline.")
         name = _free_name(made)
         names = tuple(f"{name}.{number}" for number in range(1, len(found) + 1))
         landmarks = (Landmark(each).with_key(point) for each, point in zip(names, found, strict=True))

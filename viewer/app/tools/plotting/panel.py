@@ -40,7 +40,7 @@ def draw(tool: Tool, ui: Ui) -> None:
         tool.lasso.toggle()
     ui.tooltip("Draw round a part of the surface to measure its area and perimeter", "lasso")
     _, tool.lasso.through = imgui.checkbox("Include surface behind", tool.lasso.through)
-    ui.tooltip("Also measure surfaces in front of and behind the outlined one", "lasso")
+    ui.tooltip("Also measure surfaces in front of and behind the outlined surface", "lasso")
     if tool.placed and imgui.tree_node_ex("Add a measure", 0 if measures_there else _OPEN):
         adding.draw(tool, ui)
         imgui.tree_pop()
@@ -51,7 +51,7 @@ def _draw_measures(tool: Tool) -> None:
     """The measures, each with what shows it and what deletes it, and a row to add one."""
     measures, choices = tool.landmarks.measures, tool.choices
     if not measures:
-        widgets.faint("No measures yet. Choose a landmark template that has some, or add one below.")
+        widgets.faint("No measures yet. Choose a landmark template with measures, or add a measure below.")
     for number, measure in enumerate(measures):
         imgui.push_id(number)
         right = imgui.get_cursor_start_pos().x + imgui.get_content_region_avail().x
@@ -82,8 +82,8 @@ def _draw_noise(tool: Tool) -> None:
     scale, noise = tool.context.scale, tool.choices.noise
     widgets.label(
         "Scanner noise (SD)",
-        "Standard deviation of a coordinate that the scanner measures. Scan4D includes this noise in "
-        "the uncertainty of measures",
+        "Noise of the scanner: the standard deviation of a measured coordinate. The uncertainty of "
+        "measures includes this noise",
     )
     low, high, speed = 0.0, 1e9, 0.01
     changed, new = imgui.drag_float(
@@ -107,7 +107,7 @@ def _draw_paths(tool: Tool) -> None:
             (
                 "rigid reference",
                 "Tick landmarks on a part of the subject that does not deform, such as the forehead. "
-                "Scan4D subtracts their common motion from paths and speeds",
+                "Scan4D subtracts the common motion of these landmarks from paths and speeds",
             ),
         ):
             imgui.table_next_column()

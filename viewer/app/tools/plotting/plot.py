@@ -64,27 +64,27 @@ def _why_none(tool: Tool) -> str:
     settings, mode = tool.settings, tool.settings.mode
     if tool.shown.plot is not None:
         if tool.context.followed.is_busy:
-            return "Scan4D is measuring the frames."
+            return "Scan4D is computing the measures in all frames."
         if not settings.derivative:
             return "No measure has a value in any frame."
         words, count = ORDER_WORDS[settings.order], settings.smoothing.degree + 1
-        return f"{words} needs {count} frames in a row with a value."
+        return f"{words} needs values in {count} frames in a row."
     if not tool.landmarks.measures:
         return "No measures yet: add one in the panel, such as the distance between two landmarks."
     if not tool.context.followed.series:
         return (
-            "Scan4D is measuring the frames."
+            "Scan4D is computing the measures in all frames."
             if tool.context.followed.is_busy
             else "No measure has a value yet: place the landmarks of a measure."
         )
     if not tool.shown.curves:
-        return "All measures are hidden: tick some in the panel."
+        return "All measures are hidden: tick a measure in the panel."
     if mode == REPEATS and len(tool.times) == 1:
         return "Repeats need several frames."
     return (
         "A plot of one measure against another needs two measures."
         if mode == AGAINST
-        else "No peak is high enough: lower the smallest height of peaks at the left."
+        else "No peak is high enough: reduce the smallest peak height at the left."
     )
 
 
@@ -108,12 +108,12 @@ def _draw_bar(tool: Tool, ui: Ui) -> None:
         imgui.set_next_item_width(_COMBO * em)
         share = imgui.slider_float("##least", 100 * least, 5, 100, "at least %.0f %%")[1]
         least = round(share) / 100
-        widgets.tooltip("Smallest height of a repeat's peak, in percent of the curve's range")
+        widgets.tooltip("Smallest peak that counts as a repeat, in percent of the curve's range")
     widgets.same_line(widgets.check_width("±"))
     bands = imgui.checkbox("±", settings.bands)[1]
     widgets.tooltip(
-        "Band around each curve, which holds the true value in 95 % of cases. For repeats, the band is "
-        "one standard deviation to each side"
+        "Band around each curve, which contains the true value in 95 % of cases. For repeats, the band "
+        "extends one standard deviation to each side"
     )
     widgets.same_line(_SLIDER * em)
     imgui.set_next_item_width(_SLIDER * em)

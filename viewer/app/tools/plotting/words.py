@@ -10,11 +10,11 @@ from ....analysis.words import SURE, UNKNOWN, with_uncertainty
 WARNING = "(!)"  # before numbers of a movement that the user should know more about
 NUMBERS_HELP = {
     "Amplitude": "Value at the peak minus the value at rest, which is the mean of the first frames. "
-    "± holds the true difference in 95 % of cases",
+    "In 95 % of cases, the true difference lies within ±",
     "Onset": "Time when the curve has moved away from its value at rest by 10 % of the amplitude",
     "Peak": "Time when the curve is farthest from its value at rest",
-    "Duration": "Time from the onset until the curve is again within 10 % of the amplitude of its value "
-    "at rest",
+    "Duration": "Time from the onset until the curve returns to its value at rest, within 10 % of the "
+    "amplitude",
     "Fastest": "Largest rate of change of the measure, rising or falling",
 }
 
