@@ -96,13 +96,13 @@ class Grown:
     ("fields", "message"),
     [
         ({"mode": param("one", "m", when={"sise": (1,)}), "size": param(1, "s")},
-         "Wrong.mode depends on 'sise', which is not another parameter. Known: size"),
+         "Wrong.mode depends on 'sise', which is not the name of another parameter. Known: size"),
         ({"size": param(1, "s", key="K")}, "Wrong.size has a keyboard shortcut, "
          "but only an on/off parameter can have one"),
         ({"a": param(True, "a", key="K"), "b": param(True, "b", key="K")},
          "Wrong.a has the key 'K', which another parameter also has"),
         ({"size": param(1, "s", deprecated=("mode",)), "mode": param("one", "m")},
-         "Wrong.size has the former name 'mode', which another parameter has or had"),
+         "Wrong.size has the former name 'mode', which is also a name or former name of another parameter"),
         ({"size": param(1, "s", low=2)}, "Wrong.size has an invalid default .*: size: 1 is outside"),
         ({"mode": param("one", "m", choices=("one",)), "size": param(1, "s", when={"mode": ("two",)})},
          "Wrong.size has an invalid default or condition: unknown mode 'two'"),

@@ -97,12 +97,12 @@ def test_what_cannot_be_drawn_again_is_not_recorded(app: Any) -> None:
     colour_by_a_layer(app)
     capture.note_shown()
     assert capture.recorder is None
-    assert "The recording has stopped: Scan4D computed the colours 'deviation'" in app.told[-2]
+    assert "The recording has stopped: the picture shows the colours 'deviation'" in app.told[-2]
     assert capture.last is not None
     assert len(Recording.load(capture.last).entries) == 1, "what was recorded until then"
     capture.toggle_recording()
     assert capture.recorder is None
-    assert "Cannot record: Scan4D computed the colours 'deviation'" in app.told[-1]
+    assert "Cannot record: the picture shows the colours 'deviation'" in app.told[-1]
 
 
 def test_frames_of_which_some_have_computed_colours_are_not_exported(app: Any, tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_a_picture_that_cannot_be_drawn_again_is_saved_without_a_text(app: Any) 
     capture.screenshot()
     capture.finish()
     cannot, *saved = app.told
-    assert "This picture cannot be replayed: Scan4D computed the colours 'deviation'" in cannot
+    assert "Scan4D cannot replay this picture: the picture shows the colours 'deviation'" in cannot
     first, second = (Path(words.removeprefix("Saved ")) for words in saved)
     assert Recording.load(first).entries[0].scan == "ball.npz"
     with pytest.raises(InputError):

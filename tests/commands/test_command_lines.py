@@ -84,8 +84,8 @@ from viewer.errors import NoOpenGLError
         (["--camera", ""], ["after '--camera' is empty"]),
         (["--output="], ["after '--output=' is empty"]),
         (["-y"], ["unknown option '-y'"]),
-        (["--unit", "m" * 5000], ["--unit", "not a unit"]),
-        (["--unit", "\x1b[31m"], [r"'\x1b[31m' is not a unit"]),
+        (["--unit", "m" * 5000], ["--unit", "not a usable name"]),
+        (["--unit", "\x1b[31m"], [r"'\x1b[31m' is not a usable name"]),
         (["--backend", "\x1b]0;p\x07\n\u202e"], [r"'\x1b]0;p\x07\n\u202e'"]),
     ],
 )

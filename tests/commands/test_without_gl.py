@@ -139,7 +139,7 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
         (
             (scan, "-o", "a.png", "--no-gl", "--set", "normals=60"),
-            "60 of values of n'x in the table must be odd",
+            "of values of n'x in the table must be odd, not 60",
         ),
         ((scan, "-o", "a.png", "--no-gl", "--set", "sises=3"), "Did you mean 'sizes'"),
         ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),

@@ -93,7 +93,7 @@ def test_suffixes_in_any_case(tmp_path: Path) -> None:
 def test_a_folder_of_mixed_kinds_is_ambiguous(tmp_path: Path) -> None:
     put(tmp_path, "1.npy", "2.npy", "3.xyz", "readme.txt")
     assert message(tmp_path) == (
-        f"{tmp_path}: holds files of several kinds (2 .npy, 1 .xyz). "
+        f"{tmp_path}: contains files of several kinds (2 .npy, 1 .xyz). "
         "Choose one kind with a pattern such as '*.npy'"
     )
     assert labels(tmp_path / "*.xyz") == ["3.xyz"]
@@ -112,7 +112,10 @@ def test_a_folder_called_frames_inside(tmp_path: Path) -> None:
 
 
 def test_nothing_to_open(tmp_path: Path) -> None:
-    assert "holds no scan files. Known files: .asc, .csv, .exr, .las, .laz, .npy" in message(tmp_path)
+    assert (
+        "holds no scan files. Scan4D reads files with the suffixes .asc, .csv, .exr, .las, .laz, .npy"
+        in message(tmp_path)
+    )
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
     assert message(tmp_path).endswith("holds no scan files. Open one of its folders: a9, a10, b")
     assert "a.jpg: unknown file suffix '.jpg'. Scan4D does not read a picture alone" in message(
@@ -230,7 +233,7 @@ def test_an_npz_with_times(tmp_path: Path) -> None:
 def test_a_sequence_of_files_of_many_frames_is_refused_not_cut(tmp_path: Path) -> None:
     for name in ("1.npy", "2.npy"):
         np.save(tmp_path / name, np.ones((4, 5, 3), np.float32))
-    with open_scan(tmp_path) as scan, pytest.raises(InputError, match=r"2\.npy: holds 4 frames"):
+    with open_scan(tmp_path) as scan, pytest.raises(InputError, match=r"2\.npy: contains 4 frames"):
         scan.pose(1)
 
 
@@ -333,8 +336,8 @@ def test_a_folder_that_holds_another_scan_says_so(tmp_path: Path) -> None:
     formats.write(tmp_path / "whole9.ply", cloud)
     (text,) = told(tmp_path)
     assert text == (
-        "The folder also holds whole9.ply, whole10.npz, which this scan does not use. "
-        "Open such a file by its name to see it."
+        "The folder also contains whole9.ply, whole10.npz, which are not part of this scan. "
+        "To see such a file, open it by its name."
     )
     assert told(tmp_path / "frames") == []
     assert told(tmp_path / "whole9.ply") == []
@@ -359,7 +362,7 @@ def test_a_correction_that_changes_nothing_is_reported_once(tmp_path: Path) -> N
     with open_scan(tmp_path, read={"texture": "dense"}) as timeline:
         list(timeline)
         told = [message.text for message in timeline.messages if message.kind == "correction"]
-    assert told == ["Scan4D does not use the correction texture=dense here"]
+    assert told == ["The correction texture=dense does not apply to this scan, so Scan4D ignores it"]
 
 
 def test_columns_that_do_not_fit_the_file_are_refused(tmp_path: Path) -> None:

@@ -339,7 +339,7 @@ def test_what_unpacks_to_too_much_is_refused(path: Path, monkeypatch: pytest.Mon
     np.savez_compressed(path, depth=np.ones((2000, 2000), np.float32))
     monkeypatch.setenv(READ_VARIABLE, "20")
     with pytest.raises(
-        InputError, match=rf"would need .* MB, .* set the environment variable {READ_VARIABLE}="
+        InputError, match=rf"would need .* MB of memory, .* set the environment variable {READ_VARIABLE}="
     ):
         formats.read(path)
     whole = path.read_bytes()

@@ -45,7 +45,7 @@ def test_frames_of_single_moment_files(tmp_path: Path) -> None:
     assert formats.frame_count(tmp_path / "one.xyz") == 1
     assert formats.read_times(tmp_path / "one.xyz") is None
     for frame in (1, -1):
-        with pytest.raises(InputError, match=f"has no pose {frame}. The file holds 1"):
+        with pytest.raises(InputError, match=f"has no pose {frame}. The file contains 1"):
             formats.read(tmp_path / "one.xyz", frame)
 
 

@@ -202,9 +202,9 @@ def end_of_archive(entry: bytes, count: int, told: int, large: bool) -> bytes:
     ("told", "large", "reason"),
     [
         (60_000, True, "has 60,000 members, but Scan4D reads at most 4,096"),
-        (60_000, False, "has 60,000 members, more than"),
-        (1, True, "has 2,820,000 bytes of names, more than"),
-        (1, False, "has 2,820,000 bytes of names, more than"),
+        (60_000, False, "has 60,000 members, but Scan4D reads at most"),
+        (1, True, "has 2,820,000 bytes of names, but Scan4D reads at most"),
+        (1, False, "has 2,820,000 bytes of names, but Scan4D reads at most"),
     ],
 )
 def test_a_directory_of_very_many_members_is_refused_before_it_is_read(
@@ -296,7 +296,7 @@ def test_a_million_frames_open_and_more_are_refused(tmp_path: Path) -> None:
     assert len(timeline) == 1 << 20
     assert timeline.times[-1] == pytest.approx(((1 << 20) - 1) / 25)
     np.save(path, np.ones(((1 << 20) + 1, 1, 3), np.int8))
-    with pytest.raises(InputError, match="has 1,048,577 frames, more than"):
+    with pytest.raises(InputError, match="has 1,048,577 frames, but Scan4D reads at most"):
         open_scan(path)
 
 

@@ -118,7 +118,7 @@ def test_damaged_compressed_data(path: Path) -> None:
     packed, unpacked = struct.unpack("<II", whole[:8])
     cases = {
         whole[:20]: f"contains only 12 of {packed} bytes",
-        whole[:4]: "ends early: 4 bytes where 8 should be",
+        whole[:4]: "ends early: it has 4 bytes where 8 bytes should be",
         struct.pack("<II", packed, 10**9)
         + whole[8:]: "contains 1000000000 bytes of points, but its header states",
         struct.pack("<II", 1, unpacked) + whole[8:]: f"1 bytes of compressed data cannot contain {unpacked}",
@@ -131,7 +131,7 @@ def test_damaged_compressed_data(path: Path) -> None:
 
 def test_a_bomb_is_refused_before_it_unpacks(path: Path) -> None:
     body = struct.pack("<II", 100, 34 * 10**8) + bytes(100)
-    with pytest.raises(InputError, match="cannot hold 3400000000"):
+    with pytest.raises(InputError, match="cannot contain 3400000000"):
         read(save(path, "binary_compressed", body, WIDTH=str(10**8), POINTS=str(10**8)))
 
 

@@ -187,7 +187,7 @@ def test_damaged_files_are_refused(path: Path, monkeypatch: pytest.MonkeyPatch) 
     save(path, np.ones((2000, 2000), np.float32), compression="tiff_adobe_deflate")
     monkeypatch.setenv(READ_VARIABLE, "20")
     with pytest.raises(
-        InputError, match=rf"would need .* MB, .* set the environment variable {READ_VARIABLE}="
+        InputError, match=rf"would need .* MB of memory, .* set the environment variable {READ_VARIABLE}="
     ):
         formats.read(path)
 

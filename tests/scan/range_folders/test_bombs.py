@@ -134,7 +134,7 @@ def test_info_merges_no_points(tmp_path: Path) -> None:
 # --- paths --------------------------------------------------------------------------------
 
 OUTSIDE = ["../a.png", "/etc/a.png", "depth/../../a.png", "..\\a.png", "a/..", "\x1b[2Ja.png", "a" * 501]
-OUT = "which is not a file in its folder. Put that file into this folder"
+OUT = "which is not a file in its folder. Put the named file into this folder"
 
 
 def _replaced(file: Path, old: str, new: str) -> None:

@@ -93,7 +93,7 @@ def test_a_frame_without_a_pose_is_left_out(tmp_path: Path) -> None:
     write_log(tmp_path / "trajectory.log", [POSE])
     with open_scan(tmp_path) as scan:
         assert [pose.index for pose in scan] == [0]
-        assert "has no pose: trajectory.log holds 1" in str(scan.broken[1])
+        assert "has no camera pose: trajectory.log contains only 1" in str(scan.broken[1])
 
 
 @pytest.mark.parametrize("text", ["0 0 1\n1 0 0 0\n", "one two three\n", "\0\xff"])

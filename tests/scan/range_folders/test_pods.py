@@ -122,10 +122,10 @@ def test_a_pod_may_miss_a_frame_but_not_its_texture(tmp_path: Path) -> None:
     ("changes", "reason"),
     [
         ({"range": None}, "pod 'left' has the range None, but this must be a file name"),
-        ({"range": "a_*_*.tif"}, "with one . at most"),
+        ({"range": "a_*_*.tif"}, "with at most one ."),
         ({"range": "../x.tif"}, r"pod 'left' names '../x.tif', which is not a file in its folder"),
         ({"range": "/etc/passwd"}, "which is not a file in its folder"),
-        ({"range": "*/x.tif"}, "with one . at most"),
+        ({"range": "*/x.tif"}, "with at most one ."),
         ({"range": "none.tif"}, r"there is no range image none\.tif"),
         ({"mask": 3}, "has the mask 3, but this must be a file name"),
         ({"fx": None}, "pod 'left' is not a calibration: fx is None"),

@@ -93,7 +93,7 @@ def test_a_frame_may_lack_colours_and_not_its_pose(tmp_path: Path) -> None:
     put(tmp_path, [1, 2], [1], "1.0 0 0 0 0 0 0 1\n")
     with open_scan(tmp_path) as scan:
         assert scan.pose(0).views[0].color is not None
-        with pytest.raises(InputError, match=r"no pose: none of groundtruth\.txt is within"):
+        with pytest.raises(InputError, match=r"no pose in groundtruth\.txt is within"):
             scan.pose(1)
     (tmp_path / "groundtruth.txt").unlink()
     with open_scan(tmp_path) as scan:
