@@ -140,7 +140,7 @@ def changed(*path: Any, to: Any) -> Callable[[dict[str, Any]], None]:
         (lambda data: data.pop("format"), "has the format None"),
         (lambda data: data.pop("document"), "is not a session"),
         (lambda data: data.pop("scan"), "has no 'scan'"),
-        (changed("scan", to="a\0b"), "'scan' is not the name of a scan"),
+        (changed("scan", to="a\0b"), "'scan' must be the name of a scan"),
         (changed("hash", to=7), "'hash' must be a hash, not 7"),
         (changed("pose", to=-1), "'pose' must be the index of a frame, not -1"),
         (changed("document", to=[1]), ", document: must be an object with named values, not [1]"),

@@ -54,7 +54,7 @@ def changed(*path: Any, to: Any) -> Any:
     [
         ([], "f: It must be an object with named values, not []"),
         (changed("all", to="pin"), "f: 'all' must be a list, not pin"),
-        (changed("all", to={"a": 1}), "f: 'all' is not a list"),
+        (changed("all", to={"a": 1}), "f: 'all' must be a list"),
         (changed("all", 1, to=7), "f: 'all[1]' must be an object with named values, not 7"),
         (changed("all", 1, "name", to=None), "f, all[1]: 'name' must be a text, not None"),
         (changed("all", 0, "place", to=[1, 2]), "f, all[0]: 'place' must be 3 values, not [1, 2]"),

@@ -67,7 +67,7 @@ BAD = {
     ("m.csv", f"{LONG}landmark,1.5,0,a,1,2,3,placed\n"): "the frame is '1.5'",
     ("m.csv", f"{LONG}landmark,1,0,a,1,2,3,lost\n"): "unknown state 'lost'",
     ("m.csv", "name,x,y,z,unit\na,1,2,3,mm\nb,1,2,3,feet\n"): "lengths in this row are in 'feet'",
-    ("m.csv", "frame,a_x,a_y,a_z\n2,1,2,3\n1,1,2,3\n"): "this row belongs to frame 1, but the row above",
+    ("m.csv", "frame,a_x,a_y,a_z\n2,1,2,3\n1,1,2,3\n"): "the frame of this row is 1, but the frame of",
     ("m.csv", "name,x,y,z\na,1e308,1e308,1e308\n"): "line 2: '1e308' is larger than",
     ("m.csv", "name,x,y,z\na,1e999,0,0\n"): "line 2: '1e999' is larger than",
     ("m.csv", "name,x,y,z\na,1e100,0,0\n"): "has coordinates larger",

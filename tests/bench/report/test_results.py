@@ -90,8 +90,8 @@ def test_what_a_crash_cut_off_is_left_out(tmp_path: Path) -> None:
     [
         ("{", "is not a row of data"),
         ("[1, 2]", "not a JSON object"),
-        ('{"backend": "points"}', "the row lacks a usable scene, scene_hash"),
-        (json.dumps({**a_row(), "errors": 3}), "the row lacks a usable errors"),
+        ('{"backend": "points"}', "the row has no usable value for scene, scene_hash"),
+        (json.dumps({**a_row(), "errors": 3}), "the row has no usable value for errors"),
     ],
 )
 def test_a_broken_line_is_named(tmp_path: Path, line: str, what: str) -> None:
@@ -161,7 +161,7 @@ def test_losses_come_before_gains_and_notes() -> None:
     old = [a_row({"psnr": 30.0, "flip": 0.2}), a_row(n=5)]
     new = [a_row({"psnr": 20.0, "flip": 0.1}, ms=50.0), a_row(n=6)]
     assert [line.split(":")[0] for line in compare(old, new)] == [
-        "slower", "worse", "better", "missing in the new results", "missing in the old results",
+        "slower", "worse", "better", "the new results do not contain", "the old results do not contain",
     ]  # fmt: skip
 
 
@@ -185,7 +185,7 @@ def test_another_scene_of_the_same_name_is_not_compared() -> None:
 def test_a_swept_parameter_is_in_the_words() -> None:
     row = a_row(sweep="size", params={"size": 4.0}, noise=0.01)
     (line,) = compare([row], [])
-    assert line == "missing in the new results: points, torus, 1000 points, noise 0.01, size=4.0"
+    assert line == "the new results do not contain: points, torus, 1000 points, noise 0.01, size=4.0"
 
 
 def test_preparing_is_deriving_and_uploading() -> None:

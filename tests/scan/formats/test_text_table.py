@@ -118,7 +118,7 @@ def test_guesses_without_names(values: list[float], names: str) -> None:
         ("1 2\n3 4\n", "fewer than three numbers"),
         ("1 2 3\n4 5\n", "row 2 has only 2 values, but Scan4D needs column 3"),
         ("1 2 3\n4 5 six\n", "row 2, column 3: 'six' is not a number"),
-        ("nan nan nan 1 2 3 4\n", "contains 1 points, but none of them has finite coordinates"),
+        ("nan nan nan 1 2 3 4\n", "none of the 1 points has finite coordinates"),
     ],
 )
 def test_files_that_cannot_be_used(text: str, reason: str, tmp_path: Path) -> None:

@@ -247,7 +247,7 @@ def frames(path: Path | str, decided: Decided | None = None) -> Callable[[int], 
 
 def _with_points(scanned: Scanned) -> Scanned:
     if isinstance(scanned, PointCloud) and not len(scanned):
-        what = f"contains {scanned.dropped} points, but none of them has finite coordinates"
+        what = f"none of the {scanned.dropped} points has finite coordinates"
         raise EmptyFrame(what if scanned.dropped else "holds no points")
     return scanned
 

@@ -324,7 +324,7 @@ def _wide(
         frames.append(len(frames) if frame_at is None else _frame(row[frame_at], line))
         if len(frames) > 1 and frames[-1] <= frames[-2]:
             raise at_line(
-                f"this row belongs to frame {frames[-1] + 1}, but the row above belongs to frame "
+                f"the frame of this row is {frames[-1] + 1}, but the frame of the row above is "
                 f"{frames[-2] + 1}",
                 line,
                 "Sort the rows by frame",
