@@ -1,6 +1,6 @@
-// What makes a splat of a point's cell where a disc would reach too far: an ellipse round the corners of the cell, whose middle
-// need not be the point, and the planes of neighbours that end it. The plain version is `Cell` in tests/splatting/cells.py.
-// Everything is in cells of the grid.
+// Makes a splat of a point's cell where a disc would reach too far: an ellipse around the corners of the cell, whose middle
+// need not be the point, and the planes of neighbours that end it. Lengths are in cells of the grid.
+// The plain version is `plain` in tests/splatting/test_fitted.py.
 #include "surfels/cell.glsl"
 
 layout(std430, binding = STORAGE_CELL_AXES) writeonly buffer Axes { vec4 cell_axes[]; };
