@@ -33,7 +33,6 @@ def app(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ru
     assert "Traceback" not in app.log(), app.log()
 
 
-@pytest.mark.slow
 def test_it_is_offered_shown_and_told(app: RunningApp, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(backends(), "finding", finding.BACKEND)
     app.choose(PANEL, "##backend", "###finding")

@@ -143,7 +143,7 @@ def test_poses_count_from_the_view_that_is_drawn() -> None:
 
 @pytest.mark.parametrize("fov_y", [170.1, 179.5, 1e-7])
 def test_fields_of_view_that_cannot_be_drawn_are_refused(fov_y: float) -> None:
-    with pytest.raises(InputError, match=r"expected 1e-06 to 170 degrees"):
+    with pytest.raises(InputError, match=r"must be 1e-06 to 170 degrees"):
         Camera(fov_y=fov_y)
 
 

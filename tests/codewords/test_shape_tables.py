@@ -86,7 +86,7 @@ def test_the_table_is_packed() -> None:
 @pytest.mark.parametrize(
     ("steps", "words"),
     [
-        ((17, 2, 60, 5), "60 values of n'x"),
+        ((17, 2, 60, 5), "number of values of n'x in the table must be odd, not 60"),
         ((17, 0, 61, 5), "at least 1"),
         ((400, 2, 61, 5), "not exceed 64 pixels"),
     ],

@@ -116,7 +116,7 @@ def test_a_picture_can_lie_behind() -> None:
 
 
 def test_a_window_below_eight_lines_is_refused() -> None:
-    with pytest.raises(InputError, match="window of 7 lines"):
+    with pytest.raises(InputError, match="a height of 7 lines"):
         draw_words(stream_of((5, 5), [], []), 7)
 
 

@@ -151,7 +151,9 @@ def test_it_is_drawn_again_where_its_scan_is_named_and_stays_anonymous(
     assert Path("a.png").read_bytes() == Path("b.png").read_bytes()
     cloud = sphere(1999)
     np.savez("other.npz", positions=cloud.positions)
-    assert "is not the scan of a.png" in refused("render", "other.npz", "--replay", "a.png", "-o", "c.png")
+    assert "is not the scan that a.png shows" in refused(
+        "render", "other.npz", "--replay", "a.png", "-o", "c.png"
+    )
 
 
 def test_a_recording_replays_anonymously(run: Run, folder: Path) -> None:

@@ -47,7 +47,7 @@ def test_ply_faces_by_either_name(tmp_path: Path, name: str, faces: str) -> None
     ("faces", "message"),
     [
         ("", "no faces"),
-        ("f 1 2 9\n", "vertex 8 of 4"),
+        ("f 1 2 9\n", "vertex 8, but there are only 4 vertices"),
         ("f 1 2 x\n", "faces cannot be read"),
         ("f 0 1 2\n", "vertex that does not exist"),
     ],
@@ -64,7 +64,11 @@ def test_unusable_faces_are_one_message(tmp_path: Path, faces: str, message: str
         ("", "", "no faces"),
         ("element face 1\nproperty int flag\n", "3\n", "refer to no vertices"),
         ("element face 1\nproperty int vertex_index\n", "3\n", "refer to no vertices"),
-        ("element face 2\nproperty list uchar int vertex_index\n", "3 0 1 2\n", "holds 1 of the 2 faces"),
+        (
+            "element face 2\nproperty list uchar int vertex_index\n",
+            "3 0 1 2\n",
+            "contains only 1 of the 2 faces",
+        ),
         (
             "element face 1\nproperty list uchar int vertex_index\n",
             "3 0 1 -2\n",
@@ -74,7 +78,7 @@ def test_unusable_faces_are_one_message(tmp_path: Path, faces: str, message: str
         (
             "element face 99999999999\nproperty list uchar int vertex_index\n",
             "3 0 1 2\n",
-            "holds 1 of the 99999999999 faces",
+            "contains only 1 of the 99999999999 faces",
         ),
     ],
 )

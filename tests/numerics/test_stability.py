@@ -126,7 +126,7 @@ def test_a_feed_brings_the_points_of_rows(renderer: Renderer, name: str) -> None
     shot = ROWS[0].shot()
     pose, surface = Pose(0, 0.0, "", shot.cloud()), Surface(renderer.gpu, shot.size)
     render_frame(renderer, Request(pose, shot.camera, backend, backends()[backend].params(setting)), surface)
-    assert "in place of" not in surface.stats.chosen.get("instancing", "")
+    assert "instead of" not in surface.stats.chosen.get("instancing", "")
     assert "splat" not in surface.stats.skipped
 
 

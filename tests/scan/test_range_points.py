@@ -164,7 +164,7 @@ def test_moved_points_keep_their_bits() -> None:
 
 def test_views_that_see_nothing_are_told_at_once() -> None:
     blind = replace(VIEWS[0], mask=np.zeros_like(VIEWS[0].mask))
-    with pytest.raises(InputError, match="holds no points"):
+    with pytest.raises(InputError, match="contains no points"):
         Pose.of(0, 0.0, "x", (blind, blind))
     assert Pose.of(0, 0.0, "x", (blind, VIEWS[1])).count == np.count_nonzero(VIEWS[1].valid())
 

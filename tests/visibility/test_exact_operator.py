@@ -156,7 +156,7 @@ def test_of_points_in_one_place_one_is_seen() -> None:
 def test_what_cannot_be_is_refused() -> None:
     points = spread()
     for radius in (3.9, 0.0, np.nan, np.inf):
-        with pytest.raises(InputError, match=r"does not contain all points\. The farthest point is"):
+        with pytest.raises(InputError, match=r"does not contain all points\. Use a radius larger than"):
             exact_visible_points(points, (0, 0, 3), radius)
     for eye in ((0, 0), (0, 0, np.nan), [[0, 0, 3]]):
         with pytest.raises(InputError, match="the eye must have three finite coordinates"):

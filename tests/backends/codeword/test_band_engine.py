@@ -98,5 +98,5 @@ def test_no_words_show_the_background(renderer: Renderer) -> None:
 
 def test_a_window_of_too_few_lines_is_refused(renderer: Renderer) -> None:
     none = Elements(np.zeros((0, 3), np.float32), np.zeros(0, np.uint8))
-    with pytest.raises(InputError, match="window of 7 lines"):
+    with pytest.raises(InputError, match="a height of 7 lines"):
         draw_stream(renderer.gpu, encode_elements(none, front_view((9, 20)), GREY), 7)

@@ -213,5 +213,5 @@ def test_faces_that_end_early(encoding: str, polygons: Polygons, tmp_path: Path)
     path.write_bytes(path.read_bytes()[: -3 if encoding != "ascii" else -8])
     cloud = read_points(path)
     assert (len(cloud), cloud.topology) == (5, None)
-    with pytest.raises(InputError, match=r"holds [0-9] of the [0-9] faces|ends within its corners"):
+    with pytest.raises(InputError, match=r"contains only [0-9] of the [0-9] faces|ends within its corners"):
         read_faces(path)

@@ -120,7 +120,7 @@ def test_damaged_files_are_refused_in_one_message(suffix: str, tmp_path: Path) -
             read(path)
         assert str(caught.value).startswith(str(path))
     path.write_bytes(whole[:100] + b"\xff\xff\xff\x7f" + whole[104:])
-    with pytest.raises(InputError, match="promises 2,147,483,647 records"):
+    with pytest.raises(InputError, match="states 2,147,483,647 records"):
         read(path)
     path.write_bytes(whole[:96] + b"\xf0\xff\xff\xff" + whole[100:])
     with pytest.raises(InputError, match="points begin at byte 4,294,967,280"):

@@ -13,7 +13,7 @@ from viewer.scan.formats import known_suffixes, read, read_points
 
 REFUSED = {
     "odd/ply/assimp_issue623.ply": "row 0 of vertex ends before its vertex_indices",
-    "odd/ply/assimp_pond.0.ply": "holds 70048 of the 70051 vertices",
+    "odd/ply/assimp_pond.0.ply": "contains only 70048 of the 70051 vertices",
     "odd/ply/pdal_no_vertex.ply": "has no vertex element",
     "odd/ply/pdal_sized_dims.ply": "no x, y and z among the columns: x, y, j, i",
     "odd/ply/pdal_unsized_dims.ply": "no x, y and z among the columns: y, x, i, j",
@@ -23,7 +23,7 @@ REFUSED = {
     "odd/ply/trimesh_ply_empty_header.ply": "has no vertex element",
     "odd/ply/truedepth_raw_frame-045.ply": "has no vertex element, only: metadata, color, depth",
     "odd/pcd/missingheader.pcd": "has no DATA line",
-    "odd/pcd/stereo_left.pcd": "no x, y and z among the columns: red, green, blue",
+    "odd/pcd/stereo_left.pcd": "the columns do not include x, y and z: red, green, blue",
     "odd/pts_ptx_txt/badheader.txt": "line 1 names 'x' twice, and lacks x, y or z",
     "odd/pts_ptx_txt/text.txt": "line 1 contains neither numbers nor the names x, y and z",
     "odd/other/no_vertex.obj": "holds no points",

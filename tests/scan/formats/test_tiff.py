@@ -171,7 +171,7 @@ def test_odd_keys_tell_nothing(path: Path) -> None:
 
 def test_pictures_that_are_no_depth(path: Path) -> None:
     Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(path)
-    with pytest.raises(InputError, match="is a picture of type RGB, where Scan4D needs one number per pixel"):
+    with pytest.raises(InputError, match="is a picture of type RGB, but Scan4D needs one number per pixel"):
         formats.read(path)
     path.write_bytes(b"II*\0" + bytes(100))
     with pytest.raises(InputError, match="is not a valid TIFF file"):
