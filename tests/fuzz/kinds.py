@@ -262,8 +262,8 @@ def kind_of(name: str) -> str:
     return f"{word}{suffix}" if f"{word}{suffix}" in _CHOICES else suffix
 
 
-def corpus(folder: Path) -> Callable[[int], tuple[str, bytes, bool]]:
-    """The files of a folder by number, those that end in .gz unpacked: kind, bytes, whether it is drawn."""
+def corpus(folder: Path, drawn: bool) -> Callable[[int], tuple[str, bytes, bool]]:
+    """The files of a folder by number, those that end in .gz unpacked: kind, bytes, and `drawn`."""
     files = corpus_files(folder)
 
     def of(number: int) -> tuple[str, bytes, bool]:
@@ -271,7 +271,7 @@ def corpus(folder: Path) -> Callable[[int], tuple[str, bytes, bool]]:
         data = path.read_bytes()
         if path.suffix == ".gz":
             path, data = path.with_suffix(""), gzip.decompress(data)
-        return kind_of(path.name), data, True
+        return kind_of(path.name), data, drawn
 
     return of
 

@@ -12,10 +12,11 @@ CORPUS = Path(__file__).with_name("corpus")
 INPUTS = 3000
 
 
-def test_files_that_once_did_harm(tmp_path: Path) -> None:
+@pytest.mark.parametrize("drawn", [pytest.param(1.0, marks=pytest.mark.slow), 0.0])
+def test_files_that_once_did_harm(tmp_path: Path, drawn: float) -> None:
     files = corpus_files(CORPUS)
     kinds = sorted({kind_of(path.name.removesuffix(".gz")) for path in files})
-    found = campaign(tmp_path, CORPUS, len(files), kinds=kinds)
+    found = campaign(tmp_path, CORPUS, len(files), kinds=kinds, drawn=drawn)
     assert found.inputs == len(files)
     assert not found.wrong, report(found)
 
