@@ -108,7 +108,7 @@ def test_from_scan_to_scan_and_all_of_it_again(screen: Screen, tmp_path: Path, s
         close(app)
     settings.write_text("{")
     with running_app(screen, tmp_path, study / "one") as app:
-        app.told(r"settings\.json: is damaged\. Scan4D renamed it to settings\.old\.json")
+        app.told(r"settings\.json: is damaged\. Scan4D renamed the file to settings\.old\.json")
         assert described(app)["pose"] == 1, "its document is a file of its own"
         close(app)
     assert settings.with_name("settings.old.json").read_text() == "{"

@@ -56,7 +56,10 @@ def main() -> None:
     for kind in kinds:  # so that what libraries need is there before memory is limited
         for number, data in enumerate(whole[kind][:_WARM]):
             _run(Input(kind, data, drawn=share > 0 and not number), folder)
-    of = damaged_seeds(int(source), whole, kinds, share) if source.isdecimal() else corpus(Path(source), share > 0)
+    if source.isdecimal():
+        of = damaged_seeds(int(source), whole, kinds, share)
+    else:
+        of = corpus(Path(source), share > 0)
     said_before = os.fstat(output).st_size
     warned.clear()
     print(json.dumps({"ready": True}), file=said)
