@@ -47,7 +47,7 @@ def scan(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pods = rig(head_with_a_hand(0).bounds, (-27.5, 27.5), aspect=4 / 3)
     for frame in range(FRAMES):
         seen = capture(head_with_a_hand(frame), pods, (120, 90), [Faults()] * 2, frame=frame, unit="mm")
-        views = [without(view, HOLE, 0.06) for view in seen]
+        views = [without(view, HOLE, 0.08) for view in seen]
         formats.write(folder / f"{frame:02d}.exr", merge(views), views)
     return folder
 
