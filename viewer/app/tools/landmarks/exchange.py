@@ -22,6 +22,7 @@ from ....analysis.landmarks.templates import (
     template_of,
     templates,
 )
+from ....analysis.measures.distances import is_distance_table
 from ....analysis.track import Track
 from ....bounds import Bounds
 from ....document.landmarks import Landmarks
@@ -91,6 +92,8 @@ class Exchange:
 
     def take(self, path: Path) -> bool:
         """Read a file that was opened or dropped; whether it holds landmarks or a template."""
+        if is_distance_table(path):  # its ends, x_1 and x_2, would pass for two landmarks
+            return False
         if is_landmark_file(path):
             self._read_landmarks(path)
         elif is_template_file(path):
