@@ -56,6 +56,7 @@ class Hand:
 
     def choose(self) -> None:
         name = self.random.choice(list(LISTS))
+        self.app.settle()  # rows of the panel move until all is measured
         self.app.choose(PANEL, f"{name}/##value", f"###{self.random.choice(LISTS[name])}")
 
     def place(self, reach: float = 0.4) -> tuple[int, int]:

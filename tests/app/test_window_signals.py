@@ -105,7 +105,7 @@ def test_that_software_draws_is_told_once(screen: Screen, tmp_path: Path, scan: 
         with running_app(screen, tmp_path, scan) as app:
             screen.do("key", "ctrl+q")
             assert app.process.wait(PATIENCE) == 0
-            told.append([note for note in app.notes if "draws in software" in note])
+            told.append([note for note in app.notes if "draws without a graphics card" in note])
     devices = settings(tmp_path).get("drawing", {}).get("slow_devices", [])
     assert [len(notes) for notes in told] == [len(devices), 0], "nothing is told of a graphics card"
 
