@@ -81,6 +81,7 @@ def test_one_click_beside_the_cube_turns_the_view_upright(app: RunningApp) -> No
     app.do(("mousemove", x, y + EM + 6 * ROW), ("click", 1))  # the last of the six
     assert camera_of(app).up == up_vector("-z")
     app.do(("mousemove", x, y), ("mousemove", 300, 300))
+    app.settle()  # the menu is closed
     app.screen.do("key", "ctrl+z")
     assert camera_of(app) == before
 
@@ -103,7 +104,7 @@ def test_a_surface_that_is_clicked_faces_up(app: RunningApp) -> None:
     left, top, width, height = app.view()
     app.do(("mousemove", left + width // 2, top + height // 2), ("click", 1))
     turned = camera_of(app)
-    assert np.dot(turned.up, up_vector("+z")) > 0.99, "the chest is up now"
+    assert np.dot(turned.up, up_vector("+z")) > 0.95, "the chest, rough as points fill the body, is up now"
     assert not app.state.clicking
     app.screen.do("key", "ctrl+z")
     assert camera_of(app).up == up_vector("+y")
