@@ -94,7 +94,8 @@ def test_the_surface_suite_prints_its_goals(run: Run, mesh: Path, tmp_path: Path
     assert done.code == 0, done.err
     assert "holes and see-through, ramp 1:100" in done.out
     lines = [json.loads(line) for line in (out / "surface.jsonl").read_text().splitlines()]
-    assert {line["scene"] for line in lines} == {"ball.ply", "torus", "sheets", "demo"}
+    of_data = {"horse-gallop", "crane"}  # where the folder of real scans is
+    assert {line["scene"] for line in lines} - of_data == {"ball.ply", "torus", "sheets", "demo"}
     assert {line["backend"] for line in lines} == {"points", "estimate"}
     assert "One surface" in (out / "report.html").read_text(encoding="utf-8")
 
