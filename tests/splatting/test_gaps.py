@@ -292,7 +292,7 @@ def test_pictures_of_real_scans(renderer: Renderer, draw: Draw, scene: str, data
     "scene",
     [
         "bunny", "armadillo", "horse", "igea",
-        pytest.param("crane", marks=pytest.mark.xfail(reason="0.67 % since splats fit cells", strict=False)),
+        pytest.param("crane", marks=pytest.mark.xfail(reason="0.67 % since splats fit cells", strict=True)),
     ],
 )  # fmt: skip
 def test_thinned_scans_close(renderer: Renderer, draw: Draw, scene: str, data_dir: Path) -> None:
