@@ -159,7 +159,7 @@ def test_repeats_are_the_pieces_around_the_peaks_of_a_measure(run: Run) -> None:
     write_table(Path("landmarks.csv"), rows)
     done = run(*WORDS, "--repeats", "repeats.csv", "--aligned", "way")
     assert done.code == 0, done.err
-    assert "3 repeats, aligned by the peaks of 'way'" in done.err + done.out
+    assert "Scan4D found 3 repeats, and aligned them by the peaks of 'way'" in done.err + done.out
     found = [row for row in table("repeats.csv") if row["measure"] == "way"]
     assert tuple(found[0]) == REPEAT_COLUMNS
     at_peak = {row["repeat"]: row for row in found if float(row["time [s]"]) == 0}
