@@ -13,11 +13,11 @@ from small_scans import FRAMES, SMALL, finish, front, names, process, stored
 from written import film, picture
 
 from viewer.codewords.engine import draw_words, draw_words_plainly
-from viewer.codewords.settings import Params, words_of
 from viewer.codewords.stream import read_stream
 from viewer.drawing.request import Request, view_of
 from viewer.look import Look
 from viewer.scan import formats
+from viewer.scan.code_words import Params, words_of
 from viewer.scan.pose import Pose
 
 LIBRARIES = ("libEGL.so", "libGL.so", "libOpenGL.so.0", "libGLdispatch.so.0", "libGLX.so.0")

@@ -19,16 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..scan.points import NOTHING
 from ..threads import ranges, threads_for, together
 from .lighting import LIGHT_BYTES
 from .stream import WordStream
 from .tables import BITMAP
-from .words import decode_words, row_spans
+from .words import NO_WORD, decode_words, row_spans
 
 WINDOW = 16  # lines
 _PIXELS = 16  # that a word covers, about
-NO_WORD = NOTHING
 NO_KEY = 0x7FFFFFFF  # depth where nothing is, behind all others
 
 

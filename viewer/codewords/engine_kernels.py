@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
-from ..scan.points import NOTHING
 from .tables import BITMAP
+from .words import NO_WORD
 
 _NO_KEY = np.int32(0x7FFFFFFF)
-_NO_WORD = np.uint32(NOTHING)
+_NO_WORD = np.uint32(NO_WORD)
 
 
 class StripPart(NamedTuple):

@@ -29,6 +29,7 @@ FIELDS = {
 COLUMNS = 1 << FIELDS["x"][1]  # that a strip may have
 DEPTHS = 1 << FIELDS["z"][1]
 MATERIALS = 1 << FIELDS["material"][1]
+NO_WORD = 0xFFFFFFFF  # the index of a word, and the id of a point, where a pixel shows none
 
 
 def decode_words(words: NDArray[np.uint64]) -> dict[str, NDArray[np.int32]]:

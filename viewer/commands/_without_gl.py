@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 
 from ..camera import Camera
 from ..codewords import SUFFIX
-from ..codewords.engine import NO_WORD, CodePicture, draw_words
-from ..codewords.settings import Params, words_of
+from ..codewords.engine import CodePicture, draw_words
 from ..codewords.stream import WordStream, read_stream, write_stream
+from ..codewords.words import NO_WORD
 from ..drawing.request import Request, view_of
 from ..errors import InputError
 from ..look import Look, drawable, value_source
 from ..output.export import check_output, numbered, write_arrays, write_png
 from ..output.film import FILM_SUFFIX, FilmTimes, film
 from ..params import parse
+from ..scan.code_words import Params, words_of
 from ..scan.estimate import estimate
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO

@@ -14,7 +14,6 @@ from viewer.backends import backend
 from viewer.bench.scenes.samples import on_torus
 from viewer.camera import PROJECTIONS, Camera
 from viewer.codewords.engine import draw_words
-from viewer.codewords.settings import words_of
 from viewer.codewords.stream import FINE_DEPTHS
 from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
@@ -22,6 +21,7 @@ from viewer.drawing.request import Request, view_of
 from viewer.gpu.constants import NOTHING
 from viewer.look import Look
 from viewer.picture.surface import Surface
+from viewer.scan.code_words import words_of
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

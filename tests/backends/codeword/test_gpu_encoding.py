@@ -26,7 +26,6 @@ from viewer.codewords.project_kernels import (
     X,
     Y,
 )
-from viewer.codewords.settings import elements_of, point_materials, word_lights, words_of
 from viewer.codewords.stream import strip_width
 from viewer.codewords.words import decode_words
 from viewer.drawing.frame import render_frame
@@ -34,6 +33,7 @@ from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request, view_of
 from viewer.look import Look
 from viewer.picture.surface import Surface
+from viewer.scan.code_words import elements_of, point_materials, word_lights, words_of
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 

@@ -21,7 +21,6 @@ from experiments.timing import by_turns
 from viewer.backends import backend
 from viewer.bench.run import LOOK, Bench
 from viewer.camera import PROJECTIONS, Camera
-from viewer.codewords import settings as words
 from viewer.codewords.engine import draw_words
 from viewer.codewords.stream import WordStream
 from viewer.codewords.tables import PAPER, Steps, shape_table
@@ -30,6 +29,7 @@ from viewer.drawing.request import Request, view_of
 from viewer.drawing.timing import draw
 from viewer.gpu.constants import NOTHING
 from viewer.picture.surface import Surface
+from viewer.scan import code_words as words
 from viewer.scan.pose import Pose
 
 SCENES = ("torus", "horse", "armadillo")

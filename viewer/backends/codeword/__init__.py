@@ -15,15 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codewords import settings
 from ...codewords.lighting import Materials
-from ...codewords.settings import uniform_radius, word_look, words_of
 from ...codewords.stream import WordStream
 from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...look import Look
 from ...params import param
 from ...picture.surface import Surface
+from ...scan import code_words
+from ...scan.code_words import uniform_radius, word_look, words_of
 from ...scan.layers import Layers
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
@@ -40,7 +40,7 @@ _OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
 
 
 @dataclass(frozen=True)
-class Params(settings.Params):
+class Params(code_words.Params):
     """Parameters of code words."""
 
     lighting: str = param(

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...codewords.encode import MOST_WORDS, Light
-from ...codewords.settings import Params
 from ...codewords.stream import check_picture_size, strip_width
 from ...codewords.tables import Steps, shape_table
 from ...codewords.words import DEPTHS
@@ -26,6 +25,7 @@ from ...gpu.blocks import Vec4
 from ...gpu.compact import prefix_sums
 from ...gpu.constants import LEAST_RADIUS, NOTHING
 from ...gpu.context import Gpu
+from ...scan.code_words import Params
 from ...splatting.amplify import Points
 from ...view import View
 from .engine import Sheet, WordBuffers

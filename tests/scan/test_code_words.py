@@ -10,10 +10,10 @@ from scenes import sphere
 
 from viewer.camera import Camera
 from viewer.codewords.engine import draw_words
-from viewer.codewords.settings import Params, point_materials, words_of
 from viewer.codewords.words import decode_words
 from viewer.errors import InputError
 from viewer.look import Look, color_table
+from viewer.scan.code_words import Params, point_materials, words_of
 from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose

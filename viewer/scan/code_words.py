@@ -8,20 +8,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..codewords.encode import Elements, Encoding, Light, encode_elements
+from ..codewords.lighting import Materials, map_palette, mapped, palette_of
+from ..codewords.stream import WordStream
+from ..codewords.tables import Steps
 from ..geometry import up_vector
 from ..look import Look, color_table, light_direction, rgba, value_source
 from ..params import param
-from ..scan.layers import NO_LAYERS, Layers
-from ..scan.points import PointCloud
-from ..scan.pose import Pose
-from ..scan.ranges import robust_range
-from ..scan.spacing import typical_spacing
 from ..srgb import bytes_from_light, light_from_bytes
 from ..view import View
-from .encode import Elements, Encoding, Light, encode_elements
-from .lighting import Materials, map_palette, mapped, palette_of
-from .stream import WordStream
-from .tables import Steps
+from .layers import NO_LAYERS, Layers
+from .points import PointCloud
+from .pose import Pose
+from .ranges import robust_range
+from .spacing import typical_spacing
 
 _RADIUS_PER_SPACING = 1.5  # closes a surface that is evenly covered
 _LUMA = np.array([0.2126, 0.7152, 0.0722])
