@@ -336,7 +336,7 @@ def test_a_folder_that_holds_another_scan_says_so(tmp_path: Path) -> None:
     formats.write(tmp_path / "whole9.ply", cloud)
     (text,) = told(tmp_path)
     assert text == (
-        "The folder also contains whole9.ply, whole10.npz, which are not part of this scan. "
+        "The folder also contains whole9.ply, whole10.npz beside this scan. "
         "To see such a file, open it by its name."
     )
     assert told(tmp_path / "frames") == []

@@ -84,7 +84,7 @@ def open_scan(
     others = [name for name in left_aside(path, source) if name not in aside]
     timeline.decided.leave_aside(*(Aside(name, "may be a separate scan") for name in others))
     if others:
-        what = f"The folder also contains {_listed(others)}, which are not part of this scan"
+        what = f"The folder also contains {_listed(others)} beside this scan"
         timeline.messages.append(ScanMessage("beside", f"{what}. To see such a file, open it by its name."))
     if stated and not usable_unit(stated):
         what = (
