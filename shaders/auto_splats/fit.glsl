@@ -18,6 +18,8 @@ const float MOST = 3.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
 const float OPEN = 1.75;    // radii by share: a cell that reaches farther has no end there
 const float LEAST_SHARE = 0.9, MOST_SHARE = 1.39;  // of the radius by share, bounds of that by the cell
+const float FLAT = 0.3;  // of the second eigenvalue, up to which the least one is that of a plane
+const int CLOSE = 3;     // the neighbor that a splat reaches halfway to where there is no plane
 const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good as in one pixel
 // Of the largest eigenvalue, below which the second is that of points on a line; radii that lines beside are within.
 const float LINE = 0.1, BESIDE = 6.0;
@@ -94,11 +96,20 @@ vec4 closing(vec4 bounds, float share) {
     return mix(closed, vec4(share), greaterThan(reach, vec4(OPEN * share)));
 }
 
+// How far a splat may reach, in radii of the neighborhood. At tips and on horns, points lie on no plane: a splat that
+// is wider than they are would stand out of the surface.
+float flat_reach(Extent extent, vec3 values, int count, float scale) {
+    float spread = sqrt(2.0 * values.y / float(count)), flatness = FLAT * values.y / max(values.x, 1e-9);
+    float halfway = 0.5 * LEANING * scale * sqrt(near_squared[min(CLOSE, extent.count - 1)]);
+    return max(halfway, spread * max(flatness, 1.0));
+}
+
 // The radius of a splat: how far the places reach that are nearer to the point than to any other one, its Voronoi cell in
 // the plane, so that splats leave no gap however uneven points lie; where the cell is open, as at borders, and at least about
 // as a point's share of the surface. Hidden neighbors have no splats: near ones, where points crowd the pixels, have no cell
-// either. crowded: how near these are. most: that a neighborhood counts for, as discs of the few points of sparse parts would hide the rest.
-float splat_radius(Extent extent, vec3 values, vec3 normal, float crowded, float most) {
+// either. count: points that tell the plane. crowded: how near hidden ones are. most: that a neighborhood counts for,
+// as discs of the few points of sparse parts would hide the rest.
+float splat_radius(Extent extent, int count, vec3 values, vec3 normal, float crowded, float most) {
     float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0, radius = min(sqrt(extent.squared), most);
     if (values.y <= COLLINEAR * values.z) return 2.0 * radius * inversesqrt(float(extent.count));
     // Directions turn with the scan: they are counted from the nearest neighbor's.
@@ -118,7 +129,7 @@ float splat_radius(Extent extent, vec3 values, vec3 normal, float crowded, float
         vec4 four = max(closing(highest[part], share), closing(-lowest[part], share));
         reach = max(reach, max(max(four.x, four.y), max(four.z, four.w)));
     }
-    return radius * reach;
+    return radius * min(reach, flat_reach(extent, values, count, scale));
 }
 
 // Returns how far lines beside it are looked for where all neighbors are on a line, scan units; else 0.
@@ -140,7 +151,7 @@ float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     float pixel = 1.0 / scale_at(-to_view(texelFetch(positions, int(row)).xyz).z), in_picture = typical * pixel;
     float typical_radius = max(in_picture, typical_in_space);  // near the eye, points are sparse in any picture
     float most = min(MOST * typical_radius, max(widest, MOST * in_picture));
-    float splat = splat_radius(extent, values, normal, CROWDED * pixel * unit, most * unit) / unit;
+    float splat = splat_radius(extent, count, values, normal, CROWDED * pixel * unit, most * unit) / unit;
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     bool on_line = extent.count >= LEAST_COUNT && values.y < LINE * values.z;
     extents[row] = radius;
