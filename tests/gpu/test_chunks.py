@@ -145,6 +145,14 @@ def test_orders_hold_each_point_once_and_boxes_hold_theirs() -> None:
             assert (points.max(axis=0) == ordered.high[chunk]).all()
 
 
+def test_points_of_one_plane_are_put_in_order_along_it() -> None:
+    flat = np.random.default_rng(2).uniform(size=(COUNT, 3)) * (1, 1, 0)
+    coarse = in_coarse_order(PointCloud.from_arrays(flat))
+    assert coarse.rows is not None
+    assert (np.sort(coarse.rows) == np.arange(COUNT)).all()
+    assert not coarse.is_scattered
+
+
 @given(st.integers(0, 2**32 - 1), st.sampled_from(["perspective", "orthographic"]))
 def test_no_box_with_a_point_in_view_is_left_out(seed: int, projection: Any) -> None:
     rng = np.random.default_rng(seed)

@@ -35,6 +35,7 @@ _SLACK = 1.0  # pixels beyond the edges, for what float32 rounds
 _ROUNDING = 1e-5  # of the pose's size, by which boxes are larger for the same reason
 _PART = 1 << 18  # points that are worked on at a time, so that they stay near the processor
 _LEVEL = 5  # of the cells that are put in order: 32 along each axis
+_LEAST_SPAN = np.finfo(np.float32).tiny * (2 << _LEVEL)  # cells per length stay finite
 _THIRDS = [sum((i >> bit & 1) << 3 * bit for bit in range(_LEVEL)) for i in range(1 << _LEVEL)]
 _DIGITS = np.array(_THIRDS, np.uint16)  # the bits of a number, two zeros between each and the next
 
@@ -105,7 +106,7 @@ def in_coarse_order(cloud: PointCloud) -> Ordered:
     positions = cloud.positions
     lows, highs = _boxes(positions, _PART)
     low, high = lows.min(axis=0), highs.max(axis=0)
-    steps = np.float32(1 << _LEVEL) / np.maximum(high - low, np.finfo(np.float32).tiny)
+    steps = np.float32(1 << _LEVEL) / np.maximum(high - low, _LEAST_SPAN)  # flat scans have no extent across
     codes = np.empty(len(positions), np.uint16)
     for start in range(0, len(positions), _PART):
         part = slice(start, start + _PART)
