@@ -124,7 +124,8 @@ def pixel_sizes(scene: BareScene, rows: NDArray[np.integer]) -> NDArray[np.float
 def flat_reaches(true: PlainNeighborhoods, values: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far splats may reach (M,), over the radii of their neighbourhoods: no farther than points spread."""
     rows = np.arange(len(true.counts))
-    close = true.distances[rows, np.minimum(CLOSE, true.counts - 1)] / np.where(true.radii > 0, true.radii, 1)
+    close = true.distances[rows, np.minimum(CLOSE, true.counts - 1)]
+    close = close / np.where(true.radii > 0, true.radii, 1)
     flatness = FLAT * values[:, 1] / np.maximum(values[:, 0], 1e-9)
     spread = np.sqrt(2 * values[:, 1] / true.counts) * np.maximum(flatness, 1)
     return np.maximum(LEANING * close / 2, spread)
