@@ -122,7 +122,7 @@ def pixel_sizes(scene: BareScene, rows: NDArray[np.integer]) -> NDArray[np.float
 
 
 def flat_reaches(true: PlainNeighborhoods, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far splats may reach (M,), over the radii of their neighbourhoods: no farther than points spread."""
+    """How far splats may reach (M,), in radii of the neighbourhoods: no farther than points spread."""
     rows = np.arange(len(true.counts))
     close = true.distances[rows, np.minimum(CLOSE, true.counts - 1)]
     close = close / np.where(true.radii > 0, true.radii, 1)
