@@ -292,3 +292,32 @@ def test_the_command_line_reads_as_the_window_does(tmp_path: Path, sequence: Pat
     for timeline in (stated, stored):
         timeline.pose(0)
     assert stored.reading == stated.reading
+
+
+@pytest.mark.slow
+def test_normals_are_turned_round_and_the_record_says_how_they_were_found(
+    screen: Screen, tmp_path: Path
+) -> None:
+    points = np.random.default_rng(0).normal(size=(600, 3))
+    ball = tmp_path / "ball.xyz"
+    np.savetxt(ball, points / np.linalg.norm(points, axis=1, keepdims=True))
+    with running_app(screen, tmp_path, ball) as app:
+        while app.settle().backend != "surfels":
+            app.screen.do("key", "b")
+        found = app.see(lambda state: state.record["orientation"]["value"] == "quick")
+        assert "doubtful" in found.record["orientation"]["why"]
+        app.act(PANEL, ("item_open", "How this was read"))
+        app.choose(PANEL, "How this was read/orientation/##value", "###auto-flipped")
+        app.see(lambda state: state.record["orientation"]["source"] == "user")
+        stated = app.see(lambda state: "doubtful" in state.record["orientation"]["why"])
+        assert stated.undoes == "Correct the normal orientation"
+        app.screen.do("key", "ctrl+z")
+        app.see(lambda state: state.record["orientation"]["source"] == "assumed")
+        app.settle()
+        app.screen.do("key", "ctrl+y")
+        app.see(lambda state: state.record["orientation"]["value"] == "auto-flipped")
+        app.settle()
+        app.screen.do("key", "ctrl+q")
+        app.process.wait(PATIENCE)
+    assert stored_of(tmp_path, ball).document.reading == {"orientation": "auto-flipped"}
+    assert "Traceback" not in app.log()

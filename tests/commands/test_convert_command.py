@@ -108,7 +108,7 @@ def test_convert_stores_what_it_estimates(suffix: str, run: Run, tmp_path: Path)
         for number in range(2):
             pose = timeline.pose(number)
             expected = estimate(Pose(0, 0.0, "x", bare_at(number)), ("normals", "radii"))
-            for name, values in expected.items():
+            for name, values in expected.arrays.items():
                 np.testing.assert_array_equal(getattr(pose.cloud, name), values, err_msg=name)
             assert backend_for(pose)[0] == "surfels", "it opens with what needs them"
 

@@ -105,3 +105,23 @@ def test_a_replayed_picture_reads_the_scan_as_the_first_did(
     told = json.loads(read_description(Path("b.png")))
     assert told["reading"] == {"columns": "- x y z"}
     assert told["record"]["decisions"]["columns"]["source"] == "user"
+
+
+def test_a_picture_says_how_its_normals_were_oriented(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    points = np.random.default_rng(0).normal(size=(400, 3))
+    np.savetxt("ball.xyz", points / np.linalg.norm(points, axis=1, keepdims=True))
+    small = ["--size", "64x48", "--backend", "surfels"]
+    assert cli.main(["render", "ball.xyz", *small, "-o", "a.png"]) == 0
+    assert cli.main(["render", "ball.xyz", *small, "--read", "orientation=fine-flipped", "-o", "b.png"]) == 0
+    assert cli.main(["render", "--replay", "b.png", "-o", "c.png"]) == 0
+    for name, value, source in (("a", "quick", "assumed"), *((one, "fine-flipped", "user") for one in "bc")):
+        decision = json.loads(read_description(Path(f"{name}.png")))["record"]["decisions"]["orientation"]
+        assert (decision["value"], decision["source"]) == (value, source)
+        assert "doubtful" in decision["why"]
+    for out, read in (("a.npz", "auto"), ("b.npz", "auto-flipped")):
+        assert cli.main(["convert", "ball.xyz", out, "--normals", "--read", f"orientation={read}"]) == 0
+    first, flipped = (np.load(name)["normals"] for name in ("a.npz", "b.npz"))
+    assert np.array_equal(first, -flipped)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from viewer.scan import fine_kernels, fine_sides, sheet_kernels
 from viewer.scan.estimate import cloud_normals
 from viewer.scan.open import open_scan
-from viewer.scan.points import PointCloud
-from viewer.scan.sides import Orientation, _agreement
+from viewer.scan.points import Orientation, PointCloud
+from viewer.scan.sides import _agreement
 from viewer.task import Cancelled, Task
 
 

@@ -185,7 +185,7 @@ def test_normals_that_a_pose_lacks_are_those_of_its_grids() -> None:
     dropping = flat([[1, largest, 2], [1, 1, np.nan]], fx=0.5)  # the points of largest do not fit
     for views in ((sphere_view(EYE), sphere_view((-2, 0, 4))), (sphere_view(EYE), dropping)):
         pose = Pose.of(0, 0.0, "x", views)
-        normals = estimate(pose, ["normals"])["normals"]
+        normals = estimate(pose, ["normals"]).arrays["normals"]
         assert np.array_equal(normals, merge(views, normals=True).normals)
         assert len(normals) == len(pose.cloud)
 

@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,7 @@ from ..output.export import check_output, numbered, write_arrays, write_png
 from ..output.film import FILM_SUFFIX, FilmTimes, film
 from ..params import parse
 from ..scan.code_words import Params, words_of
-from ..scan.estimate import estimate
+from ..scan.estimate import with_estimates
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
 from ..scan.pose import Pose
@@ -167,8 +166,7 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
     if not (missing and len(pose.cloud)):
         return pose
     try:
-        found: dict[str, Any] = estimate(pose, missing)
-        return pose.with_cloud(replace(pose.cloud, **found))
+        return with_estimates(pose, missing)
     except ImportError:  # the library that finds neighbours is linked to EGL
         effects = {"normals": "the discs face the viewer", "radii": "all discs have the same size"}
         effect = " and ".join(effects[name] for name in missing)

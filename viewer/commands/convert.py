@@ -20,7 +20,7 @@ from ..bounds import Bounds
 from ..errors import InputError
 from ..output.export import check_output, is_pattern
 from ..scan import formats
-from ..scan.estimate import estimate
+from ..scan.estimate import with_estimates
 from ..scan.inputs import scan_inputs
 from ..scan.octree.build import Stop
 from ..scan.pose import Pose
@@ -125,8 +125,7 @@ class _Poses:
         for pose in read_poses(timeline, indices):
             missing = [name for name in self._estimates if getattr(pose.overview, name) is None]
             if missing:
-                estimates: dict[str, Any] = {**estimate(pose, missing)}
-                pose = pose.with_cloud(replace(pose.cloud, **estimates))
+                pose = with_estimates(pose, missing)
             yield pose if self.eye is None else self._visible(pose, self.eye)
 
     def _visible(self, pose: Pose, eye: tuple[float, ...]) -> Pose:

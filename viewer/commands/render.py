@@ -224,7 +224,7 @@ def _draw(plan: Plan, args: Namespace) -> None:
             if args.out.suffix.lower() not in UNMARKED_SUFFIXES:
                 while supersample(renderer, request, surface):
                     pass
-            put(surface, number, entry.at, entry.description(), legend)
+            put(surface, number, entry.at, entry.after_drawing(request.pose).description(), legend)
         if args.stats:
             save_json(args.stats, stats.summary(renderer, surface, request, frames, entry.automatic))
 

@@ -183,6 +183,12 @@ class Entry:
         texts = dict(timeline.decided.corrections.texts)
         return replace(self, reading=texts, record=timeline.reading.to_json())
 
+    def after_drawing(self, pose: Pose) -> Entry:
+        """The entry with what the record of the scan has since the pose was drawn: sides of normals."""
+        if pose.scan.decided is None or self.anonymous:
+            return self
+        return replace(self, record=pose.scan.decided.reading.to_json())
+
     def with_notes(self, notes: tuple[Note, ...]) -> Entry:
         """The entry with the notes of its scan, if the marks show them."""
         return replace(self, notes=notes if self.marks.notes else ())

@@ -9,7 +9,7 @@ from ..backends import Derives
 from ..errors import InputError
 from ..gpu.pose import GpuPose
 from ..look import wants_normals
-from ..scan.estimate import estimate
+from ..scan.estimate import Estimates, estimate
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.spacing import spacings
@@ -33,7 +33,12 @@ def next_step(resident: Resident, request: Request, view: View | None) -> Prepar
     if missing := _missing(gpu_pose, request):
         name = f"Estimating {' and '.join(missing)}"
         args = lambda: (_bare(resident.current), missing)  # noqa: E731
-        return Preparation(Stage.ESTIMATE, missing, name, estimate, args, gpu_pose.add_estimates)
+
+        def take(found: Estimates) -> None:
+            gpu_pose.add_estimates(found.arrays)
+            gpu_pose.pose.scan.note_sides(found.sides)
+
+        return Preparation(Stage.ESTIMATE, missing, name, estimate, args, take)
     key = derived_key(request, view)
     return None if key is None or key in resident.derived else _derive(resident, request, key, view)
 
@@ -94,4 +99,6 @@ def _bare(pose: Pose) -> Pose:
 
 
 def _bare_cloud(cloud: PointCloud) -> PointCloud:
-    return PointCloud(cloud.positions, cloud.origin, ids=cloud.ids, viewpoint=cloud.viewpoint)
+    return PointCloud(
+        cloud.positions, cloud.origin, ids=cloud.ids, viewpoint=cloud.viewpoint, orientation=cloud.orientation
+    )

@@ -7,6 +7,8 @@ So neither a scan full of duplicates nor a handful of points gives NaN or infini
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,43 +16,78 @@ from numpy.typing import ArrayLike, NDArray
 from ..task import checkpoint
 from .morton import morton_codes
 from .planes import AROUND, NeighborSearch, plane_normals
-from .points import PointCloud, checked_viewpoint
+from .points import FLIPPED, Orientation, PointCloud, checked_viewpoint
 from .pose import Pose
 from .range_view import merged_normals
-from .sides import Orientation, facing, facing_out
+from .sides import FoundSides, Method, facing, facing_out
 
 Vectors = NDArray[np.float64]  # (N, 3)
 
 _FLOAT = np.finfo(np.float32)
+_METHODS: dict[str, Method | None] = {"auto": None, "quick": "quick", "fine": "fine"}
 
 
-def estimate(pose: Pose, names: Sequence[str]) -> dict[str, NDArray[np.float32]]:
-    """The attributes named, "normals" and "radii", by name. See `cloud_normals`, `cloud_radii`; the
-    normals of range views are those of their grids (`merged_normals`)."""
-    work = {"normals": _normals, "radii": lambda pose: cloud_radii(pose.cloud)}
-    return {name: work[name](pose) for name in names}
+class Estimates(NamedTuple):
+    """Estimated attributes of a pose.
+
+    arrays: (N, 3) or (N,) float32 by name. sides: how Scan4D found the sides of normals; None where it did
+    not have to.
+    """
+
+    arrays: dict[str, NDArray[np.float32]]
+    sides: FoundSides | None = None
 
 
-def _normals(pose: Pose) -> NDArray[np.float32]:
-    return merged_normals(pose.views, pose.cloud) if pose.views else cloud_normals(pose.cloud)
+def estimate(pose: Pose, names: Sequence[str]) -> Estimates:
+    """The attributes named, "normals" and "radii". See `cloud_normals`, `cloud_radii`; the normals of range
+    views are those of their grids (`merged_normals`)."""
+    arrays: dict[str, NDArray[np.float32]] = {}
+    sides = None
+    if "normals" in names:
+        if pose.views:
+            arrays["normals"] = merged_normals(pose.views, pose.cloud)
+        else:
+            arrays["normals"], sides = oriented_normals(pose.cloud)
+    if "radii" in names:
+        arrays["radii"] = cloud_radii(pose.cloud)
+    return Estimates(arrays, sides)
+
+
+def with_estimates(pose: Pose, names: Sequence[str]) -> Pose:
+    """The pose with the attributes named, estimated. The record of its scan gets how Scan4D found sides."""
+    found = estimate(pose, names)
+    pose.scan.note_sides(found.sides)
+    arrays: dict[str, Any] = {**found.arrays}
+    return pose.with_cloud(replace(pose.cloud, **arrays))
 
 
 def cloud_normals(
-    cloud: PointCloud, viewpoint: ArrayLike | None = None, orientation: Orientation = "auto"
+    cloud: PointCloud, viewpoint: ArrayLike | None = None, orientation: Orientation | None = None
 ) -> NDArray[np.float32]:
     """Unit normals of the planes through each point's nearest neighbours, (N, 3) float32.
 
     As many neighbours as the noise around asks for, 7 to 96, see `planes`.
 
-    viewpoint: (3,), where the scanner stood, in absolute scan units: normals face it; None: the cloud's.
-    orientation: "quick", "fine" or "auto", how Scan4D finds the side without a viewpoint, see `facing_out`.
-    Without one, normals face outwards, those of a sheet that can be seen from both sides the front (+z), see
-    `sides`. Where all neighbours lie in a line, to rounding, nothing tells a normal: zero, which
-    stands for none. Raises InputError where the viewpoint is not finite.
+    viewpoint: (3,), where the scanner stood, in absolute scan units: normals face it. orientation: how Scan4D
+    finds the side without it; None: that of the cloud. "auto": normals face the viewpoint of the cloud;
+    without one, they face outwards, and those of a sheet that can be seen from both sides face the front
+    (+z). "quick", "fine": outwards, by one method, see `facing_out`. "-flipped" turns all normals round.
+    Where all neighbours lie in a line, to rounding, the normal is zero, which stands for none. Raises
+    InputError where the viewpoint is not finite.
     """
-    eye = cloud.viewpoint if viewpoint is None else checked_viewpoint(viewpoint)
+    return oriented_normals(cloud, viewpoint, orientation)[0]
+
+
+def oriented_normals(
+    cloud: PointCloud, viewpoint: ArrayLike | None = None, orientation: Orientation | None = None
+) -> tuple[NDArray[np.float32], FoundSides | None]:
+    """The normals of `cloud_normals`, and how Scan4D found their sides; None where they face a viewpoint."""
+    name = orientation or cloud.orientation
+    word = name.removesuffix(FLIPPED)
+    eye = cloud.viewpoint if word == "auto" else None
+    eye = eye if viewpoint is None else checked_viewpoint(viewpoint)
     if not len(cloud):
-        return np.empty((0, 3), np.float32)
+        return np.empty((0, 3), np.float32), None
     points, copies = _distinct(cloud.positions)
     checkpoint(0.1)
     search = NeighborSearch(points)
@@ -58,12 +95,13 @@ def cloud_normals(
     checkpoint(0.3)
     normals = plane_normals(search, near)
     checkpoint(0.7)
+    sides = None
     if eye is None:
-        normals = facing_out(points, normals, near, orientation)
+        normals, sides = facing_out(points, normals, near, _METHODS[word])
     else:
         normals = facing(normals, eye - cloud.origin - points)
     normals[_in_lines(points, near)] = 0
-    return normals[copies]
+    return -normals[copies] if name.endswith(FLIPPED) else normals[copies], sides
 
 
 def cloud_radii(cloud: PointCloud, k: int = 7) -> NDArray[np.float32]:

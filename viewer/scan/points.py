@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Concatenate, ParamSpec, TypedDict, TypeVar, Unpack
+from typing import Any, Concatenate, Literal, ParamSpec, TypedDict, TypeVar, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,9 @@ _SCALAR = "scalar:"  # begins the names of scalars among those of all arrays
 
 NOTHING = 0xFFFFFFFF  # the row, or the number of a face or node, where there is none
 NOT_FINITE = "not finite"  # why points are dropped: a coordinate is NaN or infinite
+Orientation = Literal["auto", "quick", "fine", "auto-flipped", "quick-flipped", "fine-flipped"]
+ORIENTATIONS: tuple[Orientation, ...] = get_args(Orientation)
+FLIPPED = "-flipped"  # ends the name of an orientation that turns all normals round
 UNKNOWN_UNIT = "units"  # of length, where neither the file nor the user tells one
 
 
@@ -68,6 +71,7 @@ class PointCloud:
                subject under the same ids; None where the scan does not tell
     viewpoint: (3,) float64, where the scanner stood that saw all points, absolute, scan units; None where the
                scan does not tell, or several did
+    orientation: on which side normals point that Scan4D estimates, see `cloud_normals`
     """
 
     positions: NDArray[np.float32]
@@ -84,6 +88,7 @@ class PointCloud:
     topology: str | None = None
     remainders: NDArray[np.float32] | None = None
     viewpoint: NDArray[np.float64] | None = None
+    orientation: Orientation = "auto"
     _facts: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod

@@ -15,6 +15,9 @@ from ..errors import InputError
 from .points import PointCloud, strided
 from .range_points import RangePoints
 from .range_view import RangeView
+from .reading.orientation import complete
+from .reading.sequence import Decided
+from .sides import FoundSides
 from .spacing import ENOUGH, roughness, typical_spacing
 from .upright import Upright, guess_up
 
@@ -60,9 +63,28 @@ class Average:
 
 
 class ScanKey:
-    """A token that the poses of a scan share."""
+    """A token that the poses of a scan share.
 
-    __slots__ = ("__weakref__",)
+    decided: how Scan4D reads the scan; None: the pose stands alone. It stays in this process.
+    """
+
+    __slots__ = ("__weakref__", "decided", "sides")
+
+    def __init__(self, decided: Decided | None = None) -> None:
+        self.decided = decided
+        self.sides: FoundSides | None = None  # of the pose with the most doubtful ones so far
+
+    def __reduce__(self) -> tuple[type[ScanKey], tuple[()]]:
+        """Another process has no record of decisions."""
+        return ScanKey, ()
+
+    def note_sides(self, found: FoundSides | None) -> None:
+        """Put into the record how Scan4D found the sides of estimated normals; None: it did not have to."""
+        if self.decided is None or found is None:
+            return
+        if self.sides is None or found.doubtful > self.sides.doubtful:
+            self.sides = found
+            complete(self.decided, found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ makes the sum higher.
 from __future__ import annotations
 
 import heapq
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from ..task import checkpoint
 from .patches import joined_things, summed
 
 Vectors = NDArray[np.float64]  # (N, 3)
-Orientation = Literal["auto", "quick", "fine"]
+Method = Literal["quick", "fine"]
 
 LINKED = 9  # neighbours that are linked, the point itself included
 # The outside of a surface is the side that more views see, from both ends of each axis.
@@ -34,17 +34,26 @@ _GRID = 1024  # cells along an axis at most
 _PATCHES = ((10, 40, 160), (10, 40, 160, 640), (5, 20, 80, 320))
 _SEEN = 0.1  # that a view from outside weighs in links
 _TURNS = 20  # rounds in which points or patches turn, one by one
+_DOUBTFUL = 0.1  # the weight of a link from which it makes a side doubtful
 _OFTEN = 1 << 12  # steps between checkpoints
 
 
+class FoundSides(NamedTuple):
+    """How Scan4D found the sides of normals. doubtful: the share of the points that have links to neighbours
+    which contradict their sides, 0 to 1."""
+
+    method: Method
+    doubtful: float
+
+
 def facing_out(
-    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32], orientation: Orientation = "auto"
-) -> NDArray[np.float32]:
+    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32], method: Method | None = None
+) -> tuple[NDArray[np.float32], FoundSides]:
     """The normals, turned round where they point into the surface or away from the front, (N, 3).
 
-    points: (N, 3), distinct. near: (N, K), each point and its nearest others, nearest first. orientation:
-    "quick" uses links and the view from outside; "fine" also uses the winding number, see `fine_sides`;
-    "auto" does so if many links contradict each other.
+    points, normals: (N, 3), the points distinct. near: (N, K), each point and its nearest others, nearest
+    first. method: "quick" uses links and the view from outside; "fine" also uses the winding number, see
+    `fine_sides`; None: "fine" if many links contradict each other.
     """
     from . import fine_sides, side_kernels
 
@@ -59,10 +68,15 @@ def facing_out(
     signs = _agreeing(links, weights, seen)
     oriented = normals * signs[:, None]
     held = weights * signs[links].prod(axis=1)
-    if orientation == "fine" or (orientation == "auto" and fine_sides.is_unsure(held)):
+    method = method or ("fine" if fine_sides.is_unsure(held) else "quick")
+    if method == "fine":
         bonds = fine_sides.Bonds(links, held, seen * signs)
-        oriented *= fine_sides.better_sides(points, oriented, near, bonds)[:, None]
-    return oriented
+        turned = fine_sides.better_sides(points, oriented, near, bonds)
+        oriented *= turned[:, None]
+        held = held * turned[links].prod(axis=1)
+    is_doubtful = np.zeros(len(points), bool)
+    is_doubtful[links[held < -_DOUBTFUL]] = True
+    return oriented, FoundSides(method, float(is_doubtful.mean()))
 
 
 def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> NDArray[np.float32]:

@@ -94,7 +94,7 @@ class Timeline:
         self.finish: Callable[[Pose], object] = lambda pose: None
         self.source = source
         self.decided: Decided = getattr(source, "decided", None) or Decided()
-        self._scan = ScanKey()
+        self._scan = ScanKey(self.decided)
         self._state = threading.Condition()  # guards all that follows
         self._cache = PoseCache(default_budget() if cache_bytes is None else cache_bytes)
         self._loading: dict[int, Future[Pose]] = {}

@@ -22,6 +22,8 @@ from viewer.scan.reading.record import KEYS
         ("encoding", "Latin-1", "latin-1"),
         ("colors", "65535", "65535"),
         ("normals", "none", "none"),
+        ("orientation", "Fine", "fine"),
+        ("orientation", "auto-flipped", "auto-flipped"),
         ("missing", "0,0,0", (0.0, 0.0, 0.0)),
         ("missing", "-9999", -9999.0),
         ("missing", "none", "none"),

@@ -48,6 +48,7 @@ from ..range_view import RangeView, in_one_unit, merge
 from ..reading.axes import note_turned
 from ..reading.cloud import assemble, stored_colors
 from ..reading.hints import hint_for, hinted_suffix
+from ..reading.orientation import note_orientation
 from ..reading.record import Decision
 from ..reading.sequence import Decided, ask
 from ..reading.textures import PictureReaders, paint
@@ -204,7 +205,7 @@ def _finished(module: ModuleType, path: Path, found: PointContents | Scanned, de
     else:
         scanned = found
     if isinstance(scanned, PointCloud):
-        scanned = note_turned(scanned, decided)
+        scanned = note_orientation(note_turned(scanned, decided), decided)
     decided.note(Decision("format", module.TITLE, "file", path.suffix.lower()))
     return _with_points(scanned)
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...errors import InputError, shortened, unknown_name
+from ..points import ORIENTATIONS
 from ..units import checked_unit
 from .record import ROLES, Decision, holds_name
 
@@ -133,6 +134,7 @@ CORRECTED = {
     "encoding": _words("utf-8, utf-16 or latin-1", "utf-8", "utf-16", "latin-1"),
     "colors": _words("the largest value 1, 255 or 65535, or none", "1", "255", "65535", "none"),
     "normals": _words("stored or none", "stored", "none"),
+    "orientation": _words("auto, quick or fine, each also with -flipped", *ORIENTATIONS),
     "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number", ("none", "0,0,0")),
     "texture": Key(_texture, "vertices, dense, dense:500000 or none", ("vertices", "dense", "none")),
     "splats": _words("yes or no", "yes", "no"),
@@ -157,7 +159,8 @@ CORRECTED = {
 class Corrections(Mapping[str, Any]):
     """Corrections of a user: key -> parsed value.
 
-    columns:       tuple of roles        separator, encoding, colors, normals, splats, axes, ground: str
+    columns:       tuple of roles        separator, encoding, colors, normals, orientation, splats, axes,
+                   ground: str
     decimal:       "." or ","            skip: int              depth-scale: float
     missing:       "none", a float, or (x, y, z)
     camera:        tuple (fx, fy, cx, cy, *lens), in pixels with the centre of the first one at (0, 0); or a

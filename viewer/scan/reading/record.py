@@ -25,6 +25,7 @@ KEYS = {
     "columns": "Columns",
     "colors": "Color range",
     "normals": "Normals",
+    "orientation": "Normal orientation",
     "missing": "Not measured",
     "unit": "Unit",
     "axes": "Axes",
@@ -52,6 +53,13 @@ _WORDS = {  # as people read them: values of keys
         "bar": "bars",
     },
     "unit": {"units": "not known"},
+    "orientation": {
+        "auto": "automatic",
+        "auto-flipped": "automatic, flipped",
+        "quick-flipped": "quick, flipped",
+        "fine-flipped": "fine, flipped",
+        "viewpoint": "towards the scanner",
+    },
     "axes": {"unknown": "not known"},
     "take": {"all": "all, as one scan"},
 }
