@@ -25,7 +25,7 @@ const float LEANING = 1.0;  // spacings that a splat reaches, since it may lean,
 const float LEAST_FACING = 0.5;  // cosine, below which leaning adds no more to a splat: normals at outlines are uncertain
 // In distances between points in space: from which reach on a point is one of an outline, whose sectors lie outside; what
 // its splat reaches at most; and what other splats reach at least, so that none leaves a gap.
-const float OUTLINE = 1.6, AT_OUTLINE = 1.2, CLOSED = 1.0;
+const float OUTLINE = 1.4, AT_OUTLINE = 1.1, CLOSED = 1.0;
 const float FEW = 3.0;  // distances between neighbors in sectors that this is at most: few points tell none in space
 const float OUTSIDE = 1.5;   // spacings that it reaches at most: candidates at outlines have sectors far outside
 

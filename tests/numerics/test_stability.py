@@ -98,37 +98,18 @@ PICTURES = [
 ]  # fmt: skip
 
 
-# Rows that hold no longer since splats fit the cells of their points, and since splats of `hpr` follow the
-# spacing in space. They are mistakes to mend, not limits.
-BROKEN = {
-    ("the eye inside the scan", "hpr", None),
-    ("the eye inside the scan", "hpr", ("output", "reconstruction")),
-    ("each point 1000 times, without radii", "surfels", ("passes", "sorted")),
-}
-
-
-def expect_broken(request: pytest.FixtureRequest, row: Row, name: str, way: dict[str, Any]) -> None:
-    """Expect a failure of the rows of `BROKEN`."""
-    if (row.name, name, next(iter(way.items()), None)) in BROKEN:
-        request.applymarker(pytest.mark.xfail(reason="broken by new splats, to be mended", strict=True))
-
-
 @pytest.mark.parametrize(("row", "name"), PICTURES)
-def test_the_picture_stays_the_same(
-    renderer: Renderer, request: pytest.FixtureRequest, row: Row, name: str
-) -> None:
+def test_the_picture_stays_the_same(renderer: Renderer, row: Row, name: str) -> None:
     name, setting = of_variant(name)
-    expect_broken(request, row, name, setting)
     assert_allowed(renderer, row, backends()[name], setting)
 
 
 @pytest.mark.parametrize(("backend", "way"), WAYS)
 @pytest.mark.parametrize("row", [row for row in ROWS if not row.setting], ids=lambda row: row.name)
 def test_other_pictures_stay_the_same(
-    renderer: Renderer, request: pytest.FixtureRequest, row: Row, backend: Backend, way: dict[str, Any]
+    renderer: Renderer, row: Row, backend: Backend, way: dict[str, Any]
 ) -> None:
     """Cubes, two passes, sorted splats, pictures without filling: whatever declarations sweep or limit."""
-    expect_broken(request, row, backend.name, way)
     assert_allowed(renderer, row, backend, way)
 
 

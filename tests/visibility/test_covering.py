@@ -19,13 +19,12 @@ from viewer.mesh.reference import visible
 from viewer.mesh.triangles import read_mesh
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
-from viewer.scan.spacing import typical_spacing
 from viewer.visibility.calibration import EyeCalibration, body_of, calibrate
 from viewer.visibility.covering import CLEAR, REACH, STEEP, Covering, SpacedPoints
 from viewer.visibility.exact import SeenPoints, exact_visible_points, flipping, hull_rows
 from viewer.visibility.search import calibrated, visible_points
 from viewer.visibility.sectors import Sectors
-from viewer.visibility.spacing import ENOUGH, Spacings
+from viewer.visibility.spacing import NEAREST, Spacings
 
 COUNT = 3000
 SPACING = np.sqrt(4 * np.pi / COUNT)
@@ -54,16 +53,10 @@ def before_horizon(points: Floats, eye: Floats) -> Floats:
 
 
 def apart_at(points: Floats) -> Floats:
-    """How far apart points lie around each, by how many lie in a ball of two usual distances, or of twice
-    that and so on where these are fewer than six."""
+    """How far apart points lie around each, by the mean squared distance of the nearest ones."""
     between = np.linalg.norm(points[:, None] - points[None], axis=2)
-    found, ball = np.full(len(points), np.nan), 2 * typical_spacing(PointCloud.from_arrays(points))
-    while np.isnan(found).any():
-        count = (between <= ball).sum(axis=1)
-        new = np.isnan(found) & (count >= ENOUGH)
-        found[new] = ball * np.sqrt(np.pi / count[new])
-        ball *= 2
-    return found
+    nearest = np.sort(between, axis=1)[:, 1 : NEAREST + 1]
+    return np.sqrt(2 * np.pi * np.square(nearest).mean(axis=1) / (NEAREST + 1))
 
 
 def uncovered_ones(away: Floats, spacings: Floats) -> Flags:

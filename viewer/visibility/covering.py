@@ -29,7 +29,7 @@ from .candidates import RowSample
 from .clipping import EVERYWHERE, Planes
 from .sectors import Sectors
 
-REACH = 1.8  # of a disc, in distances between points
+REACH = 1.7  # of a disc, in distances between points
 CLEAR = 0.05  # of the reach: how far behind a point others may lie, beside it, that it does not cover
 CLEAR_OF_NOISE = 0.4  # where some is left: times what it was, in distances between points
 STEEP = 1.0  # and how much farther for each length aside

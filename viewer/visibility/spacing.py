@@ -17,8 +17,8 @@ from ..scan.points import NOTHING, PointCloud
 from ..scan.spacing import typical_spacing
 from .calibration import body_of, copies
 
-ENOUGH = 6  # points in a ball that tell how far apart they lie
-_BALL = 2.0  # its radius, in usual distances between points; it is doubled where there are too few
+NEAREST = 6  # points whose distances give the spacing
+_BALL = 2.0  # first radius of the search, in usual distances; it is doubled where it finds too few points
 _LEVELS = 6
 _NET_STEPS = 4095  # along an axis of an octahedron's net
 _PER_CELL = 4  # points, in the table of voxels
@@ -76,8 +76,9 @@ def foresee_spacing(cloud: PointCloud) -> None:
 
 
 class Spacings:
-    """The distance between neighbours around each point of a pose, without noise, by the number of them
-    in a ball.
+    """The distance between neighbours around each point of a pose, without noise.
+
+    The mean squared distance of the nearest points gives it. Other parts of the scan do not change it.
 
     texels: R32F, a texel a row, scan units. They lie in space, so that they are the same for all eyes; kept
     with the pose (`GpuPose.cached`).
@@ -114,7 +115,7 @@ class Spacings:
             bins.count(visits)
             bins.fill(visits, count)
             last = level == _LEVELS - 1
-            program = gpu.compute("hpr/spacing.comp", {"LAST": int(last), "ENOUGH": f"{ENOUGH}u"})
+            program = gpu.compute("hpr/spacing.comp", {"LAST": int(last), "NEAREST": NEAREST})
             bind(program)
             bins.starts.bind(Texture.STARTS)
             bins.items.bind(Texture.LISTED)

@@ -121,11 +121,11 @@ def test_normals_and_sizes_are_those_of_the_plain_version(renderer: Renderer, na
     leaning = size / np.maximum(cosine, 0.5)
     size = np.minimum(np.maximum(leaning, np.minimum(spacings, 3 * size)), 1.5 * spacings)
     apart = np.frombuffer(scene.pose.cached(Spacings).texels.buffer.read(), np.float32)
-    is_clear = seen & (np.abs(reach + 0.5 * widths_of(scene, eye) - 1.6 * apart) > 0.02 * apart)
-    at_outline = reach + 0.5 * widths_of(scene, eye) > 1.6 * apart
+    is_clear = seen & (np.abs(reach + 0.5 * widths_of(scene, eye) - 1.4 * apart) > 0.02 * apart)
+    at_outline = reach + 0.5 * widths_of(scene, eye) > 1.4 * apart
     assert 0 < at_outline[seen].mean() < 0.5
     size = np.where(
-        at_outline, np.minimum(size, 1.2 * apart), np.maximum(size, np.minimum(apart, 3 * spacings))
+        at_outline, np.minimum(size, 1.1 * apart), np.maximum(size, np.minimum(apart, 3 * spacings))
     )
     np.testing.assert_allclose(radii[is_clear], size[is_clear], rtol=0.02)
     splats.release()
