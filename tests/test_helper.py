@@ -81,6 +81,7 @@ def test_cancelling_ends_the_work_at_once_and_the_next_call_works(helper: Helper
     assert helper.call(Task("Asking"), process) != os.getpid()
 
 
+@pytest.mark.slow
 def test_progress_is_no_answer_whatever_number_it_is(helper: Helper) -> None:
     task = Task("Reporting")
     assert helper.call(task, report_an_integer) == "done"
@@ -114,6 +115,7 @@ def test_failures_come_back_as_errors_with_one_message(helper: Helper) -> None:
     assert helper.call(Task("Asking"), process) != os.getpid()
 
 
+@pytest.mark.slow
 def test_modules_in_the_working_directory_are_not_taken_for_ours(
     helper: Helper, tmp_path: object, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -236,6 +236,7 @@ def test_a_process_ends_with_the_one_that_started_it(folder: Path) -> None:
     assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
 
 
+@pytest.mark.slow
 def test_a_process_works_while_the_one_that_started_it_does() -> None:
     with start_python("import time; time.sleep(1.5); print('done')", nice=0) as process:
         assert process.communicate()[0].split() == [b"done"]

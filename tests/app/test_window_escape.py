@@ -36,6 +36,7 @@ def running(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterato
     assert "Traceback" not in app.log()
 
 
+@pytest.mark.slow
 def test_the_menu_of_up_axes_comes_again_only_with_the_mouse(app: RunningApp) -> None:
     """It drops while the mouse comes to its button; Escape closes it though the mouse rests there."""
     left, top, width, height = app.view()

@@ -110,6 +110,7 @@ def corner(app: RunningApp, right: bool) -> NDArray[np.uint8]:
     return view[-60:, -110:] if right else view[-60:, :90]
 
 
+@pytest.mark.slow
 def test_marks_are_shown_and_hidden(app: RunningApp) -> None:
     for key, right in (("s", False), ("c", True)):
         shown = corner(app, right)

@@ -187,6 +187,7 @@ def test_folders_and_files_that_are_no_utf_8(screen: Screen, tmp_path: Path) -> 
         close(app)
 
 
+@pytest.mark.slow
 def test_settings_and_keys_that_are_bombs_do_not_keep_the_window_from_opening(
     screen: Screen, tmp_path: Path
 ) -> None:

@@ -169,6 +169,7 @@ def test_backgrounds_by_what_they_are_for_are_shown_and_saved(app: RunningApp) -
     app.settle()
 
 
+@pytest.mark.slow
 def test_the_theme_changes_the_panels_and_what_is_behind_the_scan(app: RunningApp) -> None:
     screen = app.screen
     app.see(counted=True)

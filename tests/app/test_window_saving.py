@@ -135,6 +135,7 @@ def test_a_folder_lists_its_folders_and_the_newest_files_first(tmp_path: Path) -
     assert [(row.frames, row.size) for row in rows] == [(0, None), (0, None), (1, 2), (1, 1), (1, 0)]
 
 
+@pytest.mark.slow
 def test_the_folder_of_an_export_is_gone_to_and_escape_ends_one_dialog(
     app: RunningApp, tmp_path: Path
 ) -> None:

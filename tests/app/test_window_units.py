@@ -84,6 +84,7 @@ def test_a_guess_is_taken_and_lengths_are_shown_in_another_unit(app: RunningApp)
     app.see(unit="units")
 
 
+@pytest.mark.slow
 def test_a_unit_that_is_no_word_ends_nothing(screen: Screen, tmp_path: Path) -> None:
     """Of a document that was kept, with a measure, whose row of the panel has a format with the unit."""
     scan = left_open(tmp_path, frames=1, landmarks=2, measures=1)

@@ -164,6 +164,7 @@ def test_full_screen_is_the_view_alone_and_goes_back(app: RunningApp) -> None:
     app.see(view=[*place])
 
 
+@pytest.mark.slow
 def test_larger_text_takes_more_room(app: RunningApp) -> None:
     usual = app.view()
     chord(app, "ctrl", "equal")

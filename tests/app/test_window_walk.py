@@ -51,6 +51,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_buttons_of_the_toolbar_that_share_an_id_are_found(
     screen: Screen, tmp_path: Path, ball: Path
 ) -> None:

@@ -70,6 +70,7 @@ def test_large_splats_hide_small_ones_and_are_hidden_by_them(surfels: Draw) -> N
     assert_agree(by_tiles, by_quads, others=OTHERS)
 
 
+@pytest.mark.slow
 def test_a_second_pass_of_enlarged_ones_goes_on_from_there(surfels: Draw) -> None:
     camera = Camera((0.2, 0.1, 0.0), (0.1, 0.0, -1.0), fov_y=60)
     two = {"passes": "two", "enlarge": 1.5}

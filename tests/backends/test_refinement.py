@@ -147,6 +147,7 @@ def test_large_splats_among_small_ones(draw: Draw, passes: str) -> None:
         assert_agree(picture, pictures[1], 0.002)
 
 
+@pytest.mark.slow
 def test_surfaces_behind_others_are_nearer_the_truth(renderer: Renderer, draw: Draw) -> None:
     """Five balls, one behind another: fewer pixels of a wrong one, less beyond outlines, no more holes."""
     truth = AnalyticScene(tuple(Sphere(center=center) for center in CENTERS))

@@ -194,6 +194,7 @@ def test_pictures_are_compared_in_the_judge_s_look(renderer: Renderer) -> None:
     assert judge(renderer, truth).errors(other)["psnr_frame"] == math.inf
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [1.0, *rarely(0.0)])
 def test_the_back_of_the_bunny_shows_between_small_points(
     data_dir: Path, renderer: Renderer, draw: Callable[..., Surface], size: float

@@ -188,6 +188,7 @@ def test_a_zoom_of_range_views_stands_beside_their_mesh(renderer: Renderer) -> N
     assert errors["mesh"]["psnr"] > errors["range-mesh"]["psnr"]
 
 
+@pytest.mark.slow
 def test_points_have_no_range_mesh(renderer: Renderer) -> None:
     bench, ticks = Bench(renderer, SETTINGS), []
     bench.tick = lambda: ticks.append(None)
@@ -203,6 +204,7 @@ def test_measuring_ticks_as_often_as_it_said(measured: tuple[list[Row], int, int
     assert ticks == said
 
 
+@pytest.mark.slow
 def test_what_is_not_judged_is_timed_alone(renderer: Renderer, tmp_path: Path) -> None:
     ticks: list[None] = []
     bench, timed = Bench(renderer, SETTINGS, tmp_path), replace(FEW, judged=False)

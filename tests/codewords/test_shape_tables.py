@@ -46,6 +46,7 @@ def test_entries_are_what_a_look_at_each_pixel_gives(steps: Steps) -> None:
             assert np.array_equal(bitmap(table, size, i, j), expected), (size, i, j)
 
 
+@pytest.mark.slow
 def test_every_entry_of_the_papers_table() -> None:
     """The rule at each pixel of all shapes, of which opposite normals share one, without fractions."""
     table, steps = shape_table(), np.arange(-30, 31)

@@ -206,6 +206,7 @@ def test_no_opengl_is_code_3(run: Run, scans: Path, tmp_path: Path, monkeypatch:
     assert run("info", scans / "ball.npz").code == 0
 
 
+@pytest.mark.slow
 def test_the_device_is_passed_on(scans: Path, tmp_path: Path) -> None:
     ball = ("render", scans / "ball.npz", "-o", tmp_path / "a.png", *SMALL, "--force")
     assert finish(process(*ball, "--device", 0)).code == 0
@@ -314,6 +315,7 @@ def test_what_was_written_is_named_byte_by_byte_for_programs(in_terminal: bool, 
     assert path.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="has no /dev/full")
 @pytest.mark.parametrize("where", [*rarely("2>&-"), "2> /dev/full", *rarely("<&- 2>&-")])
 def test_messages_that_nobody_can_read_are_lost(where: str, scans: Path, tmp_path: Path) -> None:

@@ -195,6 +195,7 @@ def test_what_is_written_is_read_as_landmarks_again(run: Run) -> None:
         assert [float(one[axis]) for axis in "xyz"] == pytest.approx([float(other[axis]) for axis in "xyz"])
 
 
+@pytest.mark.slow
 def test_a_topology_that_changes_midway_is_no_error(run: Run) -> None:
     write_ball(Path("seq/f2.ply"), 12.0, topology=40)
     done = run(
@@ -219,6 +220,7 @@ def test_points_without_faces_are_measured(run: Run) -> None:
     assert values["way"] == pytest.approx(20 * np.arcsin(straight / 20), rel=5e-3)
 
 
+@pytest.mark.slow
 def test_measures_without_an_axis_in_a_picture_are_told(run: Run) -> None:
     kinds = {"breite": "distance", "winkel": "angle", "fläche": "area", "raum": "volume"}
     takes = {"distance": ["a", "c"]}

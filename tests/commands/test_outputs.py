@@ -349,6 +349,7 @@ def test_pictures_of_names_that_are_no_utf_8(suffix: str, several: bool, odd: st
         assert (done.code, done.err) == (0, "")
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("suffix", [".ply", ".pcd", ".npz", ".svo"])
 def test_conversions_to_names_that_are_no_utf_8(suffix: str, odd: str, run: Run) -> None:
@@ -375,6 +376,7 @@ def test_meshes_of_names_that_are_no_utf_8(odd: str, run: Run, folder: Path) -> 
     assert run("simulate", f"{odd}.obj", "-o", f"{odd}_.pcd", *SMALL).code == 0
 
 
+@pytest.mark.slow
 @posix
 def test_playing_names_that_are_no_utf_8(odd: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("DISPLAY", raising=False)

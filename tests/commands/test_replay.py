@@ -107,6 +107,7 @@ def test_a_picture_tells_its_scan_and_the_scans_hash(run: Run) -> None:
     assert pose.hash == fingerprint(sorted(Path("sequence").iterdir()))
 
 
+@pytest.mark.slow
 def test_landmarks_and_their_lines_stand_in_anonymous_pictures_where_they_are(run: Run) -> None:
     away = np.array([5000.0, -300.0, 20.0])
     formats.write(Path("away.npz"), PointCloud.from_arrays(sphere(2000).world() + away))

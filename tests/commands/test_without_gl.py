@@ -54,6 +54,7 @@ def test_a_machine_without_opengl(without_opengl: dict[str, str], scans: Path, t
     assert (picture(out / "a.png")[32, 48] != picture(out / "a.png")[0, 0]).any()
 
 
+@pytest.mark.slow
 def test_normals_that_cannot_be_estimated(
     without_opengl: dict[str, str], scans: Path, tmp_path: Path
 ) -> None:

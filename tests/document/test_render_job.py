@@ -65,6 +65,7 @@ def test_pictures_are_those_of_a_replay_and_replace_former_ones(run: Run) -> Non
         assert Path(f"again{number}.png").read_bytes() == Path(f"out/p{number}.png").read_bytes()
 
 
+@pytest.mark.slow
 def test_files_bear_the_numbers_that_are_wanted() -> None:
     out = Path("out/p%02d.png")
     made = make(Task("export"), turned(), out, 25.0, anonymous=False, numbers=(1, 5, 9))
@@ -72,6 +73,7 @@ def test_files_bear_the_numbers_that_are_wanted() -> None:
     assert listed() == ["p01.png", "p05.png", "p09.png"]
 
 
+@pytest.mark.slow
 def test_a_film_has_its_pace(run: Run) -> None:
     made = make(Task("export"), turned(), Path("out/a.mp4"), 10.0, anonymous=False)
     frames, rate = film(made.files[0])
@@ -87,6 +89,7 @@ def test_an_anonymous_picture_tells_no_name_and_no_path(run: Run, folder: Path) 
     assert np.array_equal(picture(Path("again.png")), picture(file))
 
 
+@pytest.mark.slow
 def test_an_anonymous_film_draws_no_names() -> None:
     ball = sphere(2000)
     formats.write(Path("doe.npz"), replace(ball, scalars={"janedoe": ball.positions[:, 1].copy()}))
@@ -148,6 +151,7 @@ def test_broken_frames_are_told(folder: Path) -> None:
     assert "leaves out frame 2" in made.warnings[0]
 
 
+@pytest.mark.slow
 def test_modules_of_the_working_directory_are_not_taken_for_scan4d() -> None:
     Path("viewer").mkdir()
     Path("viewer/__init__.py").write_text("raise SystemExit('taken')")
@@ -158,6 +162,7 @@ def test_modules_of_the_working_directory_are_not_taken_for_scan4d() -> None:
     assert json.loads(read_description(file))["scan"] == "doe.npz"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*rarely("p.png", "p.mp4"), "p%02d.png"])
 def test_files_that_have_come_meanwhile_stay_and_all_are_called_differently(name: str) -> None:
     out = Path("out", name)
@@ -172,6 +177,7 @@ def test_files_that_have_come_meanwhile_stay_and_all_are_called_differently(name
     assert listed() == sorted([former.name, *(path.name for path in expected)])
 
 
+@pytest.mark.slow
 def test_the_folder_names_the_scan_no_longer_than_it_takes_to_read_that(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -187,6 +193,7 @@ def test_the_folder_names_the_scan_no_longer_than_it_takes_to_read_that(
     assert named == [[]] * COUNT
 
 
+@pytest.mark.slow
 def test_folders_and_scans_that_are_no_utf_8(folder: Path) -> None:
     cafe = Path(os.fsdecode(b"caf\xe9"))
     cafe.mkdir()
@@ -201,6 +208,7 @@ def test_folders_and_scans_that_are_no_utf_8(folder: Path) -> None:
     assert sorted(path.name for path in cafe.iterdir()) == ["a.png", "doe.npz"]
 
 
+@pytest.mark.slow
 def test_a_scan_that_a_recording_may_not_ask_for_is_named_beside_it() -> None:
     Path("a").mkdir()
     Path("doe.npz").rename("a/doe.npz")

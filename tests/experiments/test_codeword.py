@@ -14,6 +14,7 @@ SIZE = (80, 60)
 SETTINGS = BenchSettings(size=SIZE, views=1, repeat=1)
 
 
+@pytest.mark.slow
 def test_rows_become_tables(renderer: Renderer) -> None:
     bench = Bench(renderer, SETTINGS)
     times = list(words.measure_times(bench, ["torus"], 500, [SIZE]))

@@ -41,6 +41,7 @@ def rows_without(*words: str) -> list[dict[str, object]]:
     return [json.loads(line)["row"] for line in done.stdout.splitlines()]
 
 
+@pytest.mark.slow
 def test_frames_are_measured_without_libraries_of_the_window() -> None:
     few = "--sizes", "2000", "--pictures", "2", "--table", "orbit", "new_pose"
     rows = rows_without("hardware", *few, "--rows", "points", "sketch 32", "GL_POINTS", "new points")

@@ -87,6 +87,7 @@ def test_the_scans_have_exactly_as_many_points_as_the_papers(data_dir: Path) -> 
         assert again.hash == subject.hash
 
 
+@pytest.mark.slow
 def test_splats_as_printed_are_alike_by_each_feed_and_close_the_surface(renderer: Renderer) -> None:
     """Two passes with colours through the feed: the same colours, nearly those of the backend."""
     pose, size, look = open_scan("demo").pose(0), (240, 160), Look(light="flat")

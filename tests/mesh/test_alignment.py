@@ -35,6 +35,7 @@ def degrees_between(first: RangeView, second: RangeView, true: tuple[RangeView, 
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
 
 
+@pytest.mark.slow
 def test_a_right_calibration_has_no_drift(ball: Mesh) -> None:
     for faults in (Faults(), RIGHT, Faults(noise=0.01)):
         views = scanned(ball, SIZE, faults, faults)

@@ -59,6 +59,7 @@ def test_each_patch_stays_once_and_none_is_lost(ball: Mesh, faults: Faults, lost
     assert found.overlap[1] == pytest.approx(np.count_nonzero(after > 1) / union, abs=0.003)
 
 
+@pytest.mark.slow
 def test_the_view_that_faces_a_patch_keeps_it(ball: Mesh) -> None:
     views, places = scanned(ball, SIZE, Faults(), Faults()), places_on(ball)
     found = compete([replace(view, confidence=None) for view in views])
@@ -75,6 +76,7 @@ def test_the_view_that_faces_a_patch_keeps_it(ball: Mesh) -> None:
     assert np.count_nonzero(right[clear]) > 0.98 * np.count_nonzero(clear)
 
 
+@pytest.mark.slow
 def test_views_of_other_resolutions_leave_no_holes(ball: Mesh) -> None:
     fine, _ = scanned(ball, (240, 180), Faults(), Faults())
     _, coarse = scanned(ball, (60, 45), Faults(), Faults())

@@ -82,7 +82,7 @@ LONG = {
 
 
 # Renderers that take long, and draw every fourth row in the quick tests.
-QUARTERED = ("auto_splats", "codeword", "hpr")
+QUARTERED = ("auto_splats", "codeword", "hpr", "voxels")
 
 
 def is_slow(row: Row, name: str) -> bool:

@@ -183,6 +183,7 @@ def test_names_of_few_landmarks_stand_beside_the_subject() -> None:
     assert not (changed(picture(*near[:-1], near[-1])) & ~changed(picture(*bare)))[:, : at(1.1, 0)[1]].any()
 
 
+@pytest.mark.slow
 def test_the_corners_of_a_region_are_smaller_and_its_name_stands_once() -> None:
     place = (0.0, 0.0, 0.0)
     area = [changed(picture(DrawnLandmark(place, "", True, is_corner=one))).sum() for one in (True, False)]

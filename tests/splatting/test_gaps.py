@@ -144,6 +144,7 @@ def test_moved_and_scaled(renderer: Renderer, shift: float, scale: float) -> Non
     assert (np.abs(error) > 1e-4).mean() < 0.005
 
 
+@pytest.mark.slow
 def test_points_that_make_no_surface(renderer: Renderer, draw: Draw) -> None:
     """One, two, all in one place, an outlier: what has no gaps is as large as splats are in general."""
     one, two = np.zeros((1, 3)), np.array([[0.0, 0, 0], [1, 0, 0]])

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scenes import BUFFERS, sphere
+from scenes import BUFFERS, rarely, sphere
 
 from viewer.backends import backend
 from viewer.bench.scenes.defects import noisy
@@ -101,8 +101,8 @@ def surfels(draw: Draw, cloud: PointCloud, camera: Camera, **params: object) -> 
 
 
 @pytest.mark.backend("surfels")
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-@pytest.mark.parametrize("instancing", ["tiles", "gs"])
+@pytest.mark.parametrize("projection", ["perspective", *rarely("orthographic")])
+@pytest.mark.parametrize("instancing", ["tiles", *rarely("gs")])
 def test_the_depth_is_the_mean_of_the_layer(draw: Draw, projection: str, instancing: str) -> None:
     cloud = noisy_sphere(0.3, 600)
     cloud = replace(cloud, radii=np.full(len(cloud), 1.2 * typical_spacing(cloud), np.float32))
@@ -122,7 +122,7 @@ def test_the_depth_is_the_mean_of_the_layer(draw: Draw, projection: str, instanc
 
 
 @pytest.mark.parametrize(("name", "params"), SPLATS)
-@pytest.mark.parametrize("noise", [0.3, 0.6])
+@pytest.mark.parametrize("noise", [0.3, *rarely(0.6)])
 def test_noise_does_not_move_the_surface(
     draw: Draw, name: str, params: dict[str, object], noise: float
 ) -> None:

@@ -108,6 +108,7 @@ def test_the_frame_looked_at_comes_first_and_frames_are_read_once_in_each_direct
     assert len(source.read) <= FRAMES + 4
 
 
+@pytest.mark.slow
 def test_only_what_changed_is_tracked_anew() -> None:
     source = MovingHills(FRAMES)
     timeline = timeline_of(source)
@@ -226,6 +227,7 @@ def test_settings_are_numbers_above_zero() -> None:
         TrackingSettings(bound=-1.0)
 
 
+@pytest.mark.slow
 def test_what_an_earlier_tracker_saw_of_a_key_is_told_where_another_key_changes() -> None:
     timeline = timeline_of(MovingHills(FRAMES))
     landmark = replace(placed("middle", key(0.0, 0.0, 0), key(0.0, 0.0, 4)), missing=(6, FRAMES + 3))

@@ -364,6 +364,7 @@ def test_a_fault_in_the_rocks(data_dir: Path) -> None:
     assert view.normals()[:, 2].min() > 0
 
 
+@pytest.mark.slow
 def test_a_scan_of_a_laser(data_dir: Path) -> None:
     file = data_dir / "range/stanford_bunny_scans/bun000.npz"
     with np.load(file) as stored_arrays:

@@ -419,6 +419,7 @@ def test_other_pictures_are_refused(name: str, reason: str, data_dir: Path) -> N
         formats.read(data_dir / name)
 
 
+@pytest.mark.slow
 def test_a_rendered_ball(data_dir: Path) -> None:
     """Two eyes without cameras: the first of them, whatever the parts are, where the data window lies."""
     single, several = (
@@ -438,6 +439,7 @@ def test_a_rendered_ball(data_dir: Path) -> None:
     assert (beyond.cx, beyond.cy) == (1024 - 1384, 778 - 328)
 
 
+@pytest.mark.slow
 def test_a_head_from_a_phone(data_dir: Path, tmp_path: Path) -> None:
     """Its notes: x = (u - cx) d / f, y = (v - cy) d / f, z = d, u and v whole at pixel centres."""
     with np.load(data_dir / "range/truedepth_head_30/frame-045.npz") as frame:

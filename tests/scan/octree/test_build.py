@@ -91,7 +91,7 @@ def clouds() -> dict[str, NDArray]:
 
 @pytest.mark.parametrize("shift", [*rarely(0.0, 1e7), -123456.789])
 @pytest.mark.parametrize("name", clouds())
-@pytest.mark.parametrize("depth", [0, *rarely(1), 9, DEEPEST])
+@pytest.mark.parametrize("depth", [*rarely(0, 1, 9), DEEPEST])
 def test_a_tree_is_that_of_exact_comparisons(name: str, shift: float, depth: int) -> None:
     cloud = PointCloud.from_arrays(clouds()[name] + np.array([shift, -shift, 2 * shift]))
     tree = build(cloud, Stop("depth", depth=depth))
@@ -201,7 +201,7 @@ def test_crowds_within_one_cell_are_counted() -> None:
     assert tree.distinct == len(np.unique(cloud.positions, axis=0))
 
 
-@pytest.mark.parametrize("most", [1, 2, *rarely(3, 8), 40, 299, 300, *rarely(1 << 40)])
+@pytest.mark.parametrize("most", [1, *rarely(2, 3, 8), 40, *rarely(299), 300, *rarely(1 << 40)])
 @pytest.mark.parametrize("name", ["random", "duplicated", "outlier"])
 def test_occupancy_divides_octants_with_more_points_than_asked(most: int, name: str) -> None:
     cloud = PointCloud.from_arrays(clouds()[name])

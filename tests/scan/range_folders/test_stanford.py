@@ -180,6 +180,7 @@ def test_real_scans_keep_every_sample(folder: str, scans: int, samples: int, dat
         assert np.quantile(off, 0.95) < 4.5
 
 
+@pytest.mark.slow
 def test_the_repository_has_the_same_scans(tmp_path: Path, data_dir: Path) -> None:
     stored = data_dir / "range" / "stanford_bunny_scans"
     (tmp_path / "bun.conf").write_text((stored / "bun.conf").read_text().splitlines()[1] + "\n")
