@@ -113,8 +113,11 @@ class View:
         """
         view = positions @ self.rotation.T + self.translation
         depth = -view[:, 2]
-        scale = self.scale / depth if self.perspective else np.full(len(depth), self.scale)
-        return self.center + view[:, :2] * np.array([1, -1]) * scale[:, None], depth
+        scale = self.scale / depth if self.perspective else self.scale
+        pixels = np.empty((len(depth), 2))
+        pixels[:, 0] = self.center[0] + view[:, 0] * scale
+        pixels[:, 1] = self.center[1] - view[:, 1] * scale
+        return pixels, depth
 
     def unproject(self, pixels: NDArray[np.floating], depth: NDArray[np.floating]) -> NDArray[np.float64]:
         """Positions (N, 3), relative to the origin, of pixel coordinates (N, 2) at depths (N,).

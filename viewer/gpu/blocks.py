@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ctypes
 import struct
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
-from itertools import chain
 from typing import Any, ClassVar, Protocol, get_type_hints
 
 import moderngl
@@ -15,18 +15,19 @@ from .bindings import UniformBlock
 
 Vec4 = tuple[float, float, float, float]
 Mat4 = tuple[Vec4, Vec4, Vec4, Vec4]  # columns
-_INT, _UINT, _FLOAT = ctypes.c_int32, ctypes.c_uint32, ctypes.c_float
-_LETTERS = {_INT: "i", _UINT: "I", _FLOAT: "f"}  # of `struct`
-# Annotation of a field -> its GLSL type, what a word of it is, how many, what its offset is a multiple of.
-_KINDS: dict[Any, tuple[str, Any, int, int]] = {
-    bool: ("bool", _UINT, 1, 1),
-    int: ("int", _INT, 1, 1),
-    float: ("float", _FLOAT, 1, 1),
-    tuple[float, float]: ("vec2", _FLOAT, 2, 2),
-    tuple[int, int]: ("ivec2", _INT, 2, 2),
-    Vec4: ("vec4", _FLOAT, 4, 4),
-    Mat4: ("mat4", _FLOAT, 16, 4),
+_FREE = "4x"  # a word that holds nothing, for `struct`
+# Annotation of a field -> its GLSL type, a word of it for `struct`, how many, what its offset is a multiple
+# of.
+_KINDS: dict[Any, tuple[str, str, int, int]] = {
+    bool: ("bool", "I", 1, 1),
+    int: ("int", "i", 1, 1),
+    float: ("float", "f", 1, 1),
+    tuple[float, float]: ("vec2", "f", 2, 2),
+    tuple[int, int]: ("ivec2", "i", 2, 2),
+    Vec4: ("vec4", "f", 4, 4),
+    Mat4: ("mat4", "f", 16, 4),
 }
+_NUMBERS = [glsl for glsl, _, count, _ in _KINDS.values() if count == 1]
 
 
 class Values(Protocol):
@@ -39,23 +40,25 @@ class Values(Protocol):
 class Member:
     """A number or several in a block.
 
-    kind: its GLSL type. help: what its declaration says of it. gap: words that are left free before it.
+    kind: its GLSL type. help: what its declaration says of it.
     """
 
     kind: str
     name: str
     help: str
-    gap: int
 
 
 @dataclass(frozen=True)
 class Block:
-    """A dataclass as a std140 block (OpenGL 4.3, 7.6.2.2). words, layout: what it is in memory."""
+    """A dataclass as a std140 block (OpenGL 4.3, 7.6.2.2).
+
+    layout: what it is in memory. numbers_of: gives the numbers of an instance, in order.
+    """
 
     declaration: type[Values]
     members: tuple[Member, ...]
-    words: type[ctypes.Structure]
     layout: struct.Struct
+    numbers_of: Callable[[Values], Sequence[float]]
 
     @property
     def name(self) -> str:
@@ -70,21 +73,17 @@ class Block:
 
     def pack(self, values: Values) -> bytes:
         """The values as the GPU reads them; floats beyond its range are infinite there."""
-        numbers: list[float] = []
-        for member in self.members:
-            if member.gap:
-                numbers += (0,) * member.gap
-            value = getattr(values, member.name)
-            if member.kind == "mat4":
-                numbers += chain.from_iterable(value)
-            elif isinstance(value, tuple):
-                numbers += value
-            else:
-                numbers.append(value)
+        numbers = self.numbers_of(values)
         try:
             return self.layout.pack(*numbers)
         except OverflowError:  # a float beyond float32, which ctypes makes infinite, in ten times the time
-            return bytes(self.words(*numbers))
+            return self.layout.pack(
+                *(ctypes.c_float(n).value if isinstance(n, float) else n for n in numbers)
+            )
+
+
+def _in_float32(number: float) -> float:
+    return ctypes.c_float(number).value
 
 
 @cache
@@ -96,7 +95,7 @@ def block_of(declaration: type[Values]) -> Block:
     """
     hints = get_type_hints(declaration)
     members: list[Member] = []
-    words: list[Any] = []
+    words: list[str] = []
     for field in fields(declaration):
         kind = hints[field.name]
         if kind is str:
@@ -104,16 +103,27 @@ def block_of(declaration: type[Values]) -> Block:
         if kind not in _KINDS:
             raise TypeError(f"{declaration.__qualname__}.{field.name}: a uniform block cannot hold {kind}")
         glsl, word, count, multiple = _KINDS[kind]
-        gap = -len(words) % multiple
-        members.append(Member(glsl, field.name, field.metadata.get("help", ""), gap))
-        words += [_UINT] * gap + [word] * count
+        members.append(Member(glsl, field.name, field.metadata.get("help", "")))
+        words += [_FREE] * (-len(words) % multiple) + [word] * count
     if not members:
         raise TypeError(f"{declaration.__qualname__} has no number")
-    letters = "".join(_LETTERS[word] for word in words)
-    words += [_UINT] * (free := -len(words) % 4)
-    named = [(f"word_{number}", word) for number, word in enumerate(words)]
-    kind = type("Words", (ctypes.Structure,), {"_fields_": named})
-    return Block(declaration, tuple(members), kind, struct.Struct(f"={letters}{4 * free}x"))
+    words += [_FREE] * (-len(words) % 4)
+    return Block(declaration, tuple(members), struct.Struct("=" + "".join(words)), _flat(members))
+
+
+def _flat(members: Sequence[Member]) -> Callable[[Values], Sequence[float]]:
+    """A function that gives the numbers of these members of an instance, in order.
+
+    A picture calls such functions some dozens of times. So each is compiled from its own line of Python,
+    like the methods of a dataclass.
+    """
+    columns = {"mat4": [f"[{number}]" for number in range(4)]}
+    parts = [
+        f"{'' if member.kind in _NUMBERS else '*'}values.{member.name}{column}"
+        for member in members
+        for column in columns.get(member.kind, [""])
+    ]
+    return eval(f"lambda values: ({', '.join(parts)},)")
 
 
 class BlockBuffer:
@@ -123,7 +133,7 @@ class BlockBuffer:
         self._block, self._binding = block_of(declaration), binding
         self._held = b""
         self._values: Values | None = None
-        self._buffer = ctx.buffer(reserve=ctypes.sizeof(self._block.words))
+        self._buffer = ctx.buffer(reserve=self._block.layout.size)
 
     def write(self, values: Values) -> None:
         """Make these the values; nothing is sent where they have not changed."""

@@ -33,8 +33,13 @@ def typical_spacing(cloud: PointCloud) -> float:
 def sparse_spacing(cloud: PointCloud) -> float:
     """The distance between neighbours where they are far apart, scan units: the 90 % quantile, but at most
     twice the median. See `spacings`."""
-    usual, sparse = (float(v) for v in np.quantile(spacings(cloud), [0.5, 0.9]))
+    usual, sparse = (cloud.remember(spacing_quantile, share) for share in (0.5, 0.9))
     return min(sparse, _SPARSEST * usual)
+
+
+def spacing_quantile(cloud: PointCloud, share: float) -> float:
+    """The distance between neighbours that so large a share of `spacings` does not exceed, scan units."""
+    return float(np.quantile(spacings(cloud), share))
 
 
 def spacings(cloud: PointCloud) -> NDArray[np.float64]:

@@ -131,8 +131,9 @@ def calibrate(
     """
     coarse = sectors.divided(_COARSE)
     sector_positions = coarse.sector_positions(strided(cloud.positions) + (cloud.origin - origin))
-    cells = coarse.sector_of(sector_positions)
-    share = max(len(np.unique(cells[cells != NOTHING])), 1) / coarse.count
+    has_point = np.zeros(coarse.count + 1, bool)
+    has_point[np.minimum(coarse.sector_of(sector_positions), coarse.count)] = True  # the last one: in none
+    share = max(int(np.count_nonzero(has_point[:-1])), 1) / coarse.count
     count = max(body_of(cloud).count * drawn, 1.0)
     inside = -1 / math.expm1(math.log1p(-_OCCUPIED) / count)  # eq. 5
     wanted = math.sqrt(inside / share * coarse.edge**2 / coarse.count)
@@ -142,7 +143,8 @@ def calibrate(
     apart = 2 * found.angle  # alpha
     if math.isinf(found.distance):
         return EyeCalibration(found.weighted(4 * depth / apart), math.inf, share, spacing)
-    distances = found.distances(sector_positions[np.isfinite(sector_positions[:, 2])])
+    is_known = np.isfinite(sector_positions[:, 2])
+    distances = found.distances(sector_positions if is_known.all() else sector_positions[is_known])
     surface = float(distances.mean()) if len(distances) else found.unit
     if len(distances):  # near points lie farther apart
         spacing *= surface / max(float(np.quantile(distances, _NEAREST)), _LEAST * surface)

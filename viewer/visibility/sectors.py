@@ -148,12 +148,16 @@ class Sectors:
         with np.errstate(invalid="ignore", divide="ignore"):
             if self.mapping == "cube":
                 return np.where((offsets != 0).any(axis=1)[:, None], offsets, np.nan)
-            forward, aside = offsets[:, 0], offsets[:, 1:]
+            forward, right, down = np.ascontiguousarray(offsets.T)
             ahead = 1 + self.closeness * forward
-            far = np.sqrt(ahead**2 + self.closeness**2 * (aside**2).sum(axis=1))
-            farther = (self.closeness * (offsets**2).sum(axis=1) + 2 * forward) / (far + 1)
-            sector_positions = np.column_stack([self.lateral * aside / ahead[:, None], farther])
-            sector_positions[~(ahead > 0)] = np.nan
+            far = np.sqrt(ahead**2 + self.closeness**2 * (right**2 + down**2))
+            away = forward**2 + right**2 + down**2
+            sector_positions = np.empty((len(offsets), 3))
+            sector_positions[:, 0] = self.lateral * right / ahead
+            sector_positions[:, 1] = self.lateral * down / ahead
+            sector_positions[:, 2] = (self.closeness * away + 2 * forward) / (far + 1)
+            if not (ahead > 0).all():
+                sector_positions[~(ahead > 0)] = np.nan
             return sector_positions
 
     def sector_of(self, sector_positions: NDArray[np.float64]) -> NDArray[np.uint32]:
@@ -161,12 +165,13 @@ class Sectors:
         face, tangents = self._on_face(sector_positions)
         with np.errstate(invalid="ignore"):
             angles = np.arctan(self.tangent * tangents) / self.tangent if self.tangent else tangents
-            at = np.floor((angles / self.half_angle + 1) * (self.edge / 2))
+            at = np.floor((angles / self.half_angle + 1) * (self.edge / 2)).T
             if self.mapping == "cube":
                 at = np.clip(at, 0, self.edge - 1)
-        outside = np.flatnonzero(~((at >= 0) & (at < self.edge)).all(axis=1))
-        at[outside] = 0
-        column, line = at.astype(np.int64).T
+            inside = (at >= 0) & (at < self.edge)
+        outside = np.flatnonzero(~(inside[0] & inside[1]))
+        at[:, outside] = 0
+        column, line = at.astype(np.int64)
         sectors = ((face * self.edge + line) * self.edge + column).astype(np.uint32)
         sectors[outside] = NOTHING
         return sectors

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...scan.points import PointCloud
 from ...scan.spacing import sparse_spacing
@@ -97,12 +98,13 @@ def border_of(cloud: PointCloud, view: View, k: int) -> int:
     """How far beside a picture points lie whose splats may reach into it, pixels: the radius of neighborhoods
     of k where points are sparse, as large as it is seen of those in the picture and beside; of those nearest
     to it where a sample has none there. At most 512."""
-    rows = np.linspace(0, len(cloud) - 1, min(len(cloud), _SAMPLE)).astype(int)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # in the eye's plane
-        pixels, depth = view.project(cloud.positions[rows] + (cloud.origin - view.origin))
+        pixels, depth = view.project(cloud.remember(_sample_of) + (cloud.origin - view.origin))
         radius = sparse_spacing(cloud) * math.sqrt(k / math.pi) * view.scale
         radii = radius / depth if view.perspective else np.full(len(depth), radius)
-        beside = np.maximum(np.maximum(-pixels, pixels - view.size), 0).max(axis=1)
+        (x, y), (width, height) = pixels.T, view.size
+        beside = np.maximum(np.maximum(-x, x - width), np.maximum(-y, y - height))
+        beside = np.maximum(beside, 0)
     shown = (depth >= view.near) & (depth <= view.far) & np.isfinite(beside)
     if not shown.any():
         return 0
@@ -111,3 +113,9 @@ def border_of(cloud: PointCloud, view: View, k: int) -> int:
         near = shown & (beside == beside[shown].min())
     wanted = min(float(np.quantile(radii[near], 0.9)), _WIDEST_BORDER)
     return _BORDER_STEP * math.ceil(wanted / _BORDER_STEP)
+
+
+def _sample_of(cloud: PointCloud) -> NDArray[np.float32]:
+    """Positions of some points, spread evenly over the file, (n, 3) relative to the cloud's origin."""
+    rows = np.linspace(0, len(cloud) - 1, min(len(cloud), _SAMPLE)).astype(int)
+    return cloud.positions[rows]

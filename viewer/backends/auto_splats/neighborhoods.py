@@ -32,7 +32,7 @@ from ...gpu.view import ViewBlock
 from ...picture.surface import Surface
 from ...scan.points import PointCloud
 from ...scan.range_points import RangePoints
-from ...scan.spacing import spacings
+from ...scan.spacing import spacing_quantile
 from ...view import View
 from .grids import COARSEST, FINEST_COARSE, Grids
 
@@ -465,7 +465,7 @@ def _typical_radius(pose: GpuPose, k: int) -> float:
 def _widest_radius(pose: GpuPose, k: int) -> float:
     """The radius of neighborhoods of k where points are sparser than nearly everywhere, scan units: what is
     farther apart, as returns of a lidar from far away, is no surface that splats could close."""
-    sparse = float(np.quantile(spacings(pose.cloud), _SPARSE))
+    sparse = pose.cloud.remember(spacing_quantile, _SPARSE)
     return _WIDEST * sparse * math.sqrt(k / math.pi)
 
 
