@@ -19,12 +19,20 @@ def test_every_swept_value_is_tried_alone() -> None:
         defaults = asdict(backend.params())
         rows = [c for c in group.contenders if c.backend == name]
         assert rows[0] == Contender(name, backend.params())
-        tried: dict[str, set[object]] = {p.name: {p.default} for p in backend.parameters if p.sweep}
+        swept = [p for p in backend.parameters if p.sweep and p.matters(backend.params())]
+        tried: dict[str, set[object]] = {p.name: {p.default} for p in swept}
         for row in rows[1:]:
             changed = {key: value for key, value in asdict(row.params).items() if value != defaults[key]}
             assert list(changed) == [row.sweep]
             tried[row.sweep].add(changed[row.sweep])
-        assert tried == {p.name: {p.default, *p.sweep} for p in backend.parameters if p.sweep}
+        assert tried == {p.name: {p.default, *p.sweep} for p in swept}
+
+
+def test_a_parameter_that_has_no_effect_beside_the_defaults_is_not_swept() -> None:
+    (group,) = plan(["bunny"], ["hpr"], counts=(), noises=())
+    swept = {contender.sweep for contender in group.contenders}
+    assert "output" in swept
+    assert not swept & {"quality", "depth", "longest"}, "they matter in other modes and outputs alone"
 
 
 def test_floor_and_ceiling_are_in_every_group() -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scenes import DRAWS_POINTS
 
-from viewer.backends import backend
+from viewer.backends import FrameView, backend, points
 from viewer.bench.plan import Contender, Group, plan
 from viewer.bench.report.results import Row
 from viewer.bench.run import LOOK, Bench, BenchSettings
@@ -21,6 +21,7 @@ from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.drawing.timing import draw
 from viewer.errors import InputError
+from viewer.gpu.pose import GpuPose
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -70,12 +71,12 @@ def test_a_row_says_all_that_is_needed_to_repeat_it(
     for row in rows:
         assert {
             "backend", "scene", "scene_hash", "n", "noise", "params", "size", "seed", "views", "gpu_ms",
-            "cpu_ms", "derive_ms", "upload_ms", "timer", "bytes_gpu", "peak_rss", "errors", "device",
-            "driver", "version",
+            "cpu_ms", "busy_ms", "same_ms", "first_ms", "derive_ms", "upload_ms", "timer", "bytes_gpu",
+            "peak_rss", "errors", "device", "driver", "version",
         } <= row.keys()  # fmt: skip
         assert (row["n"], row["size"], row["views"]) == (20_000, [120, 80], 3)
         assert row["timer"] == renderer.gpu.timers.kind
-        for name in ("gpu_ms", "cpu_ms", "derive_ms", "upload_ms"):
+        for name in ("gpu_ms", "cpu_ms", "same_ms", "first_ms", "derive_ms", "upload_ms"):
             assert row[name].keys() == SPREAD
         assert row["gpu_ms"]["median"] > 0
         assert row["cpu_ms"]["p5"] <= row["cpu_ms"]["median"] <= row["cpu_ms"]["p95"]
@@ -84,6 +85,31 @@ def test_a_row_says_all_that_is_needed_to_repeat_it(
         assert row["errors_by_view"].keys() <= row["errors"].keys()
         assert row["bytes_gpu"] > 20_000 * 12
         json.dumps(row)
+
+
+class Watched(points.PointSquares):
+    """The points, and the view of each picture."""
+
+    def __init__(self) -> None:
+        super().__init__("watched")
+        self.views: list[object] = []
+
+    def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
+        self.views.append(frame.view.key)
+        return super().draw(pose, frame, surface)
+
+
+def test_the_first_picture_new_views_and_the_same_view_are_timed(renderer: Renderer) -> None:
+    watched = Watched()
+    contender = Contender("watched", None, drawn=lambda cloud, _: (cloud, watched))
+    settings = replace(SETTINGS, views=1, repeat=3, frames=0)
+    (row,) = Bench(renderer, settings).measure(Group("torus", (contender,), count=2_000, judged=False))
+    first, *new = watched.views[:-3]
+    assert set(watched.views[-3:]) == {first}, "the same view again, as often as `repeat` says"
+    assert new[-1] == first, "the judged picture is that of the view"
+    assert len(set(new)) == len(new) >= 6, "with timers and without, each new view differs from all others"
+    for name in ("first_ms", "gpu_ms", "cpu_ms", "same_ms"):
+        assert row[name]["median"] > 0
 
 
 @pytest.mark.slow

@@ -85,7 +85,7 @@ def test_timing_passes_is_no_error(name: str, renderer: Renderer) -> None:
     kind, timers.kind = timers.kind, "query"
     try:
         with gl.debug_messages() as messages:
-            (found, _) = pass_ms(renderer, request, Surface(renderer.gpu, (64, 48)), 2)
+            (found, _) = pass_ms(renderer, [request] * 2, Surface(renderer.gpu, (64, 48)))
     finally:
         timers.kind = kind
     assert [each for each in messages if each.startswith("error")] == []
@@ -100,7 +100,7 @@ def test_the_passes_of_a_picture_are_the_frame(renderer: Renderer) -> None:
     for turn in range(5):
         request = Request(Pose(0, 0.0, "timed", cloud), Camera.orbit(cloud.bounds(), turn, 15), "points")
         start = time.perf_counter()
-        (found,) = pass_ms(renderer, request, surface, 1)
+        (found,) = pass_ms(renderer, [request], surface)
         frame = surface.stats.frame_ms
         assert frame <= 1e3 * (time.perf_counter() - start)
         assert "clear" in found

@@ -61,7 +61,8 @@ def plan(
 ) -> list[Group]:
     """The groups to measure. scenes, backends: names, or files of meshes.
 
-    Each scene meets the defaults of all backends, and every value that their declarations sweep; then
+    Each scene meets the defaults of all backends, and every value that their declarations sweep and that
+    matters beside the other defaults; then
     counts and noise vary on two scenes each, with the defaults, but for what is usual for the scene.
     swept_scenes: on how many scenes anything is swept; None: no limit. Raises InputError for unknown
     backends.
@@ -90,11 +91,13 @@ def _varying(scenes: Sequence[str], sweep: Sweep) -> list[str]:
 
 
 def _sweeps(name: str) -> list[Contender]:
-    """One contender for each value that a backend's declaration sweeps, but for the defaults."""
+    """One contender for each value that a backend's declaration sweeps, but for the defaults, and for
+    parameters that do not matter beside them."""
     declared = backend(name)
     return [
         Contender(name, declared.params({parameter.name: value}), parameter.name)
         for parameter in declared.parameters
+        if parameter.matters(declared.params())
         for value in parameter.sweep
         if value != parameter.default
     ]

@@ -1,6 +1,8 @@
 """Measuring: contenders take turns on the views of a scene, each timed and judged.
 
-Times come from draws that are already warm; judging is outside of them.
+Three things are timed: the first picture of a pose, a new view of it, and the same view again. A new view is
+the main one: the eye moves by a degree between pictures, so that no backend draws what it found before.
+Judging is outside of all times.
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ from ..backends import Backend, backend
 from ..camera import Camera
 from ..drawing.renderer import Renderer
 from ..drawing.request import Request
-from ..drawing.timing import call_ms, draw, pass_ms, peak_rss, reset_peak_rss
+from ..drawing.timing import call_ms, draw, new_views, pass_ms, peak_rss, reset_peak_rss
 from ..errors import InputError
 from ..files import output_folder, whole_file
 from ..look import Look
@@ -47,7 +49,7 @@ LOOK = Look(light="head")  # the same for all: what "auto" takes depends on the 
 _ORBIT_STEP = 2.0  # degrees from frame to frame of an orbit
 # What takes longer is not repeated as often: it stands out of the noise.
 _SLOW = 250.0  # ms
-_TIMES = ("gpu_ms", "cpu_ms", "busy_ms")  # of each view
+_TIMES = ("gpu_ms", "cpu_ms", "busy_ms", "same_ms")  # of each view
 PREPARED = 5  # views that prepare a pose anew in any case
 
 Kind = Literal["orbit", "pose"]
@@ -82,6 +84,8 @@ class _Tally:
     gpu_ms: list[float] = field(default_factory=list)
     cpu_ms: list[float] = field(default_factory=list)
     busy_ms: list[float] = field(default_factory=list)
+    same_ms: list[float] = field(default_factory=list)
+    first_ms: list[float] = field(default_factory=list)
     derive_ms: list[float] = field(default_factory=list)
     upload_ms: list[float] = field(default_factory=list)
     passes: list[dict[str, float]] = field(default_factory=list)
@@ -284,21 +288,26 @@ class Bench:
         return Judge.of(self.renderer.gpu, moment.truth, camera, size, LOOK, pose, subject.tolerance)
 
     def _time(self, request: Request, surface: Surface, tally: _Tally, anew: bool) -> None:
-        """Add what one view takes: the preparation of a pose that is new to the GPU, then warm draws."""
+        """Add what one view takes: the first picture of a pose that is new to the GPU, new views of it, and
+        the same view again, which the surface shows in the end."""
+        renderer, repeat = self.renderer, self.settings.repeat
         with undisturbed():
             reset_peak_rss()
-            draw(self.renderer, request, surface)
+            (first,) = call_ms(renderer, [request], surface)
             if anew:
+                tally.first_ms.append(first)
                 tally.upload_ms.append(surface.stats.upload_ms)
                 tally.derive_ms.append(surface.stats.derive_ms)
-                tally.bytes_gpu.append(self.renderer.bytes_of(request.pose) + surface.nbytes)
-            (warm,) = call_ms(self.renderer, request, surface, 1)
-            repeat = self.settings.repeat if warm < _SLOW else 1
+                tally.bytes_gpu.append(renderer.bytes_of(request.pose) + surface.nbytes)
+            if repeat > 1 and min(call_ms(renderer, new_views(request, 2, 2 * repeat), surface)) >= _SLOW:
+                repeat = 1
+            runs = pass_ms(renderer, new_views(request, repeat, repeat), surface)
             start = time.process_time()
-            calls = call_ms(self.renderer, request, surface, repeat)
+            calls = call_ms(renderer, new_views(request, repeat), surface)
             tally.busy_ms.append((time.process_time() - start) * 1e3 / repeat)
-            runs = pass_ms(self.renderer, request, surface, repeat)
+            again = call_ms(renderer, [request] * repeat, surface)
         tally.cpu_ms.append(spread(calls)["median"])
+        tally.same_ms.append(spread(again)["median"])
         tally.gpu_ms.append(spread([run.total() for run in runs])["median"])
         tally.passes.append({name: spread([run[name] for run in runs])["median"] for name in runs[0]})
         tally.peak_rss.append(peak_rss())

@@ -30,13 +30,13 @@ def draw_measured(
     counts. cpu_ms is taken with pass timers off, because on software drivers they wait
     between passes; gpu_ms and the passes come from as many further draws with them on.
     """
-    (first_ms,) = call_ms(renderer, request, surface, 1, tick)
+    (first_ms,) = call_ms(renderer, [request], surface, tick)
     first = surface.stats  # uploads and derives what later draws find done
     cpu_ms = [first_ms]
     if repeat is not None:
-        call_ms(renderer, request, surface, _WARM_UPS - 1, tick)
-        cpu_ms = call_ms(renderer, request, surface, repeat, tick)
-    runs = pass_ms(renderer, request, surface, repeat or 1)
+        call_ms(renderer, [request] * (_WARM_UPS - 1), surface, tick)
+        cpu_ms = call_ms(renderer, [request] * repeat, surface, tick)
+    runs = pass_ms(renderer, [request] * (repeat or 1), surface)
     return {
         "pose": request.pose.index,
         "gpu_ms": median(run.total() for run in runs),

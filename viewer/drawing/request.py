@@ -54,6 +54,10 @@ class Request:
         for name, value in zip(self.__dataclass_fields__, values, strict=True):
             object.__setattr__(self, name, value)
 
+    def seen_by(self, camera: Camera) -> Request:
+        """The same picture from another camera."""
+        return Request(self.pose, camera, self.backend, self.params, self.look, self.layers)
+
     @cached_property
     def needs(self) -> tuple[str, ...]:
         """Names of what the backend needs of the pose, see `Backend.needs`; asked for once."""

@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from .frame import render_frame
 from .renderer import Renderer
 from .request import Request
 
+VIEW_STEP = 1.0  # degrees that the eye moves from one view to the next
 _PROCESS = Path("/proc/self")  # Linux
 
 
@@ -35,15 +36,25 @@ def draw(renderer: Renderer, request: Request, surface: Surface) -> Counter[str]
     return passes
 
 
-def call_ms(
-    renderer: Renderer, request: Request, surface: Surface, repeat: int, tick: Callable[[], object] = int
-) -> list[float]:
-    """Wall time of each of `repeat` draws with the picture read back, ms; `tick` is called after each.
+def new_views(request: Request, count: int, first: int = 0) -> list[Request]:
+    """The request after `count` other views of its pose, a degree from each to the next; it is the last.
 
-    Each is drawn as if it were the first. Timers should be off: on software drivers they wait between passes.
+    first: degrees of the last one, in place of 0.
+    """
+    turns = range(first + count - 1, first - 1, -1)
+    return [request.seen_by(request.camera.orbited(turn * VIEW_STEP, 0.0)) for turn in turns]
+
+
+def call_ms(
+    renderer: Renderer, requests: Iterable[Request], surface: Surface, tick: Callable[[], object] = int
+) -> list[float]:
+    """Wall time of each picture with reading it back, ms; `tick` is called after each.
+
+    Each is drawn whole, but with what the backend keeps of the one before. Timers should be off: on software
+    drivers they wait between passes.
     """
     times = []
-    for _ in range(repeat):
+    for request in requests:
         surface.drawn = {}
         start = time.perf_counter()
         draw(renderer, request, surface)
@@ -63,20 +74,20 @@ def undisturbed_ms(renderer: Renderer, request: Request, surface: Surface, repea
     times = []
     for _ in range(repeat):
         process, thread = time.process_time(), time.thread_time()
-        (wall,) = call_ms(renderer, request, surface, 1)
+        (wall,) = call_ms(renderer, [request], surface)
         own = (time.thread_time() - thread) * 1e3
         others = (time.process_time() - process) * 1e3 - own
         times.append(own + others / (os.cpu_count() or 1) if renderer.gpu.software else wall)
     return min(times)
 
 
-def pass_ms(renderer: Renderer, request: Request, surface: Surface, repeat: int) -> list[Counter[str]]:
-    """Milliseconds on the GPU of each pass, in each of `repeat` draws as if it were the first."""
+def pass_ms(renderer: Renderer, requests: Iterable[Request], surface: Surface) -> list[Counter[str]]:
+    """Milliseconds on the GPU of each pass, in each of these pictures; see `call_ms`."""
     timers = renderer.gpu.timers
     timers.enabled = True
     found = []
     try:
-        for _ in range(repeat):
+        for request in requests:
             surface.drawn = {}
             found.append(draw(renderer, request, surface))
     finally:

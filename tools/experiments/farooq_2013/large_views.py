@@ -125,7 +125,7 @@ def _timed(
         "ms": _request(pose, scenario, primitive),
         "unskipped_ms": _request(pose, scenario, primitive, lod=False, skip=False),
     }
-    works = {name: partial(call_ms, bench.renderer, each, surface, 1) for name, each in requests.items()}
+    works = {name: partial(call_ms, bench.renderer, [each], surface) for name, each in requests.items()}
     found = by_turns(works, repeat)
     covered = 100 * float((surface.coverage > 0).mean())
     surface.release()

@@ -366,11 +366,11 @@ def _taken(bench: Bench, request: Request, size: tuple[int, int]) -> Row:
     surface = Surface(renderer.gpu, size)
 
     def picture() -> None:
-        call_ms(renderer, request, surface, 1)
+        call_ms(renderer, [request], surface)
 
     taken = by_turns({"picture": picture}, repeat)["picture"]
     with undisturbed():
-        runs = pass_ms(renderer, request, surface, repeat)
+        runs = pass_ms(renderer, [request] * repeat, surface)
     surface.release()
     passes = {name: float(np.median([run[name] for run in runs])) for name in runs[0]}
     return {"wall_ms": taken.wall, "busy_ms": taken.busy, "passes": passes}

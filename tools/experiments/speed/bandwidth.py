@@ -100,7 +100,7 @@ def passes_of(count: int, surface: Surface, rounds: int) -> Row:
     camera = Camera(eye=(0.3, 0.5, 4.0), target=(0, 0, 0), fov_y=30)
     request = Request(pose, camera, "points", None, Look(light="flat", quality="fast"))
     draw(renderer(), request, surface)
-    found = pass_ms(renderer(), request, surface, rounds)
+    found = pass_ms(renderer(), [request] * rounds, surface)
     passes = {name: round(float(np.median([each[name] for each in found])), 3) for name in found[0]}
     return {"ms": float(sum(ms for name, ms in passes.items() if name != _SHADING)), **passes}
 

@@ -197,7 +197,7 @@ class Drawn:
 
     def gpu_ms(self, step: int) -> dict[str, float]:
         """Milliseconds of its passes on the GPU."""
-        (found,) = pass_ms(renderer(), self.request(step), self.surface, 1)
+        (found,) = pass_ms(renderer(), [self.request(step)], self.surface)
         self.frame_ms = self.surface.stats.frame_ms
         return {name: float(ms) for name, ms in found.items()}
 

@@ -112,7 +112,7 @@ def _passes(own: Renderer, seen: Request, passes: str, surface: Surface, rounds:
     for turn in range(rounds + 1):
         for feed in list(times):
             try:
-                (found,) = pass_ms(own, request(feed), surface, 1)
+                (found,) = pass_ms(own, [request(feed)], surface)
             except Scan4DError:
                 del times[feed]
                 continue

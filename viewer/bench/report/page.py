@@ -39,11 +39,12 @@ if TYPE_CHECKING:
 PAGE = "report.html"
 # What the summary shows of each default row; then what is plotted besides.
 _SUMMARY = (
-    "gpu_ms", "cpu_ms", "prepare_ms", "bytes_gpu", "hole_percent", "through_percent", "closed_percent",
+    "gpu_ms", "cpu_ms", "same_ms", "first_ms", "prepare_ms", "bytes_gpu",
+    "hole_percent", "through_percent", "closed_percent",
     "spill_percent", "depth_median_px", "wrong_layer_percent", "normal_mean", "psnr", "ssim", "flip",
     "visibility_error_percent",
 )  # fmt: skip
-_JUDGED = _SUMMARY[4:]
+_JUDGED = _SUMMARY[6:]
 _PLOTTED = (
     *_JUDGED, "spill_p95", "boundary_mean", "depth_bias_px", "depth_rmse_px",
     "depth_p95_px", "normal_signed_mean",
