@@ -55,7 +55,7 @@ class Request:
             object.__setattr__(self, name, value)
 
     def seen_by(self, camera: Camera) -> Request:
-        """The same picture from another camera."""
+        """The request for the same picture from another camera."""
         return Request(self.pose, camera, self.backend, self.params, self.look, self.layers)
 
     @cached_property
