@@ -10,7 +10,10 @@ import numpy as np
 import OpenEXR
 from PIL import Image
 from PIL.TiffImagePlugin import ImageFileDirectory_v2
+from word_scenes import GREY, front_view, scattered
 
+from viewer.codewords.encode import encode_elements
+from viewer.codewords.files import write_stream, writing_streams
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -82,6 +85,17 @@ def write_scans(folder: Path) -> None:
     ]  # fmt: skip
     formats.write(folder / "views.exr", merge(views), views)
     _write_grids(folder)
+    _write_words(folder)
+
+
+def _write_words(folder: Path) -> None:
+    """Code words of one picture, and of three."""
+    view = front_view((20, 16), perspective=True)
+    pictures = [encode_elements(scattered(9, view.size, seed), view, GREY) for seed in (1, 1, 2)]
+    write_stream(pictures[0], folder / "words.cw")
+    with writing_streams(folder / "moving.cw") as add:
+        for number, stream in enumerate(pictures):
+            add(stream, number / 25)
 
 
 def _write_grids(folder: Path) -> None:

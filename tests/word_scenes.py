@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from itertools import pairwise
 from typing import Any
 
@@ -90,6 +91,19 @@ def drawn_pixels(stream: WordStream) -> tuple[np.ndarray, np.ndarray, np.ndarray
     key, right, down = stream.finer[word].T.astype(np.int64)
     pixel = y * stream.size[0] + x + strips[word] * stream.stride
     return word, pixel, key + right * column + down * row
+
+
+def equal_streams(a: WordStream, b: WordStream) -> bool:
+    """Whether two streams have the same bits."""
+
+    def is_same(x: object, y: object) -> bool:
+        if isinstance(x, Materials):
+            return all(is_same(getattr(x, f.name), getattr(y, f.name)) for f in fields(Materials))
+        if isinstance(x, np.ndarray):
+            return isinstance(y, np.ndarray) and x.dtype == y.dtype and np.array_equal(x, y)
+        return x == y
+
+    return all(is_same(getattr(a, f.name), getattr(b, f.name)) for f in fields(WordStream))
 
 
 @st.composite

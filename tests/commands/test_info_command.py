@@ -13,7 +13,7 @@ import pytest
 from command_line import Run
 from small_scans import ROOT, SMALL, cloud_at
 
-from viewer.codewords.stream import read_stream
+from viewer.codewords.files import read_stream
 from viewer.codewords.words import decode_words
 from viewer.commands._scans import first_readable
 from viewer.errors import InputError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from small_scans import FRAMES, SMALL, finish, front, names, process, stored
 from written import film, picture
 
 from viewer.codewords.engine import draw_words, draw_words_plainly
-from viewer.codewords.stream import read_stream
+from viewer.codewords.files import read_stream
 from viewer.drawing.request import Request, view_of
 from viewer.look import Look
 from viewer.scan import formats
@@ -98,6 +99,34 @@ def test_films_patterns_turntables_and_arrays(run: Run, scans: Path, tmp_path: P
     assert draw_words(stream).covered.any()
 
 
+def test_sequences_of_code_words(run: Run, scans: Path, tmp_path: Path) -> None:
+    """One stream and numbered files hold the same poses, and play as films, pictures and other files."""
+    one, many, scan = tmp_path / "a.cw", tmp_path / "c%04d.cw", scans / "sequence"
+    assert run("render", scan, "--no-gl", "--all", "-o", one, *SMALL).code == 0
+    assert run("render", scan, "--no-gl", "--all", "-o", many, *SMALL).code == 0
+    assert names(tmp_path) == ["a.cw", *(f"c{number:04d}.cw" for number in range(FRAMES))]
+    assert run("render", many, "-o", tmp_path / "b.cw", "--poses", "1:").code == 0
+    for index in range(FRAMES):
+        assert run("render", one, "--pose", index, "-o", tmp_path / "one.png", "--force").code == 0
+        assert run("render", many, "--pose", index, "-o", tmp_path / "many.png", "--force").code == 0
+        drawn = draw_words_plainly(read_stream(one, index)).image
+        assert np.array_equal(picture(tmp_path / "one.png"), drawn)
+        shown = picture(tmp_path / "many.png")
+        drawn = draw_words_plainly(read_stream(tmp_path / f"c{index:04d}.cw")).image
+        assert np.array_equal(shown, drawn)
+        if index:
+            assert np.array_equal(shown, draw_words(read_stream(tmp_path / "b.cw", index - 1)).image)
+    assert run("render", one, "--all", "-o", tmp_path / "a.mp4").code == 0
+    assert len(film(tmp_path / "a.mp4")[0]) == FRAMES
+    facts = json.loads(run("info", one, "--json").out)
+    assert (facts["pictures"], facts["file_bytes"]) == (FRAMES, one.stat().st_size)
+    assert f"{FRAMES}, {facts['keys']} of them key pictures" in run("info", one).out
+    assert f"{FRAMES}, 0 to" in run("info", many).out
+    one.write_bytes(one.read_bytes()[:-1])
+    for arguments in (("render", one, "-o", tmp_path / "x.png"), ("info", one)):
+        assert run(*arguments) == (2, "", f"scan4d: {one}: is cut short. Write the file again\n")
+
+
 def test_a_picture_lies_behind(run: Run, scans: Path, tmp_path: Path) -> None:
     """Drawn at once, or over a file of code words: what is not covered stays."""
     behind = np.random.default_rng(1).integers(0, 256, (64, 96, 3), np.uint8)
@@ -146,7 +175,8 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),
         ((words, "-o", "a.png", "--size", "10x10"), "--size: has no effect"),
         ((words, "-o", "a.png", "--look", "light=flat"), "--look: has no effect"),
-        ((words, "-o", words), "cannot write '.cw' files"),
+        ((words, "-o", words, "--force"), "is an input of this command"),
+        ((words, "-o", "a.png", "--pose", 1), "there is no pose 1"),
         ((tmp_path / "none.cw", "-o", "a.png"), "no such file or folder"),
     ):
         done = run("render", *arguments)

@@ -113,7 +113,7 @@ def test_a_folder_called_frames_inside(tmp_path: Path) -> None:
 
 def test_nothing_to_open(tmp_path: Path) -> None:
     assert (
-        "holds no scan files. Scan4D reads files with the suffixes .asc, .csv, .exr, .las, .laz, .npy"
+        "holds no scan files. Scan4D reads files with the suffixes .asc, .csv, .cw, .exr, .las, .laz, .npy"
         in message(tmp_path)
     )
     put(tmp_path, "b/1.npy", "a10/1.npy", "a9/1.npy")
@@ -121,7 +121,7 @@ def test_nothing_to_open(tmp_path: Path) -> None:
     assert "a.jpg: unknown file suffix '.jpg'. Scan4D does not read a picture alone" in message(
         put(tmp_path, "a.jpg") / "a.jpg"
     )
-    assert "a.odd: unknown file suffix '.odd'. Known: .asc, .csv, .exr, .las, .laz" in message(
+    assert "a.odd: unknown file suffix '.odd'. Known: .asc, .csv, .cw, .exr, .las, .laz" in message(
         put(tmp_path, "a.odd") / "a.odd"
     )
     assert "is empty" in message_of_pose(put_empty(tmp_path / "empty.ply"))

@@ -19,7 +19,8 @@ disc's plane, see `WordStream.finer`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -109,19 +110,32 @@ def encode_elements(
     rules: Encoding = Encoding(),  # a frozen value
     *,
     background: tuple[int, int, int, int] = (0, 0, 0, 255),
+    range_of: Callable[[float, float], tuple[float, float]] | None = None,
 ) -> WordStream:
     """Code words of what a view shows of some points; ids are their rows. Float64 throughout.
 
-    Raises InputError where there are too many.
+    range_of: gives the depths that the least and the largest Z stand for, scan units from the eye, for the
+    least and the largest depth that are drawn; None: they are these. Raises InputError where there are too
+    many words.
     """
     check_picture_size(view.size)
     found = project_elements(elements, view, light, rules)
+    if range_of is not None:
+        near, far = range_of(found.near + view.base, found.far + view.base)
+        found = replace(found, near=near - view.base, far=far - view.base)
     depths, finer = _depths(found.planes, found.near, found.far, view.perspective, rules.exact)
     emitted = emit_words(found, elements.materials, view.size, rules.steps, depths, finer)
     return WordStream(
         size=view.size, stride=strip_width(view.size[0]), **emitted._asdict(), near=found.near + view.base,
         far=found.far + view.base, materials=materials, background=background, perspective=view.perspective,
+        camera=_camera(view),
     )  # fmt: skip
+
+
+def _camera(view: View) -> NDArray[np.float64]:
+    """See `WordStream.camera`."""
+    away = view.translation - view.rotation @ view.origin - [0.0, 0.0, view.base]
+    return np.concatenate([[view.scale], view.center, np.column_stack([view.rotation, away]).ravel()])
 
 
 def project_elements(elements: Elements, view: View, light: Light, rules: Encoding = Encoding()) -> Projected:

@@ -22,6 +22,7 @@ from .words import MATERIALS
 
 LIGHT_BYTES = bytes_from_light(np.arange(LIGHT_STEPS + 1.0))
 LIGHT_BYTES.setflags(write=False)
+_AT_ONCE = 1 << 14  # colours compared with a palette together
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +93,19 @@ def palette_of(colors: NDArray[np.uint8]) -> tuple[NDArray[np.uint8], NDArray[np
     palette = np.array(picture.getpalette(), np.uint8).reshape(-1, 3)
     index = np.asarray(picture).ravel()
     return palette[: int(index.max()) + 1], index
+
+
+def nearest_colors(palette: NDArray[np.uint8], colors: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The index, (N,), of the colour of a palette, (M, 3) sRGB, nearest to each of (N, 3) colours."""
+    packed = colors.astype(np.uint32) @ np.array([1, 1 << 8, 1 << 16], np.uint32)
+    _, first, of_distinct = np.unique(packed, return_index=True, return_inverse=True)
+    # |c - p|^2 without |c|^2, which is the same for all p
+    entries, distinct = palette.astype(np.int32), colors[first].astype(np.int32)
+    squares, nearest = np.square(entries).sum(axis=1), np.empty(len(distinct), np.uint8)
+    for start in range(0, len(distinct), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        nearest[some] = (squares - 2 * distinct[some] @ entries.T).argmin(axis=1)
+    return nearest[of_distinct]
 
 
 def mapped(values: NDArray[np.floating], low: float, high: float) -> NDArray[np.uint8]:

@@ -1,16 +1,17 @@
-"""Streams of code words: what an engine is sent for one picture. They can be saved, as `.cw` files.
+"""Streams of code words: what an engine is sent for one picture. `files.py` saves them as `.cw` files.
 
 A picture is cut into strips of at most 512 columns, as a word's X has nine bits. Each strip has its words
 line by line, from the top: a line holds those whose first row it is, by ascending id. Z counts what is linear
 over a plane in the picture, as depth buffers do: depth in parallel views, and its inverse in perspective.
 
-A `.cw` file, all little-endian:
+A packed stream, all little-endian, is a file of one picture:
 
     8 bytes    "SCAN4DCW"
-    uint32     version 1; flags (1: perspective, 2: finer depths); width; height; strips; materials
+    uint32     version 1; flags (1: perspective, 2: finer depths, 4: camera); width; height; strips; materials
     uint64     words
     float64    nearest depth (Z = 0); farthest depth (Z = 511), scan units
     4 bytes    background, sRGB and alpha
+    float64    with a camera, 15 numbers: see `WordStream.camera`
     uint32     first column of each strip
     uint32     words in each line, all lines of the first strip, then those of the next one
     uint64     the words
@@ -23,27 +24,27 @@ A `.cw` file, all little-endian:
 from __future__ import annotations
 
 import math
-import os
 import struct
 import zlib
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, explained
-from ..files import open_plain, whole_file
+from ..errors import InputError
 from . import SUFFIX
 from .lighting import Materials
 from .words import COLUMNS, DEPTHS, FIELDS
 
 FINE_DEPTHS = 1 << 24  # steps of finer depths from the nearest to the farthest
 STEEPEST_DEPTHS = 1 << 26  # that finer depths may grow by in a pixel
-_MAGIC, _VERSION = b"SCAN4DCW", 1
-_PERSPECTIVE, _FINER = 1, 2
+MAGIC = b"SCAN4DCW"  # of every file of code words
+_VERSION = 1
+_PERSPECTIVE, _FINER, _CAMERA = 1, 2, 4  # flags
+_CAMERA_NUMBERS = 15
 _HEADER = struct.Struct("<8s6IQdd4s")
 _CHECKSUM = struct.Struct("<I")
+WRITE_AGAIN = "Write the file again"  # what to do about a damaged file
 _MOST_PIXELS = 1 << 26
 _LONGEST_EDGE = 1 << 15
 _NEAREST, _FARTHEST = 1e-30, 1e30  # scan units, whose inverses float32 holds too
@@ -63,6 +64,10 @@ class WordStream:
     and how much it grows a pixel to the right and a pixel down, with FINE_DEPTHS steps from near to far.
     It takes the place of Z. Sums within a bitmap stay within 32 bits.
 
+    camera: None, or (15,) float64, where the picture was seen from: pixels per unit of x/-z, of x in parallel
+    views; the pixel of the line of sight, right and down; then, row by row, the (3, 4) matrix that takes
+    points of the scan's world to the camera, which looks down -z.
+
     Raises InputError where it is no stream that an engine can draw.
     """
 
@@ -77,6 +82,7 @@ class WordStream:
     background: tuple[int, int, int, int] = (0, 0, 0, 255)
     perspective: bool = True
     finer: NDArray[np.int32] | None = field(default=None)
+    camera: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         check_picture_size(self.size)
@@ -85,6 +91,7 @@ class WordStream:
         self._check_lines()
         self._check_depths()
         self._check_words()
+        self._check_camera()
 
     def _check_lines(self) -> None:
         count = len(self.words)
@@ -126,6 +133,13 @@ class WordStream:
         falls = np.flatnonzero(self.ids[1:] < self.ids[:-1]) + 1
         if not np.isin(falls, self.line_starts).all():
             raise InputError("the words of a line must be sorted by their ids")
+
+    def _check_camera(self) -> None:
+        if self.camera is None:
+            return
+        least, most = _NEAREST, _FARTHEST
+        if not (np.abs(self.camera) < most).all() or not least < self.camera[0]:
+            raise InputError("the camera of the code words has numbers that are out of range")
 
     def __len__(self) -> int:
         return len(self.words)
@@ -176,15 +190,17 @@ def strip_width(width: int) -> int:
     return -(-width // -(-width // COLUMNS))
 
 
-def write_stream(stream: WordStream, path: Path | str) -> None:
-    """Write a `.cw` file. Raises InputError."""
+def stream_to_bytes(stream: WordStream) -> bytes:
+    """The bytes of a stream, as a file of one picture holds them."""
     flags = _PERSPECTIVE * stream.perspective | _FINER * (stream.finer is not None)
+    flags |= _CAMERA * (stream.camera is not None)
     header = _HEADER.pack(
-        _MAGIC, _VERSION, flags, *stream.size, stream.strips, len(stream.materials), len(stream),
+        MAGIC, _VERSION, flags, *stream.size, stream.strips, len(stream.materials), len(stream),
         stream.near, stream.far, bytes(stream.background),
     )  # fmt: skip
     materials = stream.materials
     arrays = [
+        *([] if stream.camera is None else [stream.camera.astype("<f8")]),
         (np.arange(stream.strips) * stream.stride).astype("<u4"),
         np.diff(stream.line_starts).astype("<u4"),
         stream.words.astype("<u8"),
@@ -193,44 +209,35 @@ def write_stream(stream: WordStream, path: Path | str) -> None:
         *(table.astype("<u2") for table in (materials.ambient, materials.diffuse, materials.specular)),
     ]
     data = header + b"".join(array.tobytes() for array in arrays)
-    with whole_file(path) as temporary:
-        temporary.write_bytes(data + _CHECKSUM.pack(zlib.crc32(data)))
+    return data + _CHECKSUM.pack(zlib.crc32(data))
 
 
-def read_stream(path: Path | str) -> WordStream:
-    """Read a `.cw` file. Raises InputError for one that cannot be read, or is damaged."""
-    try:
-        with open_plain(path) as file:
-            header = file.read(_HEADER.size)
-            needed, held = _file_size(header), os.fstat(file.fileno()).st_size
-            if held != needed:
-                what = "is cut short" if held < needed else "is longer than its header states"
-                raise InputError(what, hint="Write the file again")
-            data = header + file.read()
-    except OSError as error:
-        what, hint = explained(error)
-        raise InputError(f"cannot be read: {what}", path, hint) from error
-    except InputError as error:
-        raise InputError(error.what, path, error.hint) from error
-    try:
-        (checksum,) = _CHECKSUM.unpack_from(data, needed - _CHECKSUM.size)
-        if zlib.crc32(memoryview(data)[: -_CHECKSUM.size]) != checksum:
-            raise InputError("is damaged: its checksum is wrong", hint="Write the file again")
-        return _stream_of(data)
-    except InputError as error:
-        raise InputError(error.what, path, error.hint) from error
+def stream_from_bytes(data: bytes) -> WordStream:
+    """The stream of what `stream_to_bytes` returned. Raises InputError where it is damaged."""
+    check_length(len(data), stream_bytes(data))
+    (checksum,) = _CHECKSUM.unpack_from(data, len(data) - _CHECKSUM.size)
+    if zlib.crc32(memoryview(data)[: -_CHECKSUM.size]) != checksum:
+        raise InputError("is damaged: its checksum is wrong", hint=WRITE_AGAIN)
+    return _stream_of(data)
 
 
-def _file_size(header: bytes) -> int:
-    """Bytes of the file that begins so. Raises InputError where it is no file of code words."""
-    if not header.startswith(_MAGIC) or len(header) < _HEADER.size:
+def check_length(held: int, needed: int) -> None:
+    """Raise InputError where there are not as many bytes as a header states."""
+    if held != needed:
+        what = "is cut short" if held < needed else "is longer than its header states"
+        raise InputError(what, hint=WRITE_AGAIN)
+
+
+def stream_bytes(header: bytes) -> int:
+    """Bytes of the packed stream that begins so. Raises InputError where it is none."""
+    if not header.startswith(MAGIC) or len(header) < _HEADER.size:
         raise InputError(
             "is not a file of code words", hint=f"'scan4d render -o NAME{SUFFIX}' writes such files"
         )
-    _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack(header)
+    _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack_from(header)
     if version != _VERSION:
         raise InputError(f"is of version {version}", hint=f"This version of Scan4D reads version {_VERSION}")
-    if flags & ~(_PERSPECTIVE | _FINER):
+    if flags & ~(_PERSPECTIVE | _FINER | _CAMERA):
         raise InputError(f"has unknown flags: {flags}")
     check_picture_size((width, height))
     if not -(-width // COLUMNS) <= strips <= width:
@@ -238,7 +245,8 @@ def _file_size(header: bytes) -> int:
             f"has {strips} strips for {width} columns, but a strip has at most {COLUMNS} columns"
         )
     each = 12 + 12 * bool(flags & _FINER)
-    return _HEADER.size + 4 * strips * (1 + height) + each * words + 18 * materials + _CHECKSUM.size
+    head = _HEADER.size + 8 * _CAMERA_NUMBERS * bool(flags & _CAMERA)
+    return head + 4 * strips * (1 + height) + each * words + 18 * materials + _CHECKSUM.size
 
 
 def _stream_of(data: bytes) -> WordStream:
@@ -251,6 +259,7 @@ def _stream_of(data: bytes) -> WordStream:
         at += array.nbytes
         return array.astype(array.dtype.newbyteorder("="), copy=False)
 
+    camera = take("<f8", _CAMERA_NUMBERS) if flags & _CAMERA else None
     starts = take("<u4", strips).astype(np.int64)
     stride = int(starts[1]) if strips > 1 else width
     if (starts != np.arange(strips) * stride).any() or not starts[-1] < width <= strips * stride:
@@ -268,4 +277,5 @@ def _stream_of(data: bytes) -> WordStream:
         materials=Materials(*(take("<u2", materials, 3) for _ in range(3))),
         background=tuple(background),
         perspective=bool(flags & _PERSPECTIVE),
+        camera=camera,
     )

@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 from ..camera import Camera
 from ..codewords import SUFFIX
 from ..codewords.engine import CodePicture, draw_words
-from ..codewords.stream import WordStream, read_stream, write_stream
+from ..codewords.files import WordFile, write_stream, writing_streams
+from ..codewords.stream import WordStream
 from ..codewords.words import NO_WORD
 from ..drawing.request import Request, view_of
 from ..errors import InputError
 from ..look import Look, drawable, value_source
-from ..output.export import check_output, numbered, write_arrays, write_png
+from ..output.export import check_output, is_pattern, numbered, write_arrays, write_png
 from ..output.film import FILM_SUFFIX, FilmTimes, film
 from ..params import parse
-from ..scan.code_words import Params, words_of
+from ..scan.code_words import Params, Shared, words_of
 from ..scan.estimate import with_estimates
 from ..scan.inputs import scan_inputs
 from ..scan.open import DEMO
@@ -40,7 +41,7 @@ _SUFFIXES = (".png", ".npz", FILM_SUFFIX, SUFFIX)
 _SIZE = (1920, 1280)
 # Arguments of `scan4d render` that are for OpenGL's pictures alone, and those that a stream has settled.
 _NEED_GL = ("marks", "stats", "repeat", "replay", "anonymous", "quality", "budget", "error")
-_SETTLED = ("size", "set", "look", "camera", "orbit", "turntable", "pose", "time", "poses", "all")
+_SETTLED = ("size", "set", "look", "camera", "orbit", "turntable")
 
 
 def is_asked(args: Namespace) -> bool:
@@ -79,16 +80,38 @@ def _refuse(args: Namespace, names: tuple[str, ...], what: str) -> None:
 
 
 def _replay(args: Namespace, path: Path) -> None:
-    """Draw a file of code words."""
-    _refuse(args, _SETTLED, f"has no effect: the code words in {path.name} contain a single picture")
-    check_output(args.out, tuple(suffix for suffix in _SUFFIXES if suffix != SUFFIX), several=False)
-    claim([numbered(args.out, 0)], [path, *_given(args.behind)], args.force)
-    stream = read_stream(path)
-    draw = partial(draw_words, background=_background(args.behind, stream.size))
-    times = FilmTimes(fps=args.fps) if args.out.suffix.lower() == FILM_SUFFIX else None
-    with _written(args.out, stream.size, times, draw) as put, progress(1, args.progress) as tick:
-        put(drawing.Shot(0, 0, 0.0), stream, None)
-        tick()
+    """Draw files of code words, or store their pictures in others."""
+    _refuse(args, _SETTLED, f"has no effect: {path.name} stores finished pictures")
+    with open_timeline(args, str(path)) as timeline:
+        shots = drawing.shots(timeline, chosen_poses(args, timeline) or [0], args)
+        _check_output(args.out, several=len(shots) > 1)
+        times = drawing.film_times(shots, args)
+        shots = drawing.shown_shots(shots, times)
+        outputs = drawing.outputs(args.out, [shot.number for shot in shots])
+        claim(outputs, [*timeline.files, *_given(args.behind)], args.force)
+        files = [WordFile(file) for file in timeline.files]
+
+        def words(index: int) -> WordStream:
+            return files[0].read(index) if len(files) == 1 else files[index].read(0)
+
+        size = words(shots[0].pose).size
+        draw = partial(draw_words, background=_background(args.behind, size))
+        with (
+            _written(args.out, size, times, draw, len(shots)) as put,
+            progress(len(shots), args.progress) as tick,
+        ):
+            for shot in shots:
+                stream = words(shot.pose)
+                if stream.size != size and (times is not None or args.behind):
+                    what = "has {} x {} pixels, but the first picture has {} x {}".format(*stream.size, *size)
+                    raise InputError(what, timeline.label(shot.pose), "Draw this picture alone")
+                put(shot, stream, None)
+                tick()
+
+
+def _check_output(out: Path, several: bool) -> None:
+    """Raise InputError where pictures cannot go to this path; one `.cw` file can store several."""
+    check_output(out, _SUFFIXES, several and not _holds_several(out, 2))
 
 
 def _draw(args: Namespace) -> None:
@@ -98,7 +121,7 @@ def _draw(args: Namespace) -> None:
     with open_timeline(args, args.scan or DEMO) as timeline:
         indices, size = chosen_poses(args, timeline) or [0], args.size or _SIZE
         shots = drawing.shots(timeline, indices, args)
-        check_output(args.out, _SUFFIXES, several=len(shots) > 1)
+        _check_output(args.out, several=len(shots) > 1)
         times = drawing.film_times(shots, args)
         shots = drawing.shown_shots(shots, times)
         upright = stated_upright(args, timeline, indices)
@@ -110,7 +133,11 @@ def _draw(args: Namespace) -> None:
         camera_of = None if camera is None else lambda shot: camera
         poses = list(dict.fromkeys(shot.pose for shot in shots))
         draw = partial(draw_words, window=params.window, background=_background(args.behind, size))
-        with _written(args.out, size, times, draw) as put, progress(len(shots), args.progress) as tick:
+        shared = Shared() if _holds_several(args.out, len(shots)) else None
+        with (
+            _written(args.out, size, times, draw, len(shots)) as put,
+            progress(len(shots), args.progress) as tick,
+        ):
             for pose in read_poses(timeline, poses, with_empty=True):
                 first = pose if pose.count or camera_of else first_readable(timeline, poses)
                 camera_of = camera_of or drawing.shot_cameras(args, timeline, shots, size, upright, first)
@@ -119,7 +146,7 @@ def _draw(args: Namespace) -> None:
                 for shot in shots:
                     if shot.pose == pose.index:
                         view = view_of(Request(pose, camera_of(shot)), size)
-                        put(shot, words_of(known, view, own, params), pose)
+                        put(shot, words_of(known, view, own, params, shared=shared), pose)
                         tick()
 
 
@@ -174,18 +201,31 @@ def _with_estimates(pose: Pose, params: Params) -> Pose:
         return pose
 
 
+def _holds_several(out: Path, count: int) -> bool:
+    """Whether so many pictures go to one file of code words."""
+    return count > 1 and out.suffix.lower() == SUFFIX and not is_pattern(out)
+
+
 @contextmanager
 def _written(
-    out: Path, size: tuple[int, int], times: FilmTimes | None, draw: Callable[[WordStream], CodePicture]
+    out: Path,
+    size: tuple[int, int],
+    times: FilmTimes | None,
+    draw: Callable[[WordStream], CodePicture],
+    count: int,
 ) -> Iterator[Callable[[drawing.Shot, WordStream, Pose | None], None]]:
     """A function that writes a stream to the file, the numbered file or the film that the path names.
 
-    It takes the shot, its stream and its pose. times: of a film.
+    It takes the shot, its stream and its pose. times: of a film. count: of pictures.
     """
     suffix = out.suffix.lower()
     if times is not None:
         with film(out, size, times) as add:
             yield lambda shot, stream, pose: add(draw(stream).image, shot.start)
+        return
+    if _holds_several(out, count):
+        with writing_streams(out) as store:
+            yield lambda shot, stream, pose: store(stream, shot.start)
         return
 
     def put(shot: drawing.Shot, stream: WordStream, pose: Pose | None) -> None:

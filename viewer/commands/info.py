@@ -6,6 +6,7 @@ Scan4D reads the first readable pose only, and the header of a file of code word
 from __future__ import annotations
 
 import json
+import os
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
@@ -37,7 +38,7 @@ def add_arguments(parser: ArgumentParser) -> None:
 
 def run(args: Namespace) -> int:
     """Print it."""
-    if args.scan.lower().endswith(SUFFIX):
+    if args.scan.lower().endswith(SUFFIX) and os.path.isfile(args.scan):
         from ._word_facts import stream_as_text, stream_facts  # few scans need it
 
         words = stream_facts(args.scan)

@@ -3,7 +3,7 @@
 OUT is a .png, .exr or .npz file, a .mp4 film, or for several pictures a numbered pattern such as out%04d.png.
 PNG and MP4 show the look. EXR and NPZ store depth, normals and ids of each pixel. Scan4D fits the camera to
 the first pose and leaves it there. --replay draws a recording or a saved picture again. --no-gl draws without
-OpenGL, from code words, and can write them to a .cw file; SCAN can be such a file.
+OpenGL, from code words, and can write them to .cw files; SCAN can be such a file or a pattern.
 """
 
 from __future__ import annotations

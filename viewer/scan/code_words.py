@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..codewords.encode import Elements, Encoding, Light, encode_elements
-from ..codewords.lighting import Materials, map_palette, mapped, palette_of
+from ..codewords.lighting import Materials, map_palette, mapped, nearest_colors, palette_of
 from ..codewords.stream import WordStream
 from ..codewords.tables import Steps
 from ..geometry import up_vector
@@ -24,6 +25,9 @@ from .ranges import robust_range
 from .spacing import typical_spacing
 
 _RADIUS_PER_SPACING = 1.5  # closes a surface that is evenly covered
+_BEYOND = 1 / 16  # of the depths of the first picture, that a sequence's reach beyond them at each end
+_LEAST_FILLED = 0.5  # of the depths of a sequence, that a picture fills
+_WORSE = 1.5  # times the error of the first picture's colours, that a later one's may have
 _LUMA = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -106,13 +110,71 @@ class Params:
         return Steps(self.sizes, self.size_parts, self.normals, self.normal_parts)
 
 
-def words_of(pose: Pose, view: View, look: Look, params: Params, layers: Layers = NO_LAYERS) -> WordStream:
+class Shared:
+    """The depths that Z stands for, and the materials, of the pictures of a sequence: shared by them, so that
+    equal discs have equal words.
+
+    Both are those of the first picture until a picture does not fit: its depths reach beyond them or fill
+    less than half of them, or the materials show its colours much worse. Then those of that picture follow.
+    """
+
+    def __init__(self) -> None:
+        self._depths: tuple[float, float] | None = None
+        self._palette: NDArray[np.uint8] | None = None
+        self._error = 0.0
+
+    def range_of(self, near: float, far: float, perspective: bool) -> tuple[float, float]:
+        """The depths that Z reaches between, for a picture between these."""
+        count = np.reciprocal if perspective else np.positive
+        start, end = (float(count(depth)) for depth in (near, far))
+        if near == far:  # nothing is drawn, or a single depth
+            return self._depths or (near, far)
+        if self._depths is not None:
+            low, high = sorted(float(count(depth)) for depth in self._depths)
+            is_inside = low <= min(start, end) and max(start, end) <= high
+            if is_inside and abs(end - start) >= _LEAST_FILLED * (high - low):
+                return self._depths
+        beyond = _BEYOND * (end - start)
+        start, end = start - beyond, end + beyond
+        if perspective:
+            end = max(end, _BEYOND / far)
+        self._depths = float(count(start)), float(count(end))
+        return self._depths
+
+    def palette_of(
+        self, palette: NDArray[np.uint8], colors: NDArray[np.uint8]
+    ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+        """The shared colours, and which of them each point is shown in, (N,). palette: the colours of this
+        picture alone. colors: (N, 3) of its points."""
+        if self._palette is not None:
+            index = nearest_colors(self._palette, colors)
+            if _color_error(self._palette[index], colors) <= _WORSE * self._error + 1:
+                return self._palette, index
+        index = nearest_colors(palette, colors)
+        self._palette, self._error = palette, _color_error(palette[index], colors)
+        return palette, index
+
+
+def _color_error(shown: NDArray[np.uint8], wanted: NDArray[np.uint8]) -> float:
+    """The root of the mean square of differences, levels."""
+    return float(np.sqrt(np.square(shown.astype(np.float32) - wanted).mean())) if wanted.size else 0.0
+
+
+def words_of(
+    pose: Pose,
+    view: View,
+    look: Look,
+    params: Params,
+    layers: Layers = NO_LAYERS,
+    shared: Shared | None = None,
+) -> WordStream:
     """Code words of a pose as a view shows it; ids are rows of its cloud. view: from an origin of positions.
+    shared: with other pictures of a sequence; None: the picture stands alone.
 
     Points without a normal face the eye, those without a radius have one for all. Raises InputError for what
     the scan or the parameters do not allow.
     """
-    materials, index, lights = word_look(pose, view, look, layers)
+    materials, index, lights = word_look(pose, view, look, layers, shared)
     return encode_elements(
         elements_of(pose, view, params, index),
         view,
@@ -120,6 +182,7 @@ def words_of(pose: Pose, view: View, look: Look, params: Params, layers: Layers 
         lights,
         Encoding(params.steps, params.quality == "exact", params.radius_scale, params.cull_back),
         background=rgba(look.background),
+        range_of=None if shared is None else partial(shared.range_of, perspective=view.perspective),
     )
 
 
@@ -152,9 +215,17 @@ class WordLook(NamedTuple):
     light: Light
 
 
-def word_look(pose: Pose, view: View, look: Look, layers: Layers = NO_LAYERS) -> WordLook:
-    """The look of a pose in code words. Raises InputError for a number that the pose does not have."""
+def word_look(
+    pose: Pose, view: View, look: Look, layers: Layers = NO_LAYERS, shared: Shared | None = None
+) -> WordLook:
+    """The look of a pose in code words. shared: see `words_of`. Raises InputError for a number that the pose
+    does not have."""
     palette, index = point_materials(pose, view, look, layers)
+    if shared is not None:
+        is_own = value_source(look, {**pose.cloud.scalars, **layers.scalars}) is None
+        is_own &= look.color_by not in ("plain", "normal", "id", "level")
+        colors = pose.cloud.colors if is_own else None
+        palette, index = shared.palette_of(palette, palette[index] if colors is None else colors[:, :3])
     lights = word_lights(look, pose.cloud.normals is not None)
     shares = (look.ambient, look.diffuse, look.specular) if lights.is_lit else (0.0, 1.0, 0.0)
     return WordLook(Materials.of_palette(palette, *shares), index, lights)
