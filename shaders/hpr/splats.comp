@@ -48,7 +48,7 @@ void main() {
     normal = normal == vec3(0.0) ? to_eye : normalize(normal);
     float leaning = reach / max(dot(normal, to_eye), LEAST_FACING);
     float radius = min(max(leaning, min(LEANING * spacing, 3.0 * reach)), OUTSIDE * spacing);
-    float around = texelFetch(apart, int(row)).r;
+    float around = max(texelFetch(apart, int(row)).r, width);  // where sectors are wider, candidates are a sector apart
     float least = min(CLOSED * around, FEW * spacing);
     radius = reach > OUTLINE * around ? min(radius, AT_OUTLINE * around) : max(radius, least);
     splats[3u * row] = packSnorm2x16(folded(normal));

@@ -121,6 +121,7 @@ def test_normals_and_sizes_are_those_of_the_plain_version(renderer: Renderer, na
     leaning = size / np.maximum(cosine, 0.5)
     size = np.minimum(np.maximum(leaning, np.minimum(spacings, 3 * size)), 1.5 * spacings)
     apart = np.frombuffer(scene.pose.cached(Spacings).texels.buffer.read(), np.float32)
+    apart = np.maximum(apart, widths_of(scene, eye))
     is_clear = seen & (np.abs(reach + 0.5 * widths_of(scene, eye) - 1.4 * apart) > 0.02 * apart)
     at_outline = reach + 0.5 * widths_of(scene, eye) > 1.4 * apart
     assert 0 < at_outline[seen].mean() < 0.5
