@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from viewer.bench.scenes.samples import torus_grid
 from viewer.errors import InputError
 from viewer.scan import formats
 from viewer.scan.estimate import cloud_normals, cloud_radii
 from viewer.scan.open import open_scan
-from viewer.scan.planes import NeighborSearch
+from viewer.scan.planes import _COUNTS, NeighborSearch
 from viewer.scan.points import PointCloud
 from viewer.scan.spacing import typical_spacing
 from viewer.task import Cancelled, Task
@@ -193,6 +194,23 @@ def test_normals_are_the_same_in_any_order() -> None:
     order = np.random.default_rng(8).permutation(3000)
     here, there = (cloud_normals(PointCloud.from_arrays(some)) for some in (points, points[order]))
     assert np.array_equal(here[order], there)
+
+
+@pytest.mark.parametrize(("around", "stretch"), [(60, 5.0), (60, 8.0), (60, 12.0), (40, 16.0)])
+def test_normals_of_a_stretched_grid(around: int, stretch: float) -> None:
+    """The nearest neighbours lie in a bent line, whose plane stands across the surface."""
+    arrays = torus_grid(around, stretch)
+    shift = 1e-4 * np.random.default_rng(0).normal(size=(len(arrays["positions"]), 3))  # no equal distances
+    cloud = PointCloud.from_arrays(arrays["positions"] + shift)
+    points, normals = cloud.positions.astype(np.float64), cloud_normals(cloud)
+    assert cosines(normals, arrays["normals"]).min() > np.cos(np.radians(6))
+    for row in range(0, len(points), 97):
+        nearest = points[np.argsort(np.linalg.norm(points - points[row], axis=1), kind="stable")]
+        planes = [np.linalg.svd(nearest[:k] - nearest[:k].mean(axis=0)) for k in _COUNTS]
+        assert any(
+            sides[1] ** 2 > 0.03 * sides[0] ** 2 and abs(axes[2] @ normals[row]) > 1 - 1e-4
+            for _, sides, axes in planes
+        ), "the plane of neighbours that lie in two directions"
 
 
 def test_normals_of_a_leaning_plane_are_exact() -> None:

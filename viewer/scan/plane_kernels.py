@@ -16,6 +16,7 @@ _FLATTEST = 0.1  # of a squared width, what noise leaves of it at least
 # they lie in lines, their squared widths in a ratio below this, and residuals grow faster than a curved
 # surface's.
 _DISAGREEING, _MORE, _ROUND = 0.15, 3, 0.35
+_LINE = 0.03  # ratio of squared widths, below which neighbours lie in a line, bent or not: it has no plane
 _ROUNDS = 3  # in which a reference is found, as noise is better known from more neighbours
 
 
@@ -202,27 +203,33 @@ class TurnLimits(NamedTuple):
 
 
 @compiled
-def _fewest(fits: NestedFits, around: NDArray[np.int64], scratch: NDArray[np.float64]) -> int:
-    """The first of the numbers of neighbours that tells a surface at some points, which are judged together.
+def _ratio(widths: NDArray[np.float64]) -> float:
+    """The ratio of the squared widths (3,) along a plane, 0 to 1: small where points lie in a line."""
+    return widths[1] / widths[2] if widths[2] > 0.0 else 0.0
 
-    scratch: (K,) at least as many as the points.
+
+@compiled
+def _fewest(fits: NestedFits, around: NDArray[np.int64], scratch: NDArray[np.float64]) -> tuple[int, bool]:
+    """The first of the numbers of neighbours that tells a surface at some points, which are judged together;
+    and whether these neighbours still lie in a line, so that more are needed.
+
+    around: (K,), the point itself first. scratch: at least (K,).
     """
     counts, normals, widths = fits
     last, total = len(counts) - 1, len(around)
     for i in range(total):
         scratch[i] = _noise(widths[around[i]], counts, 0, 2)
-    least_round = _ROUND if _median(scratch, total) < 0.0 else 0.0
+    least_round = _ROUND if _median(scratch, total) < 0.0 else _LINE
     agreeing = _agreement(normals, around, total, min(last, _MORE)) - _DISAGREEING
-    first = 0
-    while first < last - 2:
+    for first in range(last - 1):
         for i in range(total):
-            widest = widths[around[i], first, 2]
-            scratch[i] = widths[around[i], first, 1] / widest if widest > 0.0 else 0.0
-        is_round = _median(scratch, total) >= least_round
-        if is_round and _agreement(normals, around, total, first) >= agreeing:
+            scratch[i] = _ratio(widths[around[i], first])
+        own = scratch[0]
+        ratio = _median(scratch, total)
+        in_line = ratio < _LINE or own < _LINE
+        if not in_line and ratio >= least_round and _agreement(normals, around, total, first) >= agreeing:
             break
-        first += 1
-    return first
+    return first, in_line
 
 
 @compiled
@@ -282,7 +289,7 @@ def choose(
                 around[total] = place
                 total += 1
         together = around[:total]
-        first = _fewest(fits, together, scratch)
+        first, in_line = _fewest(fits, together, scratch)
         reference = _settle_reference(fits, together, first, limits, turned, scratch)
         is_quiet = turned[first] < limits.quiet
         best, least = reference, np.inf
@@ -296,4 +303,4 @@ def choose(
             if error < least:
                 best, least = j, error
         chosen[m] = normals[places[rows[m]], best]
-        further[m] = not is_quiet and (reference > first or best >= last - 1)
+        further[m] = in_line or (not is_quiet and (reference > first or best >= last - 1))
