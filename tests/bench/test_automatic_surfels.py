@@ -54,10 +54,8 @@ def faults(errors: Errors) -> float:
 
 
 def marks_of(condition: ScanCondition) -> list[pytest.MarkDecorator]:
-    """Slow but for a few. On the steepest ramp, automatic splats leave more open since they fit cells."""
-    worse = [pytest.mark.xfail(reason="0.10 % more open than own radii", strict=True)]
-    slow = [] if condition.name in QUICK else [pytest.mark.slow]
-    return slow + (worse if condition.name == "ramp 1:100" else [])
+    """Slow but for a few."""
+    return [] if condition.name in QUICK else [pytest.mark.slow]
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,6 @@ from viewer.splatting.gaps import GapRadii
 pytestmark = pytest.mark.backend("surfels")
 Draw = Callable[..., Surface]
 SIZE = (300, 200)
-TURNS = np.arange(8) * np.pi / 4
 
 
 class Ellipse(NamedTuple):
@@ -54,10 +53,15 @@ def turned(vectors: NDArray[np.float64], angle: float) -> NDArray[np.float64]:
     return np.stack([np.cos(angle) * x + np.sin(angle) * y, np.cos(angle) * y - np.sin(angle) * x], axis=-1)
 
 
-def reaches(d: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far the cell of a point reaches in eight directions, (8,). d: (N, 2), offsets of others over their
-    squared length."""
-    sides = np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
+def directions(count: int) -> NDArray[np.float64]:
+    """Unit vectors around, (count, 2)."""
+    turns = np.arange(count) * 2 * np.pi / count
+    return np.stack([np.cos(turns), np.sin(turns)], axis=1)
+
+
+def reaches(d: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far the cell of a point reaches to each side, (K,). d: (N, 2), offsets of others over their squared
+    length. sides: (K, 2), unit vectors."""
     return 0.5 / np.maximum((d @ sides.T).max(axis=0), 1e-30)
 
 
@@ -80,19 +84,18 @@ def plain(positions: NDArray[np.float64], normals: NDArray[np.float64], row: int
     u = np.cross((0.0, 1.0, 0.0), n)
     u /= np.linalg.norm(u)
     v, squares = np.cross(n, u), np.square(d).sum(axis=1)
-    reach = reaches(np.stack([d @ u, d @ v], axis=1) / squares[:, None])
+    reach = reaches(np.stack([d @ u, d @ v], axis=1) / squares[:, None], directions(8))
     opposite = np.roll(reach, 4)
     in_rows = np.maximum(reach, opposite) <= 1.5 * np.minimum(reach, opposite)
     reach = np.minimum(reach, np.where(in_rows, 4.0, 2.0) * np.sort(reach)[4])
     radius = 1.2 * reach.max()
-    rough = ellipse_round(reach[:, None] * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1), 0)
+    rough = ellipse_round(reach[:, None] * directions(8), 0)
     lengths = np.array([rough.lengths[0], max(rough.lengths[1], rough.lengths[0] / 16)])
     along, across = (np.cos(a) * u + np.sin(a) * v for a in (rough.turn, rough.turn + np.pi / 2))
-    reach = reaches(np.stack([d @ along, d @ across], axis=1) * lengths / squares[:, None])
-    reach = np.where(reach > 1.5, 1.0, reach)
-    corners = 1.3 * reach[:, None] * lengths * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
-    found = ellipse_round(corners, 4)
-    is_round = found.lengths.prod() > 0.75 * radius**2
+    reach = reaches(np.stack([d @ along, d @ across], axis=1) * lengths / squares[:, None], directions(16))
+    found = ellipse_round(1.25 * np.minimum(reach, 1.5)[:, None] * lengths * directions(16), 4)
+    farthest = np.linalg.norm(found.middle) + found.lengths[0]
+    is_round = found.lengths.prod() > 0.75 * radius**2 and farthest < 1.2 * radius
     first = np.cos(found.turn) * along + np.sin(found.turn) * across
     middle = found.middle[0] * along + found.middle[1] * across
     axes = np.append(found.lengths[0] * first, found.lengths[1])
@@ -111,7 +114,7 @@ def plain(positions: NDArray[np.float64], normals: NDArray[np.float64], row: int
         slope = np.linalg.norm(parts)
         if sector[best] != k or rise[best] <= 0 or height < 0 or slope < 1e-3:
             continue
-        reach_to = turned(rough.middle, rough.turn) @ parts / slope + 1.3 * np.linalg.norm(
+        reach_to = turned(rough.middle, rough.turn) @ parts / slope + 1.25 * np.linalg.norm(
             lengths * parts / slope
         )
         room = height + 0.1 * radius
@@ -229,7 +232,7 @@ def test_feeds_draw_the_same_bits(draw: Draw, passes: str) -> None:
     for other in (by_geometry, tiles):
         assert (other.id != first.id).mean() < 0.002
         same = other.id == first.id
-        np.testing.assert_allclose(other.depth[same], first.depth[same], rtol=1e-5)
+        np.testing.assert_allclose(other.depth[same], first.depth[same], rtol=1e-4)
 
 
 def random_sphere(count: int) -> PointCloud:

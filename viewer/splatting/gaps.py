@@ -43,11 +43,12 @@ _ROWS = 4.0  # times as far, where points lie in rows: to opposite sides alike
 _CELL = {"DIRECTIONS": 8, "KNOWN": _KNOWN, "BORDER": _BORDER, "ROWS": _ROWS}
 _SPARE = 1.2  # times the radii found: these go by some directions, in a plane
 _FIT = {
-    "SPARE_FIT": 1.3,  # times how far cells reach: how far ellipses do
+    "SPARE_FIT": 1.25,  # times how far cells reach: how far ellipses do
     "THINNEST": 16.0,  # times as long as wide, at first
-    "OPEN": 1.5,  # times as far as the rough ellipse: from where on a side has no end
+    "OPEN": 1.5,  # times as far as the rough ellipse: how far a side counts at most
     "ROUNDS": 4,  # towards the smallest ellipse
-    "ROUND_SHARE": 0.75,  # of the disc's area, from which on the disc is drawn
+    "ROUND_SHARE": 0.75,  # of the disc's area, from which on the disc is drawn, where
+    "ROUND_FAR": 1.2,  # radii that the ellipse reaches at most
     "ROW": 2.0,  # times as long as wide: cells of points in rows
     "SPARE": _SPARE,
     "NEAR": 2.5,  # radii: how far neighbours are whose planes count

@@ -6,7 +6,7 @@
 layout(std430, binding = STORAGE_CELL_AXES) writeonly buffer Axes { vec4 cell_axes[]; };
 layout(std430, binding = STORAGE_CELLS) writeonly buffer Cells { vec4 cells[]; };
 
-const int CORNERS = 8, SECTORS = 6;
+const int CORNERS = 16, SECTORS = 6, CORNER_PARTS = CORNERS / 8;
 const float TURN = 6.2831853;
 
 // lengths: of its half-axes. turn: of the longer one, from the first direction of the plane.
@@ -46,11 +46,16 @@ Ellipse ellipse_round(vec2 corners[CORNERS], int rounds) {
 
 vec2 turned_by(float angle) { return vec2(cos(angle), sin(angle)); }
 
-void corners_of(vec4 forth, vec4 back, vec2 lengths, out vec2 corners[CORNERS]) {
-    for (int k = 0; k < 4; ++k) {
-        vec2 to = lengths * turned_by(TURN / float(CORNERS) * float(k));
-        corners[k] = forth[k] * to;
-        corners[k + 4] = -back[k] * to;
+// One over twice how far the cell reaches, against and along each of some directions, as in common/cell_reach.glsl.
+vec4 corner_back[CORNER_PARTS], corner_forth[CORNER_PARTS];
+
+// The corners of a cell that reaches so far forth and back in each of eight directions.
+void corners_of(vec4 forth, vec4 back, out vec2 corners[CORNERS]) {
+    for (int k = 0; k < CORNERS / 2; ++k) {
+        int of = k / CORNER_PARTS;
+        vec2 to = turned_by(TURN / 8.0 * float(of));
+        corners[k] = forth[of] * to;
+        corners[k + CORNERS / 2] = -back[of] * to;
     }
 }
 
@@ -70,7 +75,7 @@ vec2 cut_by[SECTORS];     // tilt between both normals, distance
 // forth, back: how far the cell counts in eight directions.
 void begin_fit(vec4 forth, vec4 back, float radius, vec3 u, vec3 v) {
     vec2 corners[CORNERS];
-    corners_of(forth, back, vec2(1.0), corners);
+    corners_of(forth, back, corners);
     rough = ellipse_round(corners, 0);
     rough.lengths.y = max(rough.lengths.y, rough.lengths.x / THINNEST);
     vec2 along = turned_by(rough.turn);
@@ -83,7 +88,7 @@ void begin_fit(vec4 forth, vec4 back, float radius, vec3 u, vec3 v) {
         guess_to[k] = -2.0;
         guess_at[k] = 0;
     }
-    clear_cell();
+    for (int part = 0; part < CORNER_PARTS; ++part) corner_back[part] = corner_forth[part] = vec4(0.0);
 }
 
 // A neighbour at d, in any order. at: its slot.
@@ -123,7 +128,13 @@ void find_cuts(vec3 place, vec3 n) {
 }
 
 void take_corner(vec3 d, float squared) {
-    bound_cell(vec2(dot(d, rough_u), dot(d, rough_v)) * rough.lengths / max(squared, 1e-30));
+    vec2 at = vec2(dot(d, rough_u), dot(d, rough_v)) * rough.lengths / max(squared, 1e-30);
+    for (int part = 0; part < CORNER_PARTS; ++part) {
+        vec4 angle = (vec4(0.0, 1.0, 2.0, 3.0) + float(4 * part)) * (TURN / float(CORNERS));
+        vec4 along = at.x * cos(angle) + at.y * sin(angle);
+        corner_back[part] = min(corner_back[part], along);
+        corner_forth[part] = max(corner_forth[part], along);
+    }
 }
 
 // The planes that cut off most, packed, the most first. turn: of the first half-axis from rough_u. longer: half-axis.
@@ -146,16 +157,24 @@ vec3 packed_planes(float turn, float longer) {
     return words;
 }
 
-// A side that does not end near the rough ellipse counts as that does.
-vec4 ended(vec4 reaches) { return mix(reaches, vec4(1.0), greaterThan(reaches, vec4(OPEN))); }
+// A side that does not end near the rough ellipse counts as ending there. inverse: one over twice how far a side reaches.
+vec4 ended(vec4 inverse) { return min(0.5 / max(inverse, 1e-30), OPEN); }
 
 void store_fit(uint row, vec3 place, vec3 n) {
     find_cuts(place, n);
     vec2 corners[CORNERS];
-    vec4 forth = ended(0.5 / max(highest[0], 1e-30)), back = ended(0.5 / max(-lowest[0], 1e-30));
-    corners_of(SPARE_FIT * forth, SPARE_FIT * back, rough.lengths, corners);
+    for (int part = 0; part < CORNER_PARTS; ++part) {
+        vec4 forth = SPARE_FIT * ended(corner_forth[part]), back = SPARE_FIT * ended(-corner_back[part]);
+        for (int k = 0; k < 4; ++k) {
+            int i = 4 * part + k;
+            vec2 to = rough.lengths * turned_by(TURN / float(CORNERS) * float(i));
+            corners[i] = forth[k] * to;
+            corners[i + CORNERS / 2] = -back[k] * to;
+        }
+    }
     Ellipse found = ellipse_round(corners, ROUNDS);
-    if (found.lengths.x * found.lengths.y > ROUND_SHARE * fit_radius * fit_radius) {
+    float area = found.lengths.x * found.lengths.y, farthest = length(found.middle) + found.lengths.x;
+    if (area > ROUND_SHARE * fit_radius * fit_radius && farthest < ROUND_FAR * fit_radius) {
         cell_axes[row] = vec4(0.0);
         cells[row] = vec4(0.0, packed_planes(-rough.turn, fit_radius));
         return;
