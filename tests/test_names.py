@@ -20,7 +20,7 @@ BY_PROTOCOL = {"Frames", "Params", "Tool", "Settings"}  # each backend, and each
 FUNCTIONS_BY_PROTOCOL = {
     "add_arguments", "column_names", "find", "run", "draw", "check", "contents", "frame_count", "read",
     "read_faces", "read_colors", "read_times", "read_unit", "write", "write_poses", "render",
-    "lacks", "owns", "decide",
+    "lacks", "owns", "decide", "coarser",
 }  # fmt: skip
 
 # A docstring begins with a noun or a verb that names its subject. These begin without one.

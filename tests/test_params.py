@@ -98,7 +98,7 @@ class Grown:
         ({"mode": param("one", "m", when={"sise": (1,)}), "size": param(1, "s")},
          "Wrong.mode depends on 'sise', which is not the name of another parameter. Known: size"),
         ({"size": param(1, "s", key="K")}, "Wrong.size has a keyboard shortcut, "
-         "but only an on/off parameter can have one"),
+         "but only a parameter with two values can have one"),
         ({"a": param(True, "a", key="K"), "b": param(True, "b", key="K")},
          "Wrong.a has the key 'K', which another parameter also has"),
         ({"size": param(1, "s", deprecated=("mode",)), "mode": param("one", "m")},
@@ -161,7 +161,7 @@ def test_declarations_are_complete(name: str) -> None:
     for p in declared.values():
         assert p.help
         assert not p.help.endswith(".")
-        assert p.type is bool or not p.key
+        assert p.states or not p.key
         assert p.type in (int, float) or not p.unit
         for condition in p.when:
             other = declared[condition.parameter]

@@ -35,6 +35,15 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class Obstacle:
+    """Another switch of the same declaration that, while it is off, may leave a parameter without a visible
+    effect on range views. switch: its name. why: the reason, which follows "The picture did not change:"."""
+
+    switch: str
+    why: str
+
+
+@dataclass(frozen=True)
 class Parameter:
     """One parameter as its declaration has it.
 
@@ -42,7 +51,9 @@ class Parameter:
     words a str may be; empty: any. sweep: the values a benchmark tries. affects: what an edit
     changes (`AFFECTS`). optional: None ("auto" in text) is allowed. unit: of a number, empty: none.
     group: the heading that it stands under, empty: none. when: all that has to hold for it to matter.
-    key: what switches a bool on the keyboard, empty: nothing. deprecated: former names, which are still read.
+    key: switches it on the keyboard, empty: nothing. Only a switch can have one: a bool, or a str with two
+    choices, which is on with the first. short: the title of a switch on the toolbar, empty: it is not there.
+    obstacle: why a switch may have no visible effect. deprecated: former names, which are still read.
     title: the name in words. words: choice -> what people call it, where that is another word. basic: whether
     it is for everybody; the others are for those who look for them.
     """
@@ -62,9 +73,34 @@ class Parameter:
     group: str
     when: tuple[Condition, ...]
     key: str
+    short: str
+    obstacle: Obstacle | None
     deprecated: tuple[str, ...]
     words: Mapping[str, str]
     basic: bool
+
+    @property
+    def states(self) -> tuple[Any, ...]:
+        """The values of a switch, (on, off); empty for a parameter that is no switch."""
+        if self.type is bool:
+            return True, False
+        return self.choices if len(self.choices) == 2 else ()
+
+    @property
+    def switch_title(self) -> str:
+        """The title of a switch, which says what it does while it is on."""
+        if self.type is bool:
+            return self.title
+        return f"{self.title} {self.words.get(self.choices[0], self.choices[0])}"
+
+    def is_on(self, values: object) -> bool:
+        """Whether a switch is on, in an instance of the declaration."""
+        return getattr(values, self.name) == self.states[0]
+
+    def switched(self, values: T) -> T:
+        """An instance of the declaration with this switch in its other state."""
+        other = self.states[self.is_on(values)]
+        return dataclasses.replace(values, **{self.name: other})  # type: ignore[type-var]
 
     def matters(self, values: object) -> bool:
         """Whether its value matters beside the other values of the same declaration."""
@@ -114,6 +150,8 @@ class Declared(TypedDict, total=False):
     when: Mapping[str, tuple[Any, ...]] | None
     unless: Mapping[str, tuple[Any, ...]] | None
     key: str
+    short: str
+    obstacle: Obstacle | None
     deprecated: tuple[str, ...]
     title: str
     words: Mapping[str, str]
@@ -122,7 +160,7 @@ class Declared(TypedDict, total=False):
 
 _DEFAULTS: dict[str, Any] = {
     "low": None, "high": None, "choices": (), "sweep": (), "affects": "draw", "unit": "", "group": "",
-    "key": "", "deprecated": (), "title": "", "words": {}, "basic": False,
+    "key": "", "short": "", "obstacle": None, "deprecated": (), "title": "", "words": {}, "basic": False,
 }  # fmt: skip
 
 
@@ -176,10 +214,8 @@ def _described(cls: Hashable) -> tuple[Parameter, ...]:
 def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
     """The mistake in a declaration, empty where there is none. by_name: all of the dataclass."""
     others = {name: other for name, other in by_name.items() if name != parameter.name}
-    if parameter.key and parameter.type is not bool:
-        return "has a keyboard shortcut, but only an on/off parameter can have one"
-    if parameter.key and parameter.key in (other.key for other in others.values()):
-        return f"has the key '{parameter.key}', which another parameter also has"
+    if problem := _problem_of_switch(parameter, others):
+        return problem
     for old in parameter.deprecated:
         if old in by_name or any(old in other.deprecated for other in others.values()):
             return f"has the former name '{old}', which is also a name or former name of another parameter"
@@ -202,15 +238,28 @@ def _problem(parameter: Parameter, by_name: Mapping[str, Parameter]) -> str:
     return ""
 
 
+def _problem_of_switch(parameter: Parameter, others: Mapping[str, Parameter]) -> str:
+    """The mistake in what a declaration says of a switch, empty where there is none."""
+    if parameter.key and not parameter.states:
+        return "has a keyboard shortcut, but only a parameter with two values can have one"
+    if parameter.key and parameter.key in (other.key for other in others.values()):
+        return f"has the key '{parameter.key}', which another parameter also has"
+    if parameter.short and not parameter.key:
+        return "has a place on the toolbar, but only a parameter with a keyboard shortcut can have one"
+    obstacle = parameter.obstacle
+    if obstacle and (obstacle.switch not in others or not others[obstacle.switch].key):
+        return f"names '{obstacle.switch}' as an obstacle, which is not a switch with a key"
+    return ""
+
+
 def in_words(name: str) -> str:
     """An identifier as the panel has it."""
     return name.replace("_", " ").capitalize()
 
 
-def switches(values: object) -> dict[str, bool]:
+def switches(values: object) -> dict[str, Parameter]:
     """The parameters that a key switches on and off, by name, where they matter beside the others."""
-    declared = [p for p in describe(type(values)) if p.key and p.matters(values)]
-    return {p.name: getattr(values, p.name) for p in declared}
+    return {p.name: p for p in describe(type(values)) if p.key and p.matters(values)}
 
 
 def parse(cls: type[T], values: Mapping[str, object], kind: str = "parameter") -> T:

@@ -181,7 +181,7 @@ def shown(app: App) -> dict[str, Any]:
         "unit": app.playback.unit,
         "words": app.view.words_over(),
         "renderer": backends()[app.rendering.backend].title if app.rendering.backend else None,
-        "renderer_named": app.naming.shown,
+        "caption": app.switching.caption,
         "shown_notes": [note.text for note in app.notices.shown(time.monotonic())],
         "latest_note": app.notices.latest,
         "loading": app.loading.awaited and app.loading.awaited.words,

@@ -8,7 +8,7 @@ import pytest
 
 from viewer.app.keys import chord
 from viewer.app.menus import Commands
-from viewer.app.scene.rendering import switch_commands
+from viewer.app.scene.switching import switch_commands
 from viewer.backends import Backend, backends
 from viewer.errors import InputError
 from viewer.params import param
@@ -33,9 +33,23 @@ class Laplacian:
 
 
 def test_a_key_switches_what_declares_it_while_it_matters() -> None:
-    assert switches_of(Pyramid(level_2=True)) == {"fill": True, "level_1": False, "level_2": True}
-    assert switches_of(Pyramid(fill=False)) == {"fill": False}
-    assert switches_of(Laplacian()) == {"level_2": True}
+    def states(values: object) -> dict[str, bool]:
+        return {name: one.is_on(values) for name, one in switches_of(values).items()}
+
+    assert states(Pyramid(level_2=True)) == {"fill": True, "level_1": False, "level_2": True}
+    assert states(Pyramid(fill=False)) == {"fill": False}
+    assert states(Laplacian()) == {"level_2": True}
+
+
+def test_a_choice_of_two_is_a_switch_that_is_on_with_the_first() -> None:
+    @dataclass(frozen=True)
+    class Samples:
+        shape: str = param("faces", "Shapes", choices=("dots", "faces"), title="Draw samples as", key="Q")
+
+    (switch,) = switches_of(Samples()).values()
+    assert (switch.switch_title, switch.is_on(Samples())) == ("Draw samples as dots", False)
+    assert switch.switched(Samples()) == Samples("dots")
+    assert switch.switched(Samples("dots")) == Samples()
 
 
 def test_each_switch_is_one_command_whichever_backend_draws() -> None:

@@ -126,7 +126,8 @@ def difference(one: NDArray[np.uint8], other: NDArray[np.uint8]) -> int:
 
 
 def shown(app: RunningApp) -> NDArray[np.uint8]:
-    """The 3D view on the screen."""
+    """The 3D view on the screen, once no caption lies over it."""
+    app.see(caption=None)
     left, top, width, height = app.view()
     return app.screen.picture()[top : top + height, left : left + width]
 
@@ -150,7 +151,6 @@ def assert_true_picture(app: RunningApp) -> Screenshot:
     app.settle()
     shot = Screenshot(app)
     app.send_notes_away()
-    app.see(renderer_named=None)  # the name of a renderer lies over the view for a moment
     app.settle()
     assert difference(bare(shown(app)), bare(shot.pixels)) <= 1
     assert difference(shot.drawn_headless(), shot.pixels) <= 1

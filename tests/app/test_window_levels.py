@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import test_window
 from numpy.typing import NDArray
 from PIL import Image
 from scenes import sphere_mesh
-from test_window import replayed, shown
+from test_window import replayed
 from virtual_screen import PANEL, RunningApp, Screen, State, running_app
 
 from viewer.document.recording import Recording
@@ -25,6 +26,12 @@ from viewer.simulate.scanner import Faults, capture, rig
 FRAMES = 6
 KEYS = (*((str(level), f"level_{level}") for level in range(5)), ("h", "fill"), ("shift+h", "hide"))
 HOLE = np.array([0.1, 0.5, np.sqrt(0.74)])  # on the ball
+
+
+def shown(app: RunningApp) -> NDArray[np.uint8]:
+    """The 3D view on the screen, without messages."""
+    app.send_notes_away()
+    return test_window.shown(app)
 
 
 def head_with_a_hand(frame: int) -> Mesh:
@@ -85,7 +92,6 @@ def test_a_key_paints_holes_whatever_draws(app: RunningApp) -> None:
     for name in ("points", "surfels"):
         while app.state.backend != name:
             app.press("b")
-        app.see(renderer_named=None)
         before = shown(app).copy()
         app.press("g")
         assert app.state.document["look"]["holes"]
@@ -209,3 +215,59 @@ def test_keys_pressed_while_it_plays_are_recorded_and_replayed_to_the_same_bytes
         np.testing.assert_array_equal(one, other)
     with Image.open(picture) as file:
         np.testing.assert_array_equal(np.asarray(file), once[-1])
+
+
+@pytest.fixture
+def polygons(app: RunningApp) -> Iterator[RunningApp]:
+    """The default renderer of range views as it comes; its switches are on again afterwards."""
+    draw_pyramids(app, "polygons")
+    yield app
+    for name in ("fill", *(f"level_{level}" for level in range(5))):
+        if not params(app.settle()).get(name, True):
+            app.act("toolbar", ("item_click", f"###switch_{name}"))
+
+
+@pytest.mark.slow
+def test_a_key_that_shows_nothing_says_why_and_offers_what_does(polygons: RunningApp) -> None:
+    app = polygons
+    app.screen.do("key", "4")
+    assert app.see(lambda state: state.caption).caption == "Level 4: off"
+    offer = app.told("Level 4: off. The picture did not change: polygons connect the samples")[0]
+    assert any(note.startswith(offer) for note in app.settle().shown_notes)
+    app.act("problems", ("item_click", "###Draw samples as points (Shift+P)"))
+    assert params(app.settle())["primitive"] == "points"
+    assert not app.state.shown_notes
+    app.see(caption="Draw samples as points: on")
+    app.press("4", "shift+p")
+    assert params(app.state)["primitive"] == "polygons"
+    assert params(app.state)["level_4"] is True
+    app.screen.do("key", "2", "key", "shift+p")  # the key that the message names
+    assert params(app.settle())["primitive"] == "points"
+    assert not app.state.shown_notes
+    app.press("2")
+    assert not any("did not change" in note for note in app.state.shown_notes)
+
+
+@pytest.mark.slow
+def test_the_toolbar_has_the_switches_of_range_views(polygons: RunningApp) -> None:
+    app = polygons
+    for name in (*(f"level_{level}" for level in range(5)), "fill"):
+        app.act("toolbar", ("item_click", f"###switch_{name}"))
+        assert params(app.settle())[name] is False
+    app.act("toolbar", ("item_click", "###switch_fill"))
+    assert params(app.settle())["fill"] is True
+
+
+@pytest.mark.slow
+def test_a_key_that_cannot_switch_says_why(polygons: RunningApp) -> None:
+    app = polygons
+    app.press("h", "2")
+    app.told("'Level 2' has no effect with this value of 'Fill holes'. Press H to change it")
+    assert params(app.state).get("level_2", True) is True
+    app.press("h")
+    while app.state.backend != "points":
+        app.press("b")
+    app.press("1")
+    app.told(r"The renderer 'Points' has no switch 'Level 1'. Choose the renderer 'Filled surface'")
+    while app.state.backend != "pyramidal":
+        app.press("b")

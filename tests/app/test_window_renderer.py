@@ -37,10 +37,10 @@ def test_a_renderer_is_chosen_for_one_scan_unless_the_user_says_for_all(
     with running_app(screen, tmp_path / "first", smooth, bare, third, home=home) as app:
         assert app.settle().backend == "surfels"
         screen.do("key", "b")
-        named = app.see(lambda state: state.renderer_named)
-        app.see(renderer_named=None)
+        named = app.see(lambda state: state.caption)
+        app.see(caption=None)
         assert app.settle().backend != "surfels"
-        assert named.renderer_named == app.state.renderer
+        assert named.caption == app.state.renderer
         drawn_by = [one for one in backends().values() if one.draws(Pose(0, 0.0, "ball", ball))]
         points = next(number for number, one in enumerate(drawn_by) if one.name == "points")
         app.act("toolbar", ("item_click", "###menu of backend"), ("item_click", f"//$FOCUSED/###{points}"))

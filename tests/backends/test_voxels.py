@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -19,12 +21,19 @@ from viewer.backends import backend
 from viewer.backends.voxels import Params, cuts
 from viewer.bench.scenes.catalog import subject
 from viewer.camera import Camera
-from viewer.drawing.frame import render_frame
+from viewer.drawing.frame import draw_plan, render_frame
+from viewer.drawing.plan import Effort, Ready, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.look import Look
 from viewer.mesh.reference import trace
 from viewer.picture.surface import Surface
+from viewer.scan import formats
+from viewer.scan.octree import Octree
+from viewer.scan.octree.build import Stop
+from viewer.scan.octree.storage import from_bytes
+from viewer.scan.octree.stored import octree_of
+from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.spacing import typical_spacing
@@ -352,11 +361,14 @@ def test_a_budget_gives_coarser_pictures_that_get_finer_and_never_open(renderer:
     render_frame(renderer, request, surface)  # prepared
     seen, whole = surface.row != NOTHING, surface.depth.copy()
     turned = replace(request, camera=Camera.orbit(cloud.bounds(), 40, 20, aspect=4 / 3))
+    first = Surface(renderer.gpu, (640, 480))
     refinable, drawn, depths = True, [], []
     while refinable:
-        refinable = render_frame(renderer, turned, surface, wait=False)
-        drawn.append(len(surface.pose.cloud))
-        depths.append(surface.depth.copy())
+        refinable = draw_plan(ready(renderer, turned), first, budget_ms=0)
+        drawn.append(len(first.pose.cloud))
+        if first.stats.coarseness < 0.1:  # before, few discs stand for all of the ball
+            depths.append(first.depth.copy())
+    assert len(depths) > 3
     assert drawn == sorted(drawn)
     finest = depths[-1]
     for depth in depths:
@@ -366,6 +378,88 @@ def test_a_budget_gives_coarser_pictures_that_get_finer_and_never_open(renderer:
     render_frame(renderer, again, surface)
     np.testing.assert_array_equal(surface.depth, whole)
     np.testing.assert_array_equal(surface.row != NOTHING, seen)
+
+
+def ready(renderer: Renderer, request: Request) -> Ready:
+    plan = make_plan(renderer, request, (640, 480), Effort.WAIT)
+    assert isinstance(plan, Ready)
+    return plan
+
+
+@pytest.mark.parametrize("on_gpu", [False, True])
+@pytest.mark.parametrize("change", ["pose", "camera", "preview"])
+def test_no_unfinished_cut_is_coarser_than_the_picture_before(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch, change: str, on_gpu: bool
+) -> None:
+    """With no time at all, a new pose would begin with the root: one disc as large as the picture."""
+    monkeypatch.setattr(cuts, "ON_SOFTWARE", on_gpu)
+    camera = Camera.orbit(CLOUD.bounds(), 30, 20, aspect=4 / 3)
+    request = Request(Pose(0, 0.0, "a", CLOUD), camera, "voxels", Params(pixel_threshold=0.25))
+    surface, small = Surface(renderer.gpu, (640, 480)), Surface(renderer.gpu, (320, 240))
+    draw_plan(ready(renderer, request), surface, budget_ms=0)
+    coarse = surface.stats.coarseness
+    assert coarse > 0.2, "the first picture ever may be coarse"
+    while draw_plan(ready(renderer, request), surface, budget_ms=0):
+        assert surface.stats.coarseness <= coarse
+        coarse = surface.stats.coarseness
+    whole = surface.pose.cloud.radii.max()  # type: ignore[union-attr]
+    turned = replace(camera, eye=tuple(np.add(camera.eye, 0.1)))
+    changed = {
+        "pose": replace(request, pose=Pose(1, 1.0, "b", CLOUD.displaced(np.full((len(CLOUD), 3), 0.01)))),
+        "camera": replace(request, camera=turned),
+        "preview": replace(request, camera=turned),
+    }[change]
+    target = small if change == "preview" else surface
+    draw_plan(ready(renderer, changed), target, budget_ms=0, before=surface)
+    assert target.stats.coarseness == 0
+    assert target.pose.cloud.radii.max() <= 1.1 * whole  # type: ignore[union-attr]
+
+
+def test_a_stored_octree_is_drawn_as_stored(renderer: Renderer, tmp_path: Path) -> None:
+    cloud = PointCloud.from_arrays(
+        np.concatenate([CLOUD.world(), [[500.0, 0, 0]]]),
+        normals=np.concatenate([CLOUD.normals, [[0, 0, 1]]]),  # type: ignore[list-item]
+    )
+    stop = Stop("depth", depth=4)
+    formats.write_poses(tmp_path / "a.svo", iter([Pose(0, 0.0, "a", cloud)]), "mm", stop=stop)
+    pose = open_scan(tmp_path / "a.svo").pose(0)
+    stored = cast(Octree, backend("voxels").derive(pose, Params(), None))
+    raw = from_bytes((tmp_path / "a.svo").read_bytes())
+    for level, masks in enumerate(raw.masks):
+        np.testing.assert_array_equal(stored.masks[level], masks)
+        np.testing.assert_array_equal(stored.attributes[level].normals, raw.attributes[level].normals)
+    assert stored.leaves + 1 == len(pose.cloud)
+    assert stored.depth == 4
+    assert stored.loss > 0.05, "coarser than Scan4D would build it"
+    again = cast(Octree, backend("voxels").derive(pose, Params(stop="delta"), None))
+    assert again.counts.sum() != stored.counts.sum()
+    deepest = stored.attributes[-1].rows
+    np.testing.assert_allclose(
+        pose.cloud.world(deepest), stored.centers(stored.depth), atol=1e-4 * stored.size(stored.depth)
+    )
+    for level, masks in enumerate(stored.masks):
+        children = np.repeat(np.arange(len(masks)), np.bitwise_count(masks))
+        lowest = np.full(len(masks), NOTHING, np.uint32)
+        np.minimum.at(lowest, children, stored.attributes[level + 1].rows)
+        inner = masks > 0
+        np.testing.assert_array_equal(stored.attributes[level].rows[inner], lowest[inner])
+    surface = Surface(renderer.gpu, SIZE)
+    request = Request(pose, Camera.orbit(pose.bounds, 30, 20, aspect=4 / 3), "voxels", Params())
+    render_frame(renderer, request, surface)
+    assert np.isfinite(surface.depth).mean() > 0.1
+
+
+def test_moved_points_have_no_stored_octree(tmp_path: Path) -> None:
+    formats.write_poses(tmp_path / "a.svo", iter([Pose(0, 0.0, "a", CLOUD)]), "mm")
+    cloud = open_scan(tmp_path / "a.svo").pose(0).cloud
+    assert octree_of(cloud) is not None
+    assert octree_of(replace(cloud, colors=None)) is not None
+    for other in (cloud.moved(np.ones(3)), cloud.displaced(np.ones(3)), cloud.of_rows(np.arange(9))):
+        assert octree_of(other) is None
+    turned = octree_of(replace(cloud, normals=-cloud.normals))
+    assert turned is not None
+    np.testing.assert_allclose(turned.attributes[-1].normals, -cloud.normals, atol=1e-6)
+    np.testing.assert_allclose(np.linalg.norm(turned.attributes[3].normals, axis=1), 1, atol=1e-6)
 
 
 @pytest.mark.parametrize("level", [4, 5, 6, 7])

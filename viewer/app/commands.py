@@ -13,15 +13,20 @@ def _always(*_: Any) -> bool:
     return True
 
 
+def _nothing(*_: Any) -> str:
+    return ""
+
+
 @dataclass(frozen=True)
 class Command:
     """Something to do. Its functions take the part or the tool that declares it; `menus.Commands` binds them.
 
     name: in the file of keys. title: in menus. key: its default keys, such as "Ctrl+1", several with a space
     between; empty: none. when: the name of a condition of the window that must hold. can: whether it can be
-    done now beyond that. repeats: again and again while the keys are held. is_on: whether to tick it, None
-    for what is not on or off. short: on the toolbar. icon: beside that. title_now: what the menu says where
-    that changes.
+    done now beyond that. why_not: why it cannot be done, for a user who presses its keys; empty: nothing to
+    say. is_there: whether the toolbar shows it. repeats: again and again while the keys are held. is_on:
+    whether to tick it, None for what is not on or off. short: on the toolbar. icon: beside that. title_now:
+    what the menu says where that changes.
     """
 
     name: str
@@ -32,6 +37,8 @@ class Command:
     repeats: bool = False
     is_on: Callable[..., bool] | None = None
     can: Callable[..., bool] = _always
+    why_not: Callable[..., str] = _nothing
+    is_there: Callable[..., bool] = _always
     short: str = ""
     icon: str = ""
     title_now: Callable[..., str] | None = None

@@ -97,7 +97,7 @@ class MenuBar(WindowPart):
     def draw_toolbar(self) -> None:
         """Declare the toolbar in the current ImGui window: icons and words, icons alone in the last groups
         where there is no room for both, and what has no room at all in a list at its end."""
-        groups = self.commands.toolbar
+        groups = self._shown_groups()
         left, room = [item for group in groups for item in group], imgui.get_content_region_avail().x
         worded = next((count for count in range(len(groups), 0, -1) if self._width(groups, count) <= room), 0)
         more = widgets.button_width(_MORE) + imgui.get_style().item_spacing.x
@@ -117,6 +117,15 @@ class MenuBar(WindowPart):
                 else:
                     self._draw_button(self.commands.of[item], text)
                 imgui.same_line()
+
+    def _shown_groups(self) -> Toolbar:
+        """The groups of the toolbar, without what is not there now."""
+
+        def is_there(item: str | Menu) -> bool:
+            return isinstance(item, Menu) or self.commands.of[item].is_there()
+
+        shown = (tuple(filter(is_there, group)) for group in self.commands.toolbar)
+        return tuple(filter(None, shown))
 
     def _draw_more(self, items: Sequence[str | Menu]) -> None:
         """A button that opens what had no room."""

@@ -60,7 +60,7 @@ _TOOLBAR_BEGIN: Toolbar = (
         replace(_RENDERER, icon=icons.ICON_FA_CUBE),
     ),
 )
-_TOOLBAR_END: Toolbar = (("screenshot", "export", "record"), ("undo", "redo"))
+_TOOLBAR_END: Toolbar = (("switch_*",), ("screenshot", "export", "record"), ("undo", "redo"))
 _MOUSE = (
     ("Left drag", "Orbit"),
     ("Middle drag, Shift+left drag", "Pan"),
@@ -92,14 +92,22 @@ class Commands:
         """Put the entries where their names stand."""
         self.menus = tuple(map(self._expanded, self._table))
         bar = (*_TOOLBAR_BEGIN, *self._toolbar_of_tools, *_TOOLBAR_END)
-        self.toolbar: Toolbar = tuple(
-            tuple(self._expanded(one) if isinstance(one, Menu) else one for one in group) for group in bar
-        )
+        self.toolbar: Toolbar = tuple(tuple(self._of_toolbar(group)) for group in bar)
         of = [command for menu in self.menus for command in menu.commands()]
         # Those of backends come last: they have those keys that are left.
         added = {name: number for number, name in enumerate(self.tool_of)}  # of two tools the first has a key
         of.sort(key=lambda one: (added.get(one.name, -1), one.name.startswith("switch_")))
         self.of: Mapping[str, Command] = {command.name: command for command in of}
+
+    def _of_toolbar(self, group: Sequence[str | Menu]) -> Iterator[str | Menu]:
+        """A group of the toolbar, with all short commands in place of a name that ends with a star."""
+        for one in group:
+            if isinstance(one, Menu):
+                yield self._expanded(one)
+            elif one.endswith("*"):
+                yield from (of.name for of in self._found(one) if isinstance(of, Command) and of.short)
+            else:
+                yield one
 
     def _expanded(self, menu: Menu) -> Menu:
         """A menu with entries for names. Raises KeyError where nobody declares one."""

@@ -85,7 +85,7 @@ class Notices(WindowPart):
     layer = 20
     OFFERS = {
         "note": "tell", "note_of_scan": "tell_of_scan", "note_of_work": "tell_of_work",
-        "note_of_opening": "tell_of_opening", "tell_later": "tell_later",
+        "note_of_opening": "tell_of_opening", "tell_later": "tell_later", "end_offers": "end_offers",
     }  # fmt: skip
 
     def __init__(self) -> None:
@@ -144,6 +144,14 @@ class Notices(WindowPart):
     def end(self, of: str) -> None:
         """Show no longer what was about something that is over: the scan that was open, or an opening."""
         self.all = [self._gone(notice) if notice.of == of else notice for notice in self.all]
+
+    def end_offers(self, about: str) -> None:
+        """Show no longer what was offered about something."""
+
+        def is_over(notice: Notice) -> bool:
+            return notice.offer is not None and notice.offer.about == about
+
+        self.all = [self._gone(notice) if is_over(notice) else notice for notice in self.all]
 
     @property
     def latest(self) -> str:

@@ -4,8 +4,8 @@ A part is a dataclass. Its fields without a default name what it needs: another 
 brings (the window, the renderer, …), or a request that another part offers. Each has the type that it says.
 
     @dataclass(eq=False)
-    class Naming(WindowPart):
-        name = "naming"
+    class Switching(WindowPart):
+        name = "switching"
         rendering: Rendering
         note: Callable[[str], None]  # a request: `Notices` answers it
 

@@ -83,6 +83,8 @@ class Shortcuts(WindowPart):
                 if command.can():
                     self._used = imgui.Key(pressed & ~MODIFIER_BITS)
                     command.act()
+                elif why := command.why_not():
+                    self.note(why)
 
     def _arrows_of_tool(self) -> set[int]:
         """The arrow keys that were pressed since the last frame and that a tool has taken, as chords."""

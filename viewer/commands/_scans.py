@@ -29,7 +29,10 @@ from ._console import progress, warn
 
 _FRAMED = 5  # poses that a camera is fitted to
 _TRIED = 100  # poses that are tried where one that can be read is looked for
-SCAN_HELP = "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'frame*.ply', or demo"
+SCAN_HELP = (
+    "a file, a folder, a numbered pattern such as 'frame%%04d.ply' or 'frame*.ply', or demo; an octree file "
+    "(.svo) also by its address (http, https), or - for standard input"
+)
 
 
 def add_pose_arguments(parser: ArgumentParser) -> None:

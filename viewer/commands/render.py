@@ -37,6 +37,7 @@ from ..scan.timeline import Timeline
 from ..scan.upright import Upright
 from . import _arguments as arguments
 from . import _drawing as drawing
+from . import _levels as levels
 from . import _replay as replay
 from . import _stats as stats
 from . import _without_gl as without_gl
@@ -83,6 +84,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--backend", metavar="NAME", help="renderer; default auto: the renderer that suits the scan"
     )
     add_goal_arguments(picture)
+    picture.add_argument(
+        "--levels", action="store_true",
+        help="write a picture of each level of an octree file as it arrives, with --backend voxels",
+    )  # fmt: skip
     picture.add_argument("--no-gl", action="store_true", help="draw without OpenGL, with --backend codeword")
     picture.add_argument(
         "--behind",
@@ -145,6 +150,8 @@ def run(args: Namespace) -> int:
     """Draw what is asked for; broken frames among several are left out."""
     if without_gl.is_asked(args):
         return without_gl.run(args)
+    if args.levels:
+        return levels.run(args, args.size or _SIZE)
     if args.behind:
         raise InputError(
             "applies only to pictures that Scan4D draws without OpenGL", "--behind", "Add --no-gl"

@@ -81,6 +81,8 @@ def draw_plan(
     pose.center(view.origin)
     asked = getattr(params, "share", None) or 1.0
     goes_on = _before(ready, before) if moving and asked == 1 else None
+    last = before or surface
+    coarsest = last.stats.coarseness if last.drawn else math.inf
     surface.start(pose, view, request.look, request.layers, backend.values, request.needs)
     stats = surface.stats
     stats.backend, stats.asked = backend.name, asked
@@ -88,7 +90,9 @@ def draw_plan(
         stats.skipped[planned.request.backend.name] = "Scan4D is still preparing data for this picture"
     drawn = {**_drawn(ready), "camera": view.key, "size": surface.size, "values": surface.values_key}
     changed = surface.take_changes(drawn)
-    frame = FrameView(view, params, ready.derived, share * asked, budget_ms, changed, moving, goes_on)
+    frame = FrameView(
+        view, params, ready.derived, share * asked, budget_ms, changed, moving, goes_on, coarsest
+    )
     refinable = backend.draw(pose, frame, surface)
     surface.drawn = drawn
     is_stand_in = planned is not ready

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -30,6 +31,8 @@ class FrameView:
     `Surface.resolve`. moving: whether other pictures follow at once. A backend that then draws something
     simpler sets `surface.stats.simplified`; it is called again at rest. before: the last picture of this pose
     with these parameters; a moving picture of a share may draw its points again (splatting/kept.py).
+    coarsest: the `Stats.coarseness` of the picture before, of whatever pose; infinite if there is none. A
+    backend does not draw an unfinished picture that is coarser.
     """
 
     view: View
@@ -40,3 +43,4 @@ class FrameView:
     changed: frozenset[str] = frozenset(CHANGES)
     moving: bool = False
     before: Before | None = None
+    coarsest: float = math.inf

@@ -22,7 +22,8 @@ class Stats:
     has once it is refined, less than 1 on a coarser level of detail. known: of all points, how many it or
     the pictures went through whose points it draws again (see `FrameView.before`). left_out: the points
     that are in `asked` and not in `share`. simplified: whether it is drawn more simply than a picture at
-    rest would be, as `FrameView.moving` allows; the window draws it anew then.
+    rest would be, as `FrameView.moving` allows; the window draws it anew then. coarseness: the largest size,
+    as a share of the picture's height, of what a later call replaces by finer parts; 0: nothing.
     """
 
     backend: str = ""
@@ -44,6 +45,7 @@ class Stats:
     left_out: int = 0
     simplified: bool = False
     samples: int = 1
+    coarseness: float = 0.0
 
     @property
     def is_sample(self) -> bool:

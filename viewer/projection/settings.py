@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..gpu.pyramid import BINOMIAL, BOX, GAUSSIAN, NEAREST, Filter
-from ..params import param
+from ..params import Obstacle, param
 from .spreading import FUNCTIONS, KERNELS
 from .targets import LEVELS
 from .views import MODES
 
 _FILTERS = {"box": BOX, "gaussian": GAUSSIAN, "binomial": BINOMIAL, "nearest": NEAREST}
 _FILLING = {"fill": (True,)}
+_JOINED = Obstacle("primitive", "polygons connect the samples and leave few holes to fill")
 _LEVELS, _HIDDEN, _VIEWS, _SMOOTHING = "Levels", "Hidden points", "Range images", "Anti-aliasing"
 
 
@@ -26,13 +27,17 @@ class ProjectionParams:
         group=_LEVELS,
         sweep=(True, False),
         title="Fill holes",
+        short="Fill",
+        obstacle=_JOINED,
         basic=True,
     )
-    level_0: bool = param(True, "Show the measured samples", key="0", group=_LEVELS)
+    level_0: bool = param(True, "Show the measured samples", key="0", short="0", group=_LEVELS)
     level_1: bool = param(
         True,
         "Fill holes with values from the picture at 1/2 of its width and height",
         key="1",
+        short="1",
+        obstacle=_JOINED,
         group=_LEVELS,
         when=_FILLING,
     )
@@ -40,6 +45,8 @@ class ProjectionParams:
         True,
         "Fill holes with values from the picture at 1/4 of its width and height",
         key="2",
+        short="2",
+        obstacle=_JOINED,
         group=_LEVELS,
         when=_FILLING,
     )
@@ -47,6 +54,8 @@ class ProjectionParams:
         True,
         "Fill holes with values from the picture at 1/8 of its width and height",
         key="3",
+        short="3",
+        obstacle=_JOINED,
         group=_LEVELS,
         when=_FILLING,
     )
@@ -54,6 +63,8 @@ class ProjectionParams:
         True,
         "Fill holes with values from the picture at 1/16 of its width and height",
         key="4",
+        short="4",
+        obstacle=_JOINED,
         group=_LEVELS,
         when=_FILLING,
     )
@@ -104,6 +115,7 @@ class ProjectionParams:
         "Hide samples that show through holes of a nearer surface. Polygons always hide these samples",
         key="Shift+H",
         title="Hide what lies behind",
+        obstacle=Obstacle("primitive", "polygons already hide what lies behind them"),
         basic=True,
         group=_HIDDEN,
         sweep=(True, False),
@@ -134,6 +146,9 @@ class ProjectionParams:
         "polygons",
         "Shapes that Scan4D draws for samples of range images",
         choices=("points", "polygons"),
+        title="Draw samples as",
+        key="Shift+P",
+        short="Points",
         group=_VIEWS,
         sweep=("points", "polygons"),
     )

@@ -16,7 +16,7 @@ from typing import Literal
 from ..errors import InputError
 from ..files import absolute
 from . import formats
-from .open import entries, find_source, folder_frames, is_demo, matches, scan_frames
+from .open import entries, find_source, folder_frames, is_arriving, is_demo, matches, scan_frames
 from .range_folders import find_range_frames
 from .reading.frames import is_no_scan
 from .reading.names import frame_counts
@@ -49,7 +49,8 @@ class Listed:
 def is_there(scan: str) -> bool:
     """Whether a scan can be opened, by its name alone; of a pattern, the folder must exist."""
     is_pattern = "%" in scan or glob.has_magic(scan)
-    return is_demo(scan) or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
+    is_named = is_demo(scan) or is_arriving(scan)
+    return is_named or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
 
 
 def list_folder(folder: Path | str) -> list[Listed]:

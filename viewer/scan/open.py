@@ -46,6 +46,11 @@ def is_demo(scan: str | None) -> bool:
     return scan is not None and (scan == DEMO or scan.startswith(f"{DEMO}:"))
 
 
+def is_arriving(scan: str) -> bool:
+    """Whether a name of a scan is an address of a server, or "-", standard input."""
+    return scan == "-" or scan.lower().startswith(("http://", "https://"))
+
+
 def open_scan(
     path: str | os.PathLike[str],
     unit: str | None = None,
@@ -56,7 +61,8 @@ def open_scan(
     """Open a scan without reading any frame.
 
     path: a file, a folder of frames, a pattern such as "frame%04d.ply" or "frame*.ply", or "demo", of which
-    "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed. unit: the
+    "demo:smile", "demo:sway" and "demo:cough" are variants, and "demo:smile:3" one of another seed; the
+    address of an octree file on a server (http, https), or "-" for one on standard input. unit: the
     name of its unit of length, for example "mm"; None: what the scan states, else "units". fps: frame numbers
     a second, where no times.csv states the times. Without it the times stored in the file count, and without
     those 25 a second. read: corrections of how Scan4D reads it, key -> text, as `--read` takes them. take:
@@ -167,6 +173,10 @@ def find_source(path: str | os.PathLike[str], corrections: Corrections = NOTHING
     """Find where the frames of the scan named `path` come from. Raises InputError."""
     decided = Decided(corrections)
     path = os.fspath(path)
+    if is_arriving(path):
+        from .octree.arriving import ArrivingOctrees
+
+        return ArrivingOctrees(path)
     if is_demo(path):
         from .demo import DemoSource
 

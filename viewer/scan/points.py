@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Concatenate, Literal, ParamSpec, TypedDict, TypeVar, Unpack, get_args
+from typing import Any, Concatenate, Literal, ParamSpec, Protocol, TypedDict, TypeVar, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,6 +47,14 @@ class CloudAttributes(TypedDict, total=False):
     scalars: Mapping[str, ArrayLike] | None
 
 
+class Held(Protocol):
+    """Data that a cloud holds for others."""
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it holds."""
+
+
 @dataclass(frozen=True, eq=False)
 class PointCloud:
     """N points of one moment. Make one with `from_arrays`, which guards the door.
@@ -72,6 +80,7 @@ class PointCloud:
     viewpoint: (3,) float64, where the scanner stood that saw all points, absolute, scan units; None where the
                scan does not tell, or several did
     orientation: on which side normals point that Scan4D estimates, see `cloud_normals`
+    octree:    that a file stores of these points, see `scan.octree.stored`; None where it stores none
     """
 
     positions: NDArray[np.float32]
@@ -89,6 +98,7 @@ class PointCloud:
     remainders: NDArray[np.float32] | None = None
     viewpoint: NDArray[np.float64] | None = None
     orientation: Orientation = "auto"
+    octree: Held | None = None
     _facts: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -176,7 +186,8 @@ class PointCloud:
     @property
     def nbytes(self) -> int:
         """Bytes held by all arrays."""
-        return sum(values.nbytes for values in self._named_arrays().values())
+        held = 0 if self.octree is None else self.octree.nbytes
+        return held + sum(values.nbytes for values in self._named_arrays().values())
 
     def bytes_beside(self, other: PointCloud) -> int:
         """Bytes held by the arrays that another cloud does not hold too."""

@@ -30,7 +30,9 @@ FACES_FILE = "mesh_topology.ply"  # beside the frames or their folder: the faces
 class FrameSource(Protocol):
     """A source of frames for a Timeline. Nothing is read before `load`, which several threads may call.
 
-    It may have an attribute `decided`, the decisions about how Scan4D reads it.
+    It may have an attribute `decided`, the decisions about how Scan4D reads it, and a method
+    `coarser(index)`, which gives coarser clouds of a frame while it is being read, each finer than the one
+    before.
     """
 
     @property
@@ -120,6 +122,10 @@ class FileSequence:
         points, topology = self._shared_topology
         return replace(scanned, topology=topology) if len(scanned) + scanned.dropped == points else scanned
 
+    def coarser(self, index: int) -> Iterator[PointCloud]:
+        """Coarser clouds of a frame, see `FrameSource`."""
+        return formats.coarser(self.files[index])(0)
+
     def faces(self, index: int) -> Faces:
         """The frame's own faces; where it has none, those of the file beside the frames."""
         own = formats.read_faces(self.files[index], decided=self.decided.at(index))
@@ -165,6 +171,7 @@ class MultiFrameFile:
         self._path = path
         self._count = count
         self._read = formats.frames(path, self.decided)
+        self.coarser = formats.coarser(path)
         self.decided.other_colors = self._other_colors
 
     @cached_property

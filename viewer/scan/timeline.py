@@ -105,6 +105,7 @@ class Timeline:
         self._playhead, self._direction = 0, 1
         self._ahead: Iterator[int] | None = None  # what is to be read ahead, while there is something
         self._wanted: int | None = None  # what was asked of the worker last,
+        self._coarse: Pose | None = None  # of a frame that is being read
         self._in_use: Pose | None = None  # held here even where it exceeds the cache
         self._last_read: Callable[[], PointCloud | None] = lambda: None
         self._worker: threading.Thread | None = None
@@ -284,10 +285,12 @@ class Timeline:
                 raise self._note_broken(index, error) from None
 
     def ready(self, index: int) -> Pose | None:
-        """The pose that a picture shows if it is in memory, averaged if the timeline averages; else None at
-        once."""
+        """The pose that a picture shows if it is in memory, averaged if the timeline averages; while it is
+        being read, a coarser one where its source gives one; else None at once."""
         with self._state:
             held = self._held(index)
+            if held is None and self._coarse is not None and self._coarse.index == index:
+                return self._coarse
             return held if held is not None and self._is_averaged(held) else None
 
     def request(self, index: int) -> None:
@@ -384,11 +387,31 @@ class Timeline:
                 future = self._begin(index) if held is None else None
                 reading = self._reading = Task(f"Reading {self.source.label(index)}")
             with reading.current():
+                if held is None and not self._averaging.is_on:
+                    self._read_coarser(index)
                 pose = held.raw if held is not None else self._load(index, future, ahead)
                 if pose is not None and self._averaging.is_on:
                     self._average_ahead(pose, ahead)
             self._reading = None
+            if self._coarse is not None and pose is not None and self._coarse.index == pose.index:
+                self._coarse = None
             del future, held, pose  # they hold the pose
+
+    def _read_coarser(self, index: int) -> None:
+        """Hold coarser poses of a frame while it is being read, one after the other. An error is left to
+        reading the frame, which comes upon it too."""
+        clouds = getattr(self.source, "coarser", None)
+        try:
+            for cloud in () if clouds is None else clouds(index):
+                pose = Pose.of(index, float(self.times[index]), self.source.label(index), cloud, self._scan)
+                _find_what_pictures_need(pose)
+                with self._state:
+                    if self._closed:
+                        return
+                    if index == self._wanted:
+                        self._coarse = pose
+        except (InputError, Cancelled, OSError):
+            return
 
     def _next_task(self) -> tuple[int, bool] | None:
         """The frame that the worker reads next, and whether ahead or as requested; None: nothing."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from viewer.scan import formats
 from viewer.scan.octree import file as octree_file
 from viewer.scan.octree.build import Stop
 from viewer.scan.octree.octree import Octree
-from viewer.scan.octree.storage import read_header, to_bytes
+from viewer.scan.octree.storage import Header, Read, read_header, to_bytes
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -105,13 +106,13 @@ def test_threads_read_at_once(scan: Path) -> None:
 
 def test_reading_in_turn_reads_each_octree_once(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[int] = []
-    original = octree_file.from_bytes
+    original = octree_file.read_levels
 
-    def noted(data: bytes, previous: Octree | None) -> Octree:
-        read.append(len(data))
-        return original(data, previous)
+    def noted(header: Header, read_bytes: Read, previous: Octree | None) -> Iterator[Octree]:
+        read.append(header.stored)
+        return original(header, read_bytes, previous)
 
-    monkeypatch.setattr(octree_file, "from_bytes", noted)
+    monkeypatch.setattr(octree_file, "read_levels", noted)
     frames = formats.frames(scan)
     for index in range(COUNT):
         frames(index)
@@ -122,7 +123,7 @@ def test_reading_in_turn_reads_each_octree_once(scan: Path, monkeypatch: pytest.
 
 
 def test_opening_reads_headers_alone(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(octree_file, "from_bytes", lambda *_, **__: pytest.fail("a pose was read"))
+    monkeypatch.setattr(octree_file, "read_levels", lambda *_, **__: pytest.fail("a pose was read"))
     with open_scan(scan) as timeline:
         assert (len(timeline), timeline.unit, timeline.label(3)) == (COUNT, "mm", "ball.svo frame 4")
         assert np.allclose(timeline.times, 0.5 + 0.1 * np.arange(COUNT))

@@ -1,68 +1,27 @@
-"""Which backend draws, how, and in which look; its name over the view after the user has stepped to it."""
+"""Which backend draws, how, and in which look."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from ...backends import Backend, backends
+from ...backends import backends
 from ...choice.goal import Goal
 from ...document.document import Document
-from ...errors import InputError
 from ...look import Look, drawable
-from ...params import Parameter, describe, switches
+from ...params import Parameter, switches
 from ...scan.pose import Pose
 from ...scan.times import frame_in_words
 from ..commands import Command, Item, Listing
-from ..keys import chords
 from ..part import WindowPart
 from ..playing.playback import Playback
 from ..session import Session, edit_name
-from .viewport import Viewport
 
 _UNKNOWN = "Renderer"  # what the toolbar says until a renderer draws
 _LEVEL = "level_"  # begins the names of switches that show levels
-_NAMED_SECONDS = 1.5  # that a name is shown, from the first picture by that renderer
 FIRST_GOAL = Goal("time", 50.0)  # ms
-
-
-def switch_commands(several: Iterable[Backend]) -> tuple[Command, ...]:
-    """Commands that switch the parameters with a key that backends declare; one name has one key in all."""
-    found: dict[str, Command] = {}
-    for one, parameter in ((each, p) for each in several for p in each.parameters if p.key):
-        there = found.setdefault(parameter.name, _switch(one, parameter))
-        if there.key != parameter.key:
-            raise InputError(
-                f"'{parameter.name}' has different keys, {there.key} and {parameter.key}",
-                one.name,
-                "Give this parameter the same key in all backends",
-            )
-    return tuple(found.values())
-
-
-def _switch(one: Backend, parameter: Parameter) -> Command:
-    name = parameter.name
-    try:
-        chords(parameter.key)
-    except InputError as error:
-        raise InputError(error.what, f"{one.name}.{name}, key={parameter.key!r}", error.hint) from error
-    return Command(
-        f"switch_{name}", parameter.title, lambda rendering: rendering.switch(name), parameter.key,
-        is_on=lambda rendering: rendering.switches.get(name, False),
-        can=lambda rendering: name in rendering.switches,
-    )  # fmt: skip
-
-
-def _look_switch(parameter: Parameter) -> Command:
-    """Switches a field of the look."""
-    name = parameter.name
-    return Command(
-        f"look_{name}", parameter.title, lambda rendering: rendering.switch_look(name), parameter.key,
-        is_on=lambda rendering: getattr(rendering.session.document.look, name),
-    )  # fmt: skip
 
 
 @dataclass(eq=False)
@@ -209,15 +168,15 @@ class Rendering(WindowPart):
             self.choose(names[(names.index(self.backend) + by) % len(names)])
 
     @property
-    def _params(self) -> Any:
+    def params(self) -> Any:
         """The backend's parameters; None before the first pose."""
         pose = self.playback.pose
         return None if pose is None else self.session.document.chosen(pose)[1]
 
     def edit_params(self, params: Any) -> None:
         """Draw with other parameters of the backend; edits of one without a pause are one step."""
-        if self.backend is not None and params != self._params:
-            name = edit_name(self._params, params)
+        if self.backend is not None and params != self.params:
+            name = edit_name(self.params, params)
             changed = self.session.document.with_params(self.backend, params)
             if changed.goal is not None:
                 changed = changed.drawn_by(self.backend)
@@ -237,19 +196,23 @@ class Rendering(WindowPart):
         self.edit_look(replace(look, **{name: not getattr(look, name)}))
 
     @property
-    def switches(self) -> dict[str, bool]:
+    def switches(self) -> dict[str, Parameter]:
         """The switches among the backend's parameters, see `params.switches`; none before the first pose."""
-        return {} if self._params is None else switches(self._params)
+        return {} if self.params is None else switches(self.params)
+
+    def is_on(self, name: str) -> bool:
+        """Whether one of `switches` is on; False where the backend does not have it."""
+        return name in self.switches and self.switches[name].is_on(self.params)
 
     @property
     def levels(self) -> dict[int, bool]:
         """Whether the backend shows each level, 0: what was measured; empty where it has no such switches."""
-        switches = self.switches.items()
-        return {int(name[len(_LEVEL) :]): is_on for name, is_on in switches if name.startswith(_LEVEL)}
+        named = (name for name in self.switches if name.startswith(_LEVEL))
+        return {int(name[len(_LEVEL) :]): self.is_on(name) for name in named}
 
     def switch(self, name: str) -> None:
         """Switch one of `switches` on or off."""
-        self.edit_params(replace(self._params, **{name: not self.switches[name]}))
+        self.edit_params(self.switches[name].switched(self.params))
 
     COMMANDS = (
         Listing(
@@ -258,47 +221,5 @@ class Rendering(WindowPart):
         ),
         Command("renderer_for_all", "Use renderer for all scans", toggle_for_all,
             is_on=lambda rendering: rendering.is_for_all),
-        *(_look_switch(parameter) for parameter in describe(Look) if parameter.key),
         Command("reset", "Reset appearance", reset, "Ctrl+R", can=lambda rendering: not rendering.is_default),
-        *switch_commands(backends().values()),
     )  # fmt: skip
-
-
-@dataclass(eq=False)
-class Naming(WindowPart):
-    """Steps to another renderer and shows its name until the user has seen what it draws.
-
-    shown: the name, None where there is none.
-    """
-
-    name = "naming"
-    doing = "Updating the renderer's name"
-    rendering: Rendering
-    viewport: Viewport
-
-    def __post_init__(self) -> None:
-        self._ends = -math.inf  # by the clock; infinite while the first picture is awaited
-        self.shown: str | None = None
-
-    def step(self, by: int) -> None:
-        """Draw with the next renderer, 1, or the one before, -1."""
-        self.rendering.step(by)
-        self._ends = math.inf
-
-    def advance(self, now: float) -> bool:
-        """Look at what is drawn; whether the name to show has changed. now: by the clock."""
-        before, chosen, surface = self.shown, self.rendering.backend, self.viewport.surface
-        drawn = surface.stats.backend if surface is not None and self.viewport.is_there else None
-        if math.isinf(self._ends) and self._ends > now and drawn == chosen:
-            self._ends = now + _NAMED_SECONDS
-        self.shown = backends()[chosen].title if chosen is not None and now < self._ends else None
-        return self.shown != before
-
-    def next_change(self, now: float) -> float:
-        """Seconds until the name goes; infinite where none does by itself."""
-        return self._ends - now if now < self._ends else math.inf
-
-    COMMANDS = (
-        Command("backend", "Next renderer", lambda naming: naming.step(1), "B"),
-        Command("backend_before", "Previous renderer", lambda naming: naming.step(-1), "Shift+B"),
-    )

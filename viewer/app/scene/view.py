@@ -33,8 +33,9 @@ from .full_view import FullView
 from .glide import Glide
 from .legend import ViewMarks
 from .pointed import Pointer
-from .rendering import Naming, Rendering
+from .rendering import Rendering
 from .steering import Steering
+from .switching import Switching
 from .viewport import Viewport
 
 _PIVOT = 0xF0C24B
@@ -63,7 +64,7 @@ class SceneView(WindowPart):
     pointer: Pointer
     tools: Toolbox
     marks: ViewMarks
-    naming: Naming
+    switching: Switching
     rendering: Rendering
     counting: Counting
     capture: Capture
@@ -102,8 +103,8 @@ class SceneView(WindowPart):
         with reported("Scale bar and colour bar"):
             self.marks.draw(size)
         text = printable(self.words_over() or "")
-        if self.naming.shown is not None:
-            text = "\n".join(filter(None, (self.naming.shown, text)))
+        if self.switching.caption is not None:
+            text = "\n".join(filter(None, (self.switching.caption, text)))
         if text:
             _draw_note(text, size)
         else:

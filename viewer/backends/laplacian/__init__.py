@@ -107,6 +107,7 @@ class Params:
         key="H",
         group=_LEVELS,
         title="Fill holes",
+        short="Fill",
         basic=True,
     )
 

@@ -18,6 +18,7 @@ from ...picture.stats import Stats
 from ...picture.surface import Surface
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
+from ...scan.octree.stored import octree_of
 from ...scan.octree.traverse import Sight, Traversal
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
@@ -48,10 +49,11 @@ class Params:
     """Parameters of the voxels backend."""
 
     stop: str = param(
-        "delta",
-        "When Scan4D stops dividing octants. delta: when nearly every position has its own octant; "
-        "depth: at a fixed level; occupancy: when an octant holds few points",
-        choices=STOPS,
+        "auto",
+        "When Scan4D stops dividing octants. auto: as stored in an octree file, which Scan4D then draws as "
+        "stored; for other scans as delta. delta: when nearly every position has its own octant; depth: at "
+        "a fixed level; occupancy: when an octant holds few points",
+        choices=("auto", *STOPS),
         affects="derive",
         group="Octree",
     )
@@ -62,7 +64,7 @@ class Params:
         high=1,
         affects="derive",
         group="Octree",
-        when={"stop": ("delta",)},
+        when={"stop": ("auto", "delta")},
     )
     depth: int = param(
         10,
@@ -202,9 +204,9 @@ class Voxels(Backend):
         return () if params.shape == "flat_cubes" else ("normals",)
 
     def derive(self, pose: Pose, params: Params, view: View | None) -> Octree:
-        """The octree of a pose."""
-        stop = Stop(rule=params.stop, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
-        octree = build(pose.cloud, stop)
+        """The octree of a pose: the one that its file stores, or one built from its points."""
+        stored = octree_of(pose.cloud) if params.stop == "auto" else None
+        octree = stored or build(pose.cloud, _stop(params))
         # A process's first cut imports, a machine's first compiles: not while a window draws.
         traversal = Traversal(octree.prefix(1), _ANYWHERE)
         traversal.advance()
@@ -231,6 +233,7 @@ class Voxels(Backend):
         found = shown.found
         coarse = frame.share < 1 and found.coarsest < min(params.max_depth, voxels.octree.depth)
         _report(found, voxels.octree, params, surface.stats)
+        surface.stats.coarseness = found.coarseness
         if coarse:
             surface.stats.left_out = math.ceil(pose.count * (1 - frame.share))  # as good as
         points = Points(shown.points, use_radii=True, count=shown.points.count)
@@ -256,10 +259,18 @@ class Voxels(Backend):
         return coarse or not (found.complete and layer.known)
 
 
+def _stop(params: Params) -> Stop:
+    """The rule for octrees that are built."""
+    rule = "delta" if params.stop == "auto" else params.stop
+    return Stop(rule=rule, delta=params.delta, depth=params.depth, occupancy=params.occupancy)
+
+
 def _report(found: CutCounts, octree: Octree, params: Params, stats: Stats) -> None:
-    stopped = shortfall(octree, Stop(params.stop, params.delta))
+    stopped = shortfall(octree, _stop(params))
     if stopped:
         stats.chosen["depth"] = stopped
+    if params.cull_back and octree.attributes and octree.attributes[0].cones is None:
+        stats.skipped["cull_back"] = "the octree file does not store how far the normals in an octant differ"
     for cause, count in (("out of view", found.outside), ("facing away", found.facing_away)):
         if count:
             stats.skipped[f"octants {cause}"] = f"{count:,}, with all their children"

@@ -117,6 +117,16 @@ class OctreeCuts:
         self._asked, self._seen = asked, seen
         return self._shown
 
+    def _coarseness(self, frame: FrameView, edge: float) -> float:
+        """The size of an octant of this edge, about where the octree is nearest, as a share of the picture's
+        height."""
+        view, octree = frame.view, self.octree
+        if not edge:
+            return 0.0
+        middle = octree.low + octree.edge / 2 - view.origin
+        depth = float(view.depths(middle)) - math.sqrt(3) / 2 * octree.edge if view.perspective else 1.0
+        return edge * view.scale / max(depth, view.near if view.perspective else 1.0) / view.size[1]
+
     def _may_cut_on_gpu(self, params: OctantSettings) -> bool:
         """Whether shaders find the nodes: discs, and as many as a shader can see."""
         wanted = ON_SOFTWARE or not self._gpu.software
@@ -125,10 +135,14 @@ class OctreeCuts:
     def _find_on_gpu(self, pose: GpuPose, frame: FrameView, options: CutOptions) -> ShownOctants:
         if self._on_gpu is None:
             self._on_gpu = GpuOctree(self._gpu, self.octree)
-        if not self._on_gpu.is_complete:
+        octree, depth = self._on_gpu, options.max_depth
+        if not octree.is_complete:
             with pose.preparing("upload"):
-                pose.spent.nbytes += self._on_gpu.upload(frame.budget_ms)
-        return self._on_gpu.show(pose, self._strays(pose), sight_of(frame.view), options)
+                pose.spent.nbytes += octree.upload(frame.budget_ms)
+                while self._coarseness(frame, octree.largest(depth)) > frame.coarsest:
+                    pose.spent.nbytes += octree.upload(0.0)
+        coarseness = self._coarseness(frame, octree.largest(depth))
+        return octree.show(pose, self._strays(pose), sight_of(frame.view), options, coarseness)
 
     def _find(
         self, pose: GpuPose, frame: FrameView, options: CutOptions, asked: tuple[object, ...], is_new: bool
@@ -145,11 +159,15 @@ class OctreeCuts:
             )
         elif is_new:
             self._traversal.look(sight)
-        self._traversal.advance(frame.budget_ms)
+        traversal = self._traversal
+        traversal.advance(frame.budget_ms)
+        while self._coarseness(frame, traversal.largest) > frame.coarsest:
+            traversal.advance(0.0)
         params: OctantSettings = frame.params
-        return self._gather(self._traversal.cut(pose.origin, means=params.shape == "discs"), pose, params)
+        cut = traversal.cut(pose.origin, means=params.shape == "discs")
+        return self._gather(cut, pose, params, self._coarseness(frame, traversal.largest))
 
-    def _gather(self, cut: Cut, pose: GpuPose, params: OctantSettings) -> _Gathered:
+    def _gather(self, cut: Cut, pose: GpuPose, params: OctantSettings, coarseness: float) -> _Gathered:
         """The nodes of a cut as points, their radii those of discs or half of the cubes' edges, and behind
         them the strays as they are, as large as typical leaves."""
         strays = self._strays(pose)
@@ -178,7 +196,7 @@ class OctreeCuts:
         numbers = cut.numbers(self.octree)
         octants = np.concatenate([numbers, np.full(len(strays.rows), NOTHING, np.uint32)])
         coarsest = int(cut.level[-1]) if len(cut) else self.octree.depth
-        found = CutCounts(cut.complete, cut.outside, cut.facing_away, coarsest)
+        found = CutCounts(cut.complete, cut.outside, cut.facing_away, coarsest, coarseness)
         return _Gathered(GpuPose(self._gpu, replace(pose.pose, points=shown)), rows, octants, found)
 
     def _strays(self, pose: GpuPose) -> StrayPoints:

@@ -144,6 +144,12 @@ class GpuOctree:
         """Whether all levels are there."""
         return not self._slices
 
+    def largest(self, max_depth: int) -> float:
+        """The edge of the largest octants that may give way once more levels are there, scan units; 0: none
+        may. max_depth: the deepest level to draw."""
+        wanted = max(0, min(max_depth, self._octree.depth))
+        return 0.0 if self._ready > wanted else self._octree.size(max(self._ready - 1, 0))
+
     def upload(self, budget_ms: float | None = None) -> int:
         """Upload for about so long: a slice at least, and the root with the first call; None: all. Returns
         how many bytes."""
@@ -181,8 +187,16 @@ class GpuOctree:
         self._texels["first_child"].bind(Texture.FIRST_CHILDREN)
         self._cells.bind(Texture.NODE_CELLS)
 
-    def show(self, pose: GpuPose, strays: StrayPoints, sight: Sight, options: CutOptions) -> ShownOctants:
-        """The nodes that a view shows, of the levels that are there, and the strays, as points of a pose."""
+    def show(
+        self,
+        pose: GpuPose,
+        strays: StrayPoints,
+        sight: Sight,
+        options: CutOptions,
+        coarseness: float = 0.0,
+    ) -> ShownOctants:
+        """The nodes that a view shows, of the levels that are there, and the strays, as points of a pose.
+        coarseness: see `CutCounts`."""
         gpu, wanted = self._gpu, max(0, min(options.max_depth, self._octree.depth))
         depth = min(wanted, self._ready - 1)
         scratch = gpu.cached(_Scratch)
@@ -200,7 +214,8 @@ class GpuOctree:
                 self._gather(scratch, arrays, count)
         levels = np.flatnonzero(counts)
         coarsest = int(levels[0]) if len(levels) else self._octree.depth
-        found = CutCounts(depth == wanted, int(totals["outside"]), int(totals["facing_away"]), coarsest)
+        outside, away = int(totals["outside"]), int(totals["facing_away"])
+        found = CutCounts(depth == wanted, outside, away, coarsest, coarseness)
         return CutPose(pose, self._octree, arrays, count, strays, found, self._pool)
 
     def _pack(self, pose: GpuPose, sight: Sight, options: CutOptions, depth: int) -> bytes:

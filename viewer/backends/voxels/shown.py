@@ -15,12 +15,13 @@ from ...picture.rows import Octants
 class CutCounts(NamedTuple):
     """Facts about the octants that a view shows. complete: whether a later call would find the same. outside,
     facing_away: octants left out with all their children, by cause. coarsest: the least level of those that
-    are drawn; that of the leaves where none is."""
+    are drawn; that of the leaves where none is. coarseness: see `Stats`."""
 
     complete: bool
     outside: int
     facing_away: int
     coarsest: int
+    coarseness: float = 0.0
 
 
 class ShownOctants(Octants, Protocol):

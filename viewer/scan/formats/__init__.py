@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -244,6 +244,12 @@ def frames(path: Path | str, decided: Decided | None = None) -> Callable[[int], 
             return _finished(module, path, opened.read(frame), shared.at(frame))
 
     return read_frame
+
+
+def coarser(path: Path | str) -> Callable[[int], Iterator[PointCloud]]:
+    """A function that gives coarser clouds of a frame while it is being read; none of most formats."""
+    module = _readable(Path(path))
+    return partial(module.coarser, Path(path)) if hasattr(module, "coarser") else lambda frame: iter(())
 
 
 def _with_points(scanned: Scanned) -> Scanned:

@@ -5,7 +5,7 @@ That package takes longer to import than all other formats together, so each fun
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -60,6 +60,13 @@ class Frames:
         from ..octree import file
 
         self.read = file.Frames(path).read
+
+
+def coarser(path: Path, frame: int) -> Iterator[PointCloud]:
+    """The leaves of coarser octrees of one pose, each finer than the one before."""
+    from ..octree import file
+
+    return file.Frames(path).coarser(frame)
 
 
 def write_poses(path: Path, poses: Iterable[Pose], unit: str, **options: Any) -> None:

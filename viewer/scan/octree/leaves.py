@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..points import PointCloud, choose_origin
-from .discs import MIDDLE, discs_of
+from .discs import MIDDLE
 from .octree import Octree
+from .stored import with_discs
 
 _SAMPLE = 1 << 13  # leaves that the origin is chosen by
 
 
-def leaf_points(octree: Octree) -> PointCloud:
+def leaf_points(octree: Octree, means: bool = True) -> PointCloud:
     """A point for each leaf, with its colour and normal, by level and then by Morton code.
 
-    It lies where the surface is in the leaf, where the tree's attributes tell, else in its middle. Radii are
-    of discs there that close the surface, see `discs_of`.
+    It lies where the surface is in the leaf if `means`, where the tree's attributes tell, else in its middle.
+    Radii are of discs there that close the surface, see `discs_of`.
     """
     leaves: dict[int, NDArray[np.bool_] | slice] = {
         level: masks == 0 for level, masks in enumerate(octree.masks) if not masks.all()
@@ -34,10 +35,10 @@ def leaf_points(octree: Octree) -> PointCloud:
             return None
         return joined(getattr(octree.attributes[level], name)[those] for level, those in leaves.items())
 
-    offsets, radii = of_leaves("offsets"), of_leaves("radii")
+    offsets, radii = of_leaves("offsets") if means else None, of_leaves("radii")
     if radii is None:
-        found = _radii(octree)
-        radii = joined(found[level][those] for level, those in leaves.items())
+        octree = with_discs(octree)
+        radii = of_leaves("radii")
     codes = {level: octree.codes(level)[those] for level, those in leaves.items()}
     step = max(1, sum(map(len, codes.values())) // _SAMPLE)
     origin = choose_origin(
@@ -57,15 +58,3 @@ def leaf_points(octree: Octree) -> PointCloud:
         precise=False,
     )
     return replace(cloud, origin=origin)
-
-
-def _radii(octree: Octree) -> list[NDArray[np.float32]]:
-    """Radii of all nodes, level by level, of a tree that does not tell them."""
-    counts = octree.counts.tolist()
-    offsets = [np.full((count, 3), MIDDLE, np.uint16) for count in counts]
-    radii = [np.empty(count, np.float32) for count in counts]
-    for level, own in enumerate(octree.attributes):
-        if own.offsets is not None and len(own.offsets):
-            offsets[level][:] = own.offsets
-    discs_of(octree.masks, octree.edge, offsets, radii)
-    return radii

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import struct
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from typing import NamedTuple
 
@@ -196,10 +196,30 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     Raises InputError where bytes are missing or damaged.
     """
     header, size = read_header(data)
-    behind = data[size + header.strays.masks + header.strays.attributes :]
-    whole = [level.nodes for level, _ in zip(header.levels, _whole_levels(header, behind), strict=False)]
-    if _are_too_many(sum(whole), len(data)):
-        raise InputError(f"claims {sum(whole):,} octants in {len(data):,} bytes, which is too many")
+
+    def read(start: int, count: int) -> bytes:
+        return data[size + start : size + start + count]
+
+    *_, octree = read_levels(header, read, previous, attributes=attributes)
+    return octree
+
+
+Read = Callable[[int, int], bytes]  # (start, size): bytes behind a header, fewer where they end there
+
+
+def read_levels(
+    header: Header, read: Read, previous: Octree | None = None, attributes: bool = True
+) -> Iterator[Octree]:
+    """The tree behind a header, without strays, level by level: each time coarser trees are there whole, and
+    the last is the finest that the bytes hold. Reads no byte before it is needed.
+
+    previous, attributes: as for `from_bytes`. Raises InputError where bytes are missing within a level, or
+    damaged, after the trees before them.
+    """
+    nodes = sum(level.nodes for level in header.levels)
+    size = len(header.to_bytes()) + header.stored
+    if _are_too_many(nodes, size):
+        raise InputError(f"claims {nodes:,} octants in {size:,} bytes, which is too many")
     if header.before and (previous is None or not _can_tell(header, previous, attributes)):
         raise InputError("this octree depends on the octree before it, which is missing")
     before = previous if header.before else None
@@ -207,36 +227,35 @@ def from_bytes(data: bytes, previous: Octree | None = None, attributes: bool = T
     masks: list[Bytes] = []
     found: list[Attributes] = []
     values: Bytes | None = None
-    for number, (above, own) in enumerate(_whole_levels(header, behind)):
+    for number, (above, own) in enumerate(_whole_levels(header, read)):
         if number:
             masks.append(_read_masks(above, header, coder, len(masks)))
             if header.flags & _PACKED:
-                coder.descend(masks[-1], deepest=number == len(whole) - 1)
+                coder.descend(masks[-1], deepest=number == len(header.levels) - 1)
         if attributes and header.width:
             predicted = before is not None and header.predicted_attributes >> number & 1
             known = _counterparts(before, coder.counterparts, number) if before and predicted else None
             values = _read_attributes(own, header.width, masks, values, known)
             found.append(_attributes(values, header.flags))
-    return Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, tuple(found))
+        yield Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, tuple(found))
 
 
-def read_strays(data: bytes) -> Strays:
+def read_strays(header: Header, read: Read) -> Strays:
     """The points outside the cube of a tree of `to_bytes`. Raises InputError where bytes are missing or
     damaged."""
-    header, size = read_header(data)
     entry = header.strays
-    middle, end = size + entry.masks, size + entry.masks + entry.attributes
-    if end > len(data):
+    data = read(0, entry.masks + entry.attributes)
+    if len(data) < entry.masks + entry.attributes:
         raise InputError("ends within the points outside an octree")
-    if zlib.crc32(data[size:end]) != entry.check:
+    if zlib.crc32(data) != entry.check:
         raise InputError("the points outside an octree are damaged")
-    places = coding.unpack(data[size:middle], 24 * entry.nodes).reshape(24, -1).T
+    places = coding.unpack(data[: entry.masks], 24 * entry.nodes).reshape(24, -1).T
     positions = np.ascontiguousarray(places).view("<f8").astype(np.float64)
     if not (np.abs(positions) < _LARGEST).all():
         raise InputError("some points outside an octree have coordinates that are not finite")
     found = Attributes()
     if header.width:
-        values = coding.unpack(data[middle:end], header.width * entry.nodes)
+        values = coding.unpack(data[entry.masks :], header.width * entry.nodes)
         found = _attributes(values.reshape(header.width, -1).T, header.flags)
     return Strays(positions.reshape(-1, 3), found.colors, found.normals)
 
@@ -307,19 +326,20 @@ def _same_cube(one: Octree | Header, other: Octree) -> bool:
     return one.edge == other.edge and bool((one.low == other.low).all())
 
 
-def _whole_levels(header: Header, data: bytes) -> Iterator[tuple[bytes, bytes]]:
+def _whole_levels(header: Header, read: Read) -> Iterator[tuple[bytes, bytes]]:
     """Stored bytes of each level, masks and attributes, as far as there are any."""
-    at = 0
+    at = header.strays.masks + header.strays.attributes
     for number, level in enumerate(header.levels):
-        if at == len(data) and number:
+        size = level.masks + level.attributes
+        data = read(at, size)
+        if number and not data:
             return
-        middle, end = at + level.masks, at + level.masks + level.attributes
-        if end > len(data):
+        if len(data) < size:
             raise InputError(f"ends within level {number} of {len(header.levels) - 1} of an octree")
-        if zlib.crc32(data[at:end]) != level.check:
+        if zlib.crc32(data) != level.check:
             raise InputError(f"level {number} of an octree is damaged")
-        yield data[at:middle], data[middle:end]
-        at = end
+        yield data[: level.masks], data[level.masks :]
+        at += size
 
 
 # --- strays ---------------------------------------------------------------------------

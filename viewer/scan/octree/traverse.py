@@ -195,6 +195,11 @@ class Traversal:
         """Whether `advance` would change nothing."""
         return self._at == len(self._nodes)
 
+    @property
+    def largest(self) -> float:
+        """The edge of the largest node that may still give way to its children, scan units; 0: none may."""
+        return 0.0 if self.complete else self.octree.size(self._level)
+
     def advance(self, budget_ms: float | None = None) -> bool:
         """Go on for about so long, a step at least; None: to the end. Returns whether it is complete."""
         until = math.inf if budget_ms is None else time.perf_counter() + budget_ms / 1e3
