@@ -22,7 +22,7 @@ from ..errors import InputError
 from ..files import absolute
 from ..geometry import UP
 from ..look import Look
-from ..scan.open import is_demo
+from ..scan.open import is_no_path
 from .laid import Laid
 from .part import WindowPart, chosen
 from .playing.player import Pace
@@ -32,7 +32,7 @@ _MOST_LEFT = 50  # scans whose changes can still be undone
 
 def known_as(scan: str) -> str:
     """The name that a scan is remembered by: its path from the root, wherever Scan4D was started."""
-    return scan if is_demo(scan) else absolute(scan)
+    return scan if is_no_path(scan) else absolute(scan)
 
 
 def named_like(scan: str, folder: Path, suffix: str) -> Path:

@@ -28,7 +28,7 @@ from ..output.film import FILM_SUFFIX, FilmTimes
 from ..output.legend import Legend, marks_of
 from ..scan.averaging import Averaging
 from ..scan.inputs import scan_inputs
-from ..scan.open import is_demo, open_scan
+from ..scan.open import is_no_path, open_scan
 from ..scan.timeline import Timeline
 from ..scan.times import frame_in_words
 from . import _arguments as arguments
@@ -217,7 +217,7 @@ def _open(scan: str, path: Path, read: Mapping[str, str]) -> tuple[str, Timeline
             if os.path.exists(folder):
                 raise
             missing = error
-    if is_demo(scan) or os.path.isabs(scan):
+    if is_no_path(scan) or os.path.isabs(scan):
         raise missing
     hint = (
         f"Scan4D looked in '{path.parent}' and in the working directory. Put the scan there, or "

@@ -20,7 +20,7 @@ from .. import __version__
 from ..errors import InputError, explained
 from ..files import free_file, read_text
 from ..folders import new_file, own_folder, state_folder
-from ..scan.open import is_demo
+from ..scan.open import is_no_path
 from .recording import FORMAT, Recording
 from .schema import DAMAGED
 
@@ -157,7 +157,7 @@ def _from_root(recording: Recording, folder: Path) -> Recording:
     """The recording for another folder: its scans are named from the root."""
 
     def named(scan: str | None) -> str | None:
-        return scan if scan is None or is_demo(scan) else os.path.join(folder, scan or "")
+        return scan if scan is None or is_no_path(scan) else os.path.join(folder, scan or "")
 
     return replace(
         recording, entries=tuple(replace(entry, scan=named(entry.scan)) for entry in recording.entries)

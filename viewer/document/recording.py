@@ -53,7 +53,7 @@ from ..output.overlays import (
 )
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
-from ..scan.open import is_demo, searches_folders
+from ..scan.open import is_arriving, is_no_path, searches_folders
 from ..scan.pose import Pose
 from ..scan.reading.corrections import Corrections
 from ..scan.reading.record import Reading
@@ -443,7 +443,7 @@ def is_recording(path: Path) -> bool:
 
 def scan_paths(scan: str, recording: Path) -> list[str]:
     """Paths of a scan that a recording names: beside the recording, then as it is named."""
-    return [scan] if is_demo(scan) else list(dict.fromkeys([str(recording.parent / scan), scan]))
+    return [scan] if is_no_path(scan) else list(dict.fromkeys([str(recording.parent / scan), scan]))
 
 
 def checked_scan_paths(scan: str, recording: Path) -> list[str]:
@@ -460,7 +460,7 @@ def checked_scan_paths(scan: str, recording: Path) -> list[str]:
 
 def remote_location(scan: str) -> str:
     """Words on where a scan may be that only the user may name; "" where a recording may."""
-    if scan.startswith(("//", "\\\\")):
+    if scan.startswith(("//", "\\\\")) or is_arriving(scan):
         return "which is on another machine"
     return "a pattern that would search through folders" if searches_folders(scan) else ""
 

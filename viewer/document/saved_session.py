@@ -24,7 +24,7 @@ from .. import __version__
 from ..errors import InputError, explained
 from ..files import absolute, open_plain, output_folder, whole_file
 from ..folders import new_file, user_folder
-from ..scan.open import is_demo
+from ..scan.open import STANDARD_INPUT, is_no_path
 from .document import Document
 from .schema import (
     DAMAGED,
@@ -128,7 +128,7 @@ def is_session(path: Path) -> bool:
 
 def _named_from(folder: Path, scan: str) -> str:
     """A scan's path from a folder, with slashes; from the root where it is on another drive."""
-    if is_demo(scan):
+    if is_no_path(scan):
         return scan
     try:
         return Path(os.path.relpath(absolute(scan), absolute(folder))).as_posix()
@@ -152,6 +152,8 @@ def store(session: SavedSession) -> str | None:
     Where another window has written it meanwhile, what was made there is put aside; returns words of that for
     the user. Raises InputError where it cannot be written, or there is one that only others can read.
     """
+    if session.scan == STANDARD_INPUT:
+        return None  # the next stream is another scan
     path = stored_file(session.scan)
     is_new = not os.path.lexists(path)
     aside = None if is_new else _spared(path, session.document)

@@ -16,7 +16,7 @@ from typing import Literal
 from ..errors import InputError
 from ..files import absolute
 from . import formats
-from .open import entries, find_source, folder_frames, is_arriving, is_demo, matches, scan_frames
+from .open import entries, find_source, folder_frames, is_no_path, matches, scan_frames
 from .range_folders import find_range_frames
 from .reading.frames import is_no_scan
 from .reading.names import frame_counts
@@ -49,8 +49,7 @@ class Listed:
 def is_there(scan: str) -> bool:
     """Whether a scan can be opened, by its name alone; of a pattern, the folder must exist."""
     is_pattern = "%" in scan or glob.has_magic(scan)
-    is_named = is_demo(scan) or is_arriving(scan)
-    return is_named or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
+    return is_no_path(scan) or os.path.exists(scan) or (is_pattern and os.path.isdir(os.path.dirname(scan)))
 
 
 def list_folder(folder: Path | str) -> list[Listed]:
@@ -100,7 +99,7 @@ def scans_beside(scan: str) -> list[str]:
     The scan alone where its folder cannot be listed.
     """
     path = Path(absolute(scan))
-    if is_demo(scan) or str(path) == path.anchor:
+    if is_no_path(scan) or str(path) == path.anchor:
         return [scan]
     kinds = ("file", "folder") if os.path.exists(path) else ("sequence",)
     found: dict[str, str] = {}

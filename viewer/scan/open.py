@@ -32,6 +32,7 @@ from .times import is_times_file, natural_key
 from .units import checked_unit, usable_unit
 
 DEMO = "demo"
+STANDARD_INPUT = "-"
 _PICTURES = {  # beside which text tables are no points
     ".png", ".jpg", ".jpeg", ".ppm", ".pgm", ".tif", ".tiff", ".bmp",
 }  # fmt: skip
@@ -47,8 +48,13 @@ def is_demo(scan: str | None) -> bool:
 
 
 def is_arriving(scan: str) -> bool:
-    """Whether a name of a scan is an address of a server, or "-", standard input."""
-    return scan == "-" or scan.lower().startswith(("http://", "https://"))
+    """Whether a name of a scan is an address of a server, or standard input."""
+    return scan == STANDARD_INPUT or scan.lower().startswith(("http://", "https://"))
+
+
+def is_no_path(scan: str) -> bool:
+    """Whether a name of a scan is no path: the demo, or something that arrives."""
+    return is_demo(scan) or is_arriving(scan)
 
 
 def open_scan(

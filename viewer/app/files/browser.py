@@ -14,7 +14,7 @@ from ...document.recording import is_recording
 from ...document.saved_session import SUFFIX, is_session
 from ...files import printable
 from ...scan.listing import Listed, list_folder
-from ...scan.open import DEMO, is_demo
+from ...scan.open import DEMO, is_no_path
 from ...scan.timeline import Timeline
 from .. import widgets
 from ..commands import Command
@@ -89,8 +89,8 @@ class Browser(WindowPart):
             self._view.show(folder)
             return
         scan = self.session.scan
-        here = self._view.folder if is_demo(scan) else Path(known_as(scan)).parent
-        self._view.show(here, "" if is_demo(scan) else known_as(scan))
+        here = self._view.folder if is_no_path(scan) else Path(known_as(scan)).parent
+        self._view.show(here, "" if is_no_path(scan) else known_as(scan))
 
     @property
     def waits(self) -> bool:

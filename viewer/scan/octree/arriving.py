@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +20,10 @@ from ..times import frame_in_words
 from .byte_sources import HttpBytes, StreamBytes
 from .file import Octrees, find_extents
 
-STANDARD_INPUT = "-"
+
+@cache  # whoever opens a stream again finds the bytes that have come
+def _stream_of(buffer: BinaryIO) -> StreamBytes:
+    return StreamBytes(buffer)
 
 
 class ArrivingOctrees:
@@ -27,11 +32,11 @@ class ArrivingOctrees:
     files: tuple[Path, ...] = ()
 
     def __init__(self, scan: str) -> None:
-        """scan: an address, or `STANDARD_INPUT`. Raises InputError where no octree is there."""
-        is_input = scan == STANDARD_INPUT
+        """scan: an address, or "-" for standard input. Raises InputError where no octree is there."""
+        is_input = scan == "-"
         self.name = "standard input" if is_input else printable(scan.rstrip("/").rsplit("/", 1)[-1])
         self.decided = Decided()
-        source = self._source = StreamBytes(sys.stdin.buffer) if is_input else HttpBytes(scan)
+        source = self._source = _stream_of(sys.stdin.buffer) if is_input else HttpBytes(scan)
         try:
             self._octrees = Octrees(source, find_extents(source), self._held)
         except InputError as error:
@@ -41,7 +46,7 @@ class ArrivingOctrees:
             raise InputError(error.what, error.where or where, hint) from error
         if source.is_stream:
             what = f"Scan4D reads only the first octree of {'a stream' if is_input else 'this server'}"
-            self.decided.report("aside", f"{what}. To see all frames, save the octrees to a file.")
+            self.decided.report("assumed", f"{what}. To see all frames, save the octrees to a file.")
         self.unit = self._octrees.extents[0].header.unit
 
     def _close(self) -> None:
