@@ -235,9 +235,9 @@ def test_a_key_that_shows_nothing_says_why_and_offers_what_does(polygons: Runnin
     offer = app.told("Level 4: off. The picture did not change: polygons connect the samples")[0]
     assert any(note.startswith(offer) for note in app.settle().shown_notes)
     app.act("problems", ("item_click", "$$0/###Draw samples as points (Shift+P)"))
+    app.see(caption="Draw samples as points: on")
     assert params(app.settle())["primitive"] == "points"
     assert not app.state.shown_notes
-    app.see(caption="Draw samples as points: on")
     app.press("4", "shift+p")
     assert params(app.state)["primitive"] == "polygons"
     assert params(app.state)["level_4"] is True
