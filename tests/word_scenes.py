@@ -131,4 +131,5 @@ def streams(draw: st.DrawFn, finer: bool | None = None) -> WordStream:
         size=size, stride=stride, line_starts=line_starts.astype(np.int64), words=encode_words(fields),
         ids=ids, near=2.0, far=5.0, materials=GREY, background=(10, 20, 30, 255),
         perspective=draw(st.booleans()), finer=steps.astype(np.int32) if has_finer else None,
+        depth_bits=draw(st.sampled_from([16, 24])) if has_finer else 24,
     )  # fmt: skip

@@ -2,7 +2,7 @@
 // memory, and flushes it. Of the words that cover a pixel the least depth is seen, of these the least rank: whole numbers,
 // and least ones, whichever order words come in. FINER: depths are those beside the words, in place of Z. PACKED: Z and
 // rank fit into one number. OWNERS: a rank is a number of OWNERS; else it is the row itself. SHOWN 0: keys and ranks;
-// 1: depths and rows of a Surface; NOWHERE:
+// 1: depths and rows of a Surface. SHIFT: how many last bits of finer depths the depth buffer leaves out. NOWHERE:
 // depth where nothing is. LIT: with colours. A band of very many words is drawn in several calls, since drivers may bound
 // how often a loop turns: `skipped` is how many words of each band were drawn before, RESUMED: there were some, of which
 // keys and ranks tell.
@@ -47,6 +47,11 @@ void meet() {
 
 uint start_of(int line) { return texelFetch(starts, line).r; }
 
+#if FINER
+// A finer depth as the depth buffer holds it.
+int kept(int depth) { return SHIFT == 0 ? depth : clamp(depth, 0, MOST_DEPTH) >> SHIFT; }
+#endif
+
 void take(int at, uint key, uint rank, int pass) {
 #if PACKED
     atomicMin(best[at], key << RANK_BITS | rank);
@@ -68,7 +73,7 @@ void draw_row(uvec3 word, ivec2 span, int line, int row, ivec4 part, uint rank, 
     int at = (y - part.y) * columns - part.x;
     for (int column = max(x + span.x, part.x); column <= min(x + span.y, part.z - 1); ++column) {
 #if FINER
-        key = uint(depth + column * plane.y) ^ SIGN;
+        key = uint(kept(depth + column * plane.y)) ^ SIGN;
 #endif
         take(at + column, key, rank, pass);
     }

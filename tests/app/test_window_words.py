@@ -38,7 +38,7 @@ def test_qualities_and_lightings_are_chosen_and_look_like_surfels(app: RunningAp
     discs = middle(app)
     app.choose(PANEL, "##backend", "###codeword")
     pictures = []
-    for quality in ("table", "exact"):
+    for quality in ("table", "planes", "exact"):
         for lighting in ("common", "own"):
             app.choose(PANEL, "renderer/quality/##value", f"###{quality}")
             app.choose(PANEL, "renderer/lighting/##value", f"###{lighting}")

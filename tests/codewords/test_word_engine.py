@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -11,7 +13,7 @@ from word_scenes import GREY, encode_words, front_view, scattered, streams
 from viewer.codewords.encode import Encoding, encode_elements
 from viewer.codewords.engine import NO_KEY, NO_WORD, CodePicture, draw_words, draw_words_plainly
 from viewer.codewords.lighting import Materials
-from viewer.codewords.stream import WordStream
+from viewer.codewords.stream import FINE_DEPTHS, WordStream
 from viewer.codewords.words import FIELDS
 from viewer.errors import InputError
 
@@ -48,11 +50,14 @@ def test_the_engine_draws_as_its_twin_with_any_window(stream: WordStream, window
     assert same(draw_words_plainly(stream, window), plain)
 
 
-@pytest.mark.parametrize("exact", [False, True])
-def test_encoded_scenes_are_drawn_the_same(exact: bool) -> None:
+RULES = (Encoding(), Encoding(exact=True, depth_bits=16), Encoding(exact=True))
+
+
+@pytest.mark.parametrize("rules", RULES)
+def test_encoded_scenes_are_drawn_the_same(rules: Encoding) -> None:
     for seed, size in enumerate([(70, 40), (1, 1), (7, 9), (530, 12)]):
         view = front_view(size, perspective=bool(seed % 2))
-        stream = encode_elements(scattered(120, size, seed), view, GREY, rules=Encoding(exact=exact))
+        stream = encode_elements(scattered(120, size, seed), view, GREY, rules=rules)
         picture = draw_words(stream)
         assert picture.covered.any()
         assert same(picture, draw_words_plainly(stream, 8))
@@ -79,6 +84,18 @@ def test_the_nearest_word_is_seen_and_ties_go_to_the_lowest_id_then_to_the_first
     picture = draw_words(stream_of((8, 8), words, [9, 8, 7, 7, 7]))
     assert picture.indices[:, 0].tolist() == [0, 1, 1, 1, 1, 2, 3, NO_WORD]
     assert picture.keys[:, 0].tolist() == [5, 4, 4, 4, 4, 5, 5, NO_KEY]
+
+
+def test_a_depth_buffer_of_16_bits_holds_whole_steps() -> None:
+    """Of planes, at each pixel; what is outside of its range is at an end."""
+    words = [(0, {"scans": FULL, "mode": 1}), (4, {"scans": FULL, "mode": 1})]
+    planes = np.array([[-300, 256, 0], [FINE_DEPTHS - 700, 200, 100]], np.int32)
+    stream = replace(stream_of((8, 8), words, [0, 1]), finer=planes, depth_bits=16)
+    picture = draw_words(stream)
+    assert picture.keys[0].tolist() == [0, 0, 0, 1, 2, 3, 4, 5]
+    assert picture.keys[4].tolist() == [65533, 65534, 65534, 65535, 65535, 65535, 65535, 65535]
+    inverse = 1 + (picture.keys[4] + 0.5) / 65536 * (0.5 - 1)
+    np.testing.assert_allclose(picture.depths()[4], 1 / inverse, rtol=1e-6)
 
 
 def test_depths_at_both_ends_are_seen_before_nothing() -> None:

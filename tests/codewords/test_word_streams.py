@@ -144,6 +144,7 @@ def test_streams_that_an_engine_cannot_draw(small: Path) -> None:
         ({"ids": stream.ids[1:]}, "must store an id for each code word"),
         ({"finer": steep}, "exact depths"),
         ({"finer": steep[1:]}, "must store an id for each code word"),
+        ({"depth_bits": 9}, "has 16 or 24 bits, not 9"),
         ({"camera": np.full(15, np.nan)}, "the camera of the code words"),
         ({"camera": np.zeros(15)}, "the camera of the code words"),
         ({"stride": 513}, "1 to 512 columns, not 513"),

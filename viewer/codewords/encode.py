@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..view import View
+from .engine import NO_KEY, draw_words
 from .lighting import Materials
-from .stream import FINE_DEPTHS, STEEPEST_DEPTHS, WordStream, check_picture_size, strip_width
+from .stream import FINE_DEPTHS, PLANE_BITS, STEEPEST_DEPTHS, WordStream, check_picture_size, strip_width
 from .tables import PAPER, Steps, shape_table
 from .words import DEPTHS
 
@@ -84,13 +85,15 @@ class Encoding:
     """Rules by which elements become code words.
 
     steps: of sizes and normals. exact: whether outlines and depths are not rounded to steps, see above.
-    radius_scale: factor on radii. cull_back: whether elements that face away are left out.
+    radius_scale: factor on radii. cull_back: whether elements that face away are left out. depth_bits: of the
+    depth buffer of exact outlines, see `WordStream`.
     """
 
     steps: Steps = PAPER
     exact: bool = False
     radius_scale: float = 1.0
     cull_back: bool = False
+    depth_bits: int = PLANE_BITS[-1]
 
 
 class EmittedWords(NamedTuple):
@@ -120,16 +123,40 @@ def encode_elements(
     """
     check_picture_size(view.size)
     found = project_elements(elements, view, light, rules)
+    stream = _stream(found, elements, view, materials, rules)
+    if rules.exact and rules.depth_bits < PLANE_BITS[-1]:
+        found = _within_sight(found, stream, view)
     if range_of is not None:
         near, far = range_of(found.near + view.base, found.far + view.base)
         found = replace(found, near=near - view.base, far=far - view.base)
+    if (found.near + view.base, found.far + view.base) != (stream.near, stream.far):
+        stream = _stream(found, elements, view, materials, rules)
+    return replace(stream, background=background, depth_bits=rules.depth_bits)
+
+
+def _stream(
+    found: Projected, elements: Elements, view: View, materials: Materials, rules: Encoding
+) -> WordStream:
+    """Code words of projected elements, whose depths count from `found.near` to `found.far`."""
     depths, finer = _depths(found.planes, found.near, found.far, view.perspective, rules.exact)
     emitted = emit_words(found, elements.materials, view.size, rules.steps, depths, finer)
     return WordStream(
         size=view.size, stride=strip_width(view.size[0]), **emitted._asdict(), near=found.near + view.base,
-        far=found.far + view.base, materials=materials, background=background, perspective=view.perspective,
-        camera=_camera(view),
+        far=found.far + view.base, materials=materials, perspective=view.perspective, camera=_camera(view),
     )  # fmt: skip
+
+
+def _within_sight(found: Projected, stream: WordStream, view: View) -> Projected:
+    """The elements with depths that count between the least and the largest one that a picture shows, so that
+    the steps of a small depth buffer are not spent on what is hidden; but on no less than 1/16 of all depths.
+    """
+    keys = draw_words(stream).keys
+    keys = keys[keys != NO_KEY]
+    if not len(keys):
+        return found
+    low, high = int(keys.min()), max(int(keys.max()), int(keys.min()) + FINE_DEPTHS // 16)
+    near, far = (float(depth) - view.base for depth in stream.depths(np.array([low, high])))
+    return replace(found, near=near, far=far)
 
 
 def _camera(view: View) -> NDArray[np.float64]:

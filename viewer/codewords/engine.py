@@ -6,7 +6,8 @@ eight rows, any window of eight lines or more gives the same picture.
 
 The rule: of the words that cover a pixel, that with the least depth is seen; of those the one with the
 lowest id; of these the first in the stream. Depth is Z, or, where the stream has finer ones, depth + x right
-+ y down at the pixel's position (x, y) in the word's bitmap. What lies right of a strip or below the picture
++ y down at the pixel's position (x, y) in the word's bitmap. A depth buffer of 16 bits
+holds that sum, cut to 0 to 2^24 - 1, without its last 8 bits. What lies right of a strip or below the picture
 is cut off.
 """
 
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..threads import ranges, threads_for, together
 from .lighting import LIGHT_BYTES
-from .stream import WordStream
+from .stream import FINE_DEPTHS, WordStream
 from .tables import BITMAP
 from .words import NO_WORD, decode_words, row_spans
 
@@ -70,7 +71,7 @@ def draw_words(
 
     picture = begun(stream, window, background)
     materials = stream.materials
-    no_finer = np.empty((0, 3), np.int32)
+    finer = np.empty((0, 3), np.int32) if stream.finer is None else stream.finer
     coefficients = np.stack([materials.ambient, materials.diffuse, materials.specular]).astype(np.int32)
 
     def drawn(strip: int, top: int, bottom: int) -> None:
@@ -78,7 +79,7 @@ def draw_words(
         starts = stream.line_starts[strip * height : (strip + 1) * height + 1]
         slide(
             StripPart(left, min(stream.stride, stream.size[0] - left), top, bottom),
-            StripWords(starts, stream.words, stream.ids, no_finer if stream.finer is None else stream.finer),
+            StripWords(starts, stream.words, stream.ids, finer, stream.shift),
             window,
             coefficients,
             LIGHT_BYTES,
@@ -122,6 +123,8 @@ def draw_words_plainly(
                         key = int(fields["z"][index])
                         if stream.finer is not None:
                             key = int(stream.finer[index] @ np.array([1, column, row]))
+                        if stream.shift:
+                            key = min(max(key, 0), FINE_DEPTHS - 1) >> stream.shift
                         rank = key, int(stream.ids[index]), index
                         if rank < (keys[at], _id(stream, indices[at]), indices[at]):
                             keys[at], indices[at] = key, index

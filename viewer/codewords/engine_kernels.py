@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from .stream import FINE_DEPTHS
 from .tables import BITMAP
 from .words import NO_WORD
 
+_MOST_DEPTH = FINE_DEPTHS - 1
 _NO_KEY = np.int32(0x7FFFFFFF)
 _NO_WORD = np.uint32(NO_WORD)
 
@@ -31,6 +33,7 @@ class StripWords(NamedTuple):
     words: NDArray[np.uint64]
     ids: NDArray[np.uint32]
     finer: NDArray[np.int32]  # (words, 3) or (0, 3)
+    shift: int  # bits of finer depths that the depth buffer leaves out
 
 
 class PictureArrays(NamedTuple):
@@ -52,7 +55,7 @@ def slide(
 ) -> None:
     """Slide a window of some lines down a part of a strip. materials: (3, M, 3), I_0, k_d and k_s."""
     left, columns, top, bottom = part
-    line_starts, words, ids, finer = stream
+    line_starts, words, ids, finer, shift = stream
     image, keys, indices = picture
     height = len(line_starts) - 1
     has_finer = len(finer) > 0
@@ -78,6 +81,8 @@ def slide(
                 slot = (y + row) % window
                 for column in range(first, min(last, columns - 1 - x) + 1):
                     here = np.int32(key + column * right + row * grown_down)
+                    if shift > 0:
+                        here = np.int32(min(max(int(here), 0), _MOST_DEPTH) >> shift)
                     before = window_keys[slot, x + column]
                     if here < before or (
                         here == before and ids[index] < ids[window_indices[slot, x + column]]

@@ -7,7 +7,8 @@ over a plane in the picture, as depth buffers do: depth in parallel views, and i
 A packed stream, all little-endian, is a file of one picture:
 
     8 bytes    "SCAN4DCW"
-    uint32     version 1; flags (1: perspective, 2: finer depths, 4: camera); width; height; strips; materials
+    uint32     version 1; flags (1: perspective, 2: finer depths, 4: camera, 8: depth buffer of 16 bits);
+               width; height; strips; materials
     uint64     words
     float64    nearest depth (Z = 0); farthest depth (Z = 511), scan units
     4 bytes    background, sRGB and alpha
@@ -37,10 +38,11 @@ from .lighting import Materials
 from .words import COLUMNS, DEPTHS, FIELDS
 
 FINE_DEPTHS = 1 << 24  # steps of finer depths from the nearest to the farthest
+PLANE_BITS = (16, 24)  # that a depth buffer may have where words have finer depths
 STEEPEST_DEPTHS = 1 << 26  # that finer depths may grow by in a pixel
 MAGIC = b"SCAN4DCW"  # of every file of code words
 _VERSION = 1
-_PERSPECTIVE, _FINER, _CAMERA = 1, 2, 4  # flags
+_PERSPECTIVE, _FINER, _CAMERA, _SIXTEEN = 1, 2, 4, 8  # flags
 _CAMERA_NUMBERS = 15
 _HEADER = struct.Struct("<8s6IQdd4s")
 _CHECKSUM = struct.Struct("<I")
@@ -62,7 +64,8 @@ class WordStream:
 
     finer: None, or (N, 3) int32 beside the words: depth at the first row and left column of a word's bitmap,
     and how much it grows a pixel to the right and a pixel down, with FINE_DEPTHS steps from near to far.
-    It takes the place of Z. Sums within a bitmap stay within 32 bits.
+    It takes the place of Z. Sums within a bitmap stay within 32 bits. depth_bits: of the engine's depth
+    buffer where there are finer depths, 24 or 16. With 16, a pixel holds the sum without its last 8 bits.
 
     camera: None, or (15,) float64, where the picture was seen from: pixels per unit of x/-z, of x in parallel
     views; the pixel of the line of sight, right and down; then, row by row, the (3, 4) matrix that takes
@@ -83,6 +86,7 @@ class WordStream:
     perspective: bool = True
     finer: NDArray[np.int32] | None = field(default=None)
     camera: NDArray[np.float64] | None = None
+    depth_bits: int = 24
 
     def __post_init__(self) -> None:
         check_picture_size(self.size)
@@ -110,6 +114,8 @@ class WordStream:
         least = _NEAREST if self.perspective else -_FARTHEST
         if not least <= self.near <= self.far <= _FARTHEST:
             raise InputError(f"the depths {self.near:g} to {self.far:g} of the code words are out of range")
+        if self.depth_bits not in PLANE_BITS:
+            raise InputError(f"a depth buffer of code words has 16 or 24 bits, not {self.depth_bits}")
         limits = np.array([1 << 30, STEEPEST_DEPTHS, STEEPEST_DEPTHS])
         if self.finer is not None and (np.abs(self.finer.astype(np.int64)) > limits).any():
             raise InputError(
@@ -155,9 +161,16 @@ class WordStream:
         finer = 0 if self.finer is None else self.finer.nbytes
         return self.words.nbytes + self.ids.nbytes + self.line_starts.nbytes + finer
 
+    @property
+    def shift(self) -> int:
+        """The bits of a finer depth that the depth buffer leaves out."""
+        return PLANE_BITS[-1] - self.depth_bits
+
     def depths(self, keys: NDArray[np.integer]) -> NDArray[np.float32]:
-        """Depths, scan units, any shape, of values of Z, or of finer ones where there are."""
-        t = np.asarray(keys, np.float64) / (DEPTHS - 1 if self.finer is None else FINE_DEPTHS)
+        """Depths, scan units, any shape, of values of Z, or of finer ones as a depth buffer has them: of the
+        middles of its steps."""
+        steps = DEPTHS - 1 if self.finer is None else FINE_DEPTHS >> self.shift
+        t = (np.asarray(keys, np.float64) + (0.5 if self.shift else 0.0)) / steps
         if not self.perspective:
             return (self.near + t * (self.far - self.near)).astype(np.float32)
         inverse = 1 / self.near + t * (1 / self.far - 1 / self.near)
@@ -193,7 +206,7 @@ def strip_width(width: int) -> int:
 def stream_to_bytes(stream: WordStream) -> bytes:
     """The bytes of a stream, as a file of one picture holds them."""
     flags = _PERSPECTIVE * stream.perspective | _FINER * (stream.finer is not None)
-    flags |= _CAMERA * (stream.camera is not None)
+    flags |= _CAMERA * (stream.camera is not None) | _SIXTEEN * (stream.shift > 0)
     header = _HEADER.pack(
         MAGIC, _VERSION, flags, *stream.size, stream.strips, len(stream.materials), len(stream),
         stream.near, stream.far, bytes(stream.background),
@@ -237,7 +250,7 @@ def stream_bytes(header: bytes) -> int:
     _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack_from(header)
     if version != _VERSION:
         raise InputError(f"is of version {version}", hint=f"This version of Scan4D reads version {_VERSION}")
-    if flags & ~(_PERSPECTIVE | _FINER | _CAMERA):
+    if flags & ~(_PERSPECTIVE | _FINER | _CAMERA | _SIXTEEN):
         raise InputError(f"has unknown flags: {flags}")
     check_picture_size((width, height))
     if not -(-width // COLUMNS) <= strips <= width:
@@ -278,4 +291,5 @@ def _stream_of(data: bytes) -> WordStream:
         background=tuple(background),
         perspective=bool(flags & _PERSPECTIVE),
         camera=camera,
+        depth_bits=PLANE_BITS[0] if flags & _SIXTEEN else PLANE_BITS[-1],
     )

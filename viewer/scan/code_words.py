@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..codewords.encode import Elements, Encoding, Light, encode_elements
 from ..codewords.lighting import Materials, map_palette, mapped, nearest_colors, palette_of
-from ..codewords.stream import WordStream
+from ..codewords.stream import PLANE_BITS, WordStream
 from ..codewords.tables import Steps
 from ..geometry import up_vector
 from ..look import Look, color_table, light_direction, rgba, value_source
@@ -38,10 +38,11 @@ class Params:
     quality: str = param(
         "table",
         "Accuracy of discs. table: shapes, positions and depths are rounded to the steps of Maršík 2010; "
-        "exact: outlines and depths are exact",
-        choices=("table", "exact"),
+        "planes: outlines are exact, and each pixel has the depth of its disc's plane in 16 bits; "
+        "exact: as planes, with depths in 24 bits",
+        choices=("table", "planes", "exact"),
         title="Code table",
-        sweep=("table", "exact"),
+        sweep=("table", "planes", "exact"),
         group="Words",
         basic=True,
     )
@@ -108,6 +109,12 @@ class Params:
     def steps(self) -> Steps:
         """Steps of the table. Raises InputError."""
         return Steps(self.sizes, self.size_parts, self.normals, self.normal_parts)
+
+    @property
+    def rules(self) -> Encoding:
+        """Rules of encoding. Raises InputError."""
+        bits = PLANE_BITS[0] if self.quality == "planes" else PLANE_BITS[-1]
+        return Encoding(self.steps, self.quality != "table", self.radius_scale, self.cull_back, bits)
 
 
 class Shared:
@@ -180,7 +187,7 @@ def words_of(
         view,
         materials,
         lights,
-        Encoding(params.steps, params.quality == "exact", params.radius_scale, params.cull_back),
+        params.rules,
         background=rgba(look.background),
         range_of=None if shared is None else partial(shared.range_of, perspective=view.perspective),
     )

@@ -80,6 +80,16 @@ def test_exact_words_show_what_discs_show_about_the_eye(draw: Draw) -> None:
     assert share_of_other_ids(discs, words) <= 0.005
 
 
+@pytest.mark.parametrize("projection", PROJECTIONS)
+def test_planes_in_16_bits_show_what_discs_show(draw: Draw, projection: str) -> None:
+    """But for discs that are nearer to each other than a step, at one pixel in a hundred."""
+    discs, words = drawn_both(draw, projection, "planes")
+    assert 0.002 < share_of_other_ids(discs, words) <= 0.01
+    same = (discs.id == words.id) & (words.id != NOTHING)
+    assert ((discs.id != NOTHING) == (words.id != NOTHING)).mean() > 0.9999
+    np.testing.assert_allclose(words.depth[same], discs.depth[same], atol=2e-4)
+
+
 @pytest.mark.xfail(
     strict=True,
     reason="84 % differ: a word has one depth, so that of discs that overlap the one with the nearer centre "

@@ -101,7 +101,7 @@ def measure_pixels(
             camera = _camera(pose, size, subject.up, projection)
             discs = _surface(bench, surfels.backend, surfels.params, pose, camera, size)
             stream = words.words_of(pose, discs.view, LOOK, words.Params())
-            for quality in ("table", "exact"):
+            for quality in ("table", "planes", "exact"):
                 drawn = _surface(bench, BACKEND, {"quality": quality}, pose, camera, size)
                 yield {
                     **row_of(bench, scene=subject.name, n=pose.count, size=list(size)),

@@ -51,8 +51,9 @@ class Sheet:
 
     size: (width, height). stride: columns of a strip. near, far: depths of the least and the largest Z, as
     pictures count them. is_inverse: whether Z counts inverse depths. has_finer: whether words have finer
-    depths, which are drawn in place of Z. line_starts: of words, as a stream has them. ranks: how many there
-    may be. has_owners: whether a rank is a number of one of the owners; else it is a row.
+    depths, which are drawn in place of Z, without as many of their last bits as `shift` says. line_starts: of
+    words, as a stream has them. ranks: how many there may be. has_owners: whether a rank is a number of one
+    of the owners; else it is a row.
     """
 
     size: tuple[int, int]
@@ -64,6 +65,7 @@ class Sheet:
     line_starts: NDArray[np.integer]
     ranks: int
     has_owners: bool
+    shift: int = 0
 
 
 @dataclass(frozen=True)
@@ -142,7 +144,7 @@ class WordBuffers:
             self.write("finer", stream.finer)
         return Sheet(
             stream.size, stream.stride, stream.near - base, stream.far - base, stream.perspective,
-            stream.finer is not None, stream.line_starts, count, has_owners,
+            stream.finer is not None, stream.line_starts, count, has_owners, stream.shift,
         )  # fmt: skip
 
     def release(self) -> None:
@@ -183,6 +185,8 @@ def draw_bands(
             shown, owned = is_surface and is_last, sheet.has_owners and is_last
             defines = {
                 "FINER": int(sheet.has_finer),
+                "SHIFT": sheet.shift,
+                "MOST_DEPTH": FINE_DEPTHS - 1,
                 "PACKED": int(packed),
                 "RANK_BITS": f"{RANK_BITS}u",
                 "PIXELS": room,
@@ -226,6 +230,7 @@ def _bands(sheet: Sheet, window: int, room: int) -> _Bands:
     columns = min(sheet.stride, room // window)
     strip_parts = -(-sheet.stride // columns)
     start, end = (1 / sheet.near, 1 / sheet.far) if sheet.is_inverse else (sheet.near, sheet.far)
+    step = (end - start) / ((FINE_DEPTHS >> sheet.shift) if sheet.has_finer else DEPTHS - 1)
     return _Bands(
         picture_size=sheet.size,
         stride=sheet.stride,
@@ -234,8 +239,8 @@ def _bands(sheet: Sheet, window: int, room: int) -> _Bands:
         strip_parts=strip_parts,
         parts=strip_parts * -(-sheet.size[0] // sheet.stride),
         is_inverse=sheet.is_inverse,
-        nearest=start,
-        depth_step=(end - start) / (FINE_DEPTHS if sheet.has_finer else DEPTHS - 1),
+        nearest=start + (0.5 * step if sheet.shift else 0.0),
+        depth_step=step,
         least_inverse=_LEAST_INVERSE,
     )
 
