@@ -107,9 +107,11 @@ def equal_streams(a: WordStream, b: WordStream) -> bool:
 
 
 @st.composite
-def streams(draw: st.DrawFn, finer: bool | None = None) -> WordStream:
+def streams(draw: st.DrawFn, finer: bool | None = None, sampled: bool = False) -> WordStream:
     """Streams of any words: ids that several have, depths that are equal, bitmaps beyond the edges."""
-    size = draw(st.tuples(st.integers(1, 30), st.integers(1, 20)))
+    samples = draw(st.sampled_from([1, 1, 2, 4])) if sampled else 1
+    width, height = draw(st.tuples(st.integers(1, 30 // samples), st.integers(1, 20 // samples)))
+    size = (samples * width, samples * height)
     stride = draw(st.integers(max(1, size[0] // 3), size[0]))
     strips = -(-size[0] // stride)
     lines = draw(st.lists(st.integers(0, strips * size[1] - 1), max_size=25))
@@ -131,5 +133,5 @@ def streams(draw: st.DrawFn, finer: bool | None = None) -> WordStream:
         size=size, stride=stride, line_starts=line_starts.astype(np.int64), words=encode_words(fields),
         ids=ids, near=2.0, far=5.0, materials=GREY, background=(10, 20, 30, 255),
         perspective=draw(st.booleans()), finer=steps.astype(np.int32) if has_finer else None,
-        depth_bits=draw(st.sampled_from([16, 24])) if has_finer else 24,
+        depth_bits=draw(st.sampled_from([16, 24])) if has_finer else 24, samples=samples,
     )  # fmt: skip

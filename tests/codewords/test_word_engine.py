@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from word_scenes import GREY, encode_words, front_view, scattered, streams
+from word_scenes import GREY, encode_words, front_view, one_element, scattered, streams
 
-from viewer.codewords.encode import Encoding, encode_elements
+from viewer.codewords.encode import Encoding, Light, encode_elements
 from viewer.codewords.engine import NO_KEY, NO_WORD, CodePicture, draw_words, draw_words_plainly
 from viewer.codewords.lighting import Materials
 from viewer.codewords.stream import FINE_DEPTHS, WordStream
+from viewer.codewords.tables import Steps
 from viewer.codewords.words import FIELDS
 from viewer.errors import InputError
+from viewer.srgb import bytes_from_light, light_from_bytes
 
 FULL = 0b111000_111000_111000_111000  # all eight columns
 
@@ -42,7 +44,7 @@ def stream_of(
 
 
 @settings(max_examples=60, deadline=None)
-@given(streams(), st.integers(8, 40))
+@given(streams(sampled=True), st.integers(8, 40))
 def test_the_engine_draws_as_its_twin_with_any_window(stream: WordStream, window: int) -> None:
     plain = draw_words_plainly(stream)
     assert same(draw_words(stream), plain)
@@ -135,6 +137,41 @@ def test_a_picture_can_lie_behind() -> None:
 def test_a_window_below_eight_lines_is_refused() -> None:
     with pytest.raises(InputError, match="a height of 7 lines"):
         draw_words(stream_of((5, 5), [], []), 7)
+
+
+def test_a_pixel_is_the_mean_light_of_its_samples() -> None:
+    """Of a word over the left half of a pixel; and what lies behind shows through."""
+    words = [(0, {"scans": 0b001000_001000_001000_001000, "mode": 1, "diffuse": 127, "material": 1})]
+    stream = replace(stream_of((8, 4), words, [3]), samples=4, background=(0, 0, 0, 255))
+    picture = draw_words(stream)
+    assert (stream.picture_size, picture.image.shape, picture.keys.shape) == ((2, 1), (1, 2, 4), (1, 2))
+    full = draw_words(replace(stream, samples=1)).image[0, 0, :3]
+    half = bytes_from_light(light_from_bytes(full) / 2)
+    assert np.abs(picture.image[0, 0, :3].astype(int) - half).max() <= 1
+    assert picture.image[0, 1].tolist() == [0, 0, 0, 255]
+    assert not picture.covered.any(), "the sample beside the middle"
+    clear = draw_words(replace(stream, background=(9, 9, 9, 0)))
+    assert clear.image[0, 0].tolist() == [*full, 128], "what is clear has no colour"
+    behind = np.array([[[255, 255, 255, 255], [1, 2, 3, 255]]], np.uint8)
+    assert draw_words(stream, background=behind).image[0, 1].tolist() == [1, 2, 3, 255]
+    with pytest.raises(InputError, match="whole pixels of 4 x 4 samples"):
+        replace(stream_of((6, 4), [], []), samples=4)
+
+
+@pytest.mark.parametrize("exact", [False, True])
+def test_samples_bring_pictures_nearer_to_the_shape(exact: bool) -> None:
+    """Of one disc: how much of each pixel it covers."""
+    view = front_view((40, 30))
+    y, x = np.mgrid[:480, :640] / 16
+    true = (np.hypot(x - 20.3, y - 14.6) <= 9.7).reshape(30, 16, 40, 16).mean(axis=(1, 3))
+    errors = []
+    for samples in (1, 2, 4):
+        element = one_element((0.3, 0.4, 0.0), 9.7)
+        rules = Encoding(Steps(sizes=65), exact=exact, samples=samples)
+        stream = encode_elements(element, view, GREY, Light(is_lit=False), rules, background=(0, 0, 0, 0))
+        errors.append(float(np.abs(draw_words(stream).image[..., 3] / 255 - true).mean()))
+    assert errors[2] < 0.5 * errors[0], errors
+    assert errors[1] < errors[0]
 
 
 def test_light_is_ambient_diffuse_and_specular() -> None:

@@ -99,6 +99,23 @@ def test_films_patterns_turntables_and_arrays(run: Run, scans: Path, tmp_path: P
     assert draw_words(stream).covered.any()
 
 
+def test_quality_is_samples(run: Run, scans: Path, tmp_path: Path) -> None:
+    """By either option; in files of code words as well."""
+    scan, out = scans / "ball.npz", tmp_path / "a.cw"
+    levels = []
+    for quality, samples in (("fast", 1), ("balanced", 4), ("fine", 16)):
+        assert run("render", scan, "-o", out, *SMALL, "--quality", quality, "--force").code == 0
+        assert json.loads(run("info", out, "--json").out)["samples"] == samples
+        assert run("render", out, "-o", tmp_path / "a.png", "--force").code == 0
+        options = ("--no-gl", "--look", f"quality={quality}", "--force")
+        assert run("render", scan, "-o", tmp_path / "b.png", *SMALL, *options).code == 0
+        shown = picture(tmp_path / "a.png")
+        assert np.array_equal(shown, picture(tmp_path / "b.png"))
+        assert shown.shape[:2] == (64, 96)
+        levels.append(len(np.unique(shown.reshape(-1, 4), axis=0)))
+    assert levels[0] < levels[1] < levels[2], "outlines have more levels"
+
+
 def test_sequences_of_code_words(run: Run, scans: Path, tmp_path: Path) -> None:
     """One stream and numbered files hold the same poses, and play as films, pictures and other files."""
     one, many, scan = tmp_path / "a.cw", tmp_path / "c%04d.cw", scans / "sequence"
@@ -165,7 +182,6 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
             (scan, "-o", "a.png", "--no-gl", "--marks", "stamp"),
             "--marks: applies only to pictures that Scan4D draws with OpenGL, without --no-gl",
         ),
-        ((scan, "-o", "a.png", "--no-gl", "--quality", "fine"), "--quality: applies only to"),
         ((scan, "-o", "a.exr", "--no-gl"), "cannot write '.exr' files"),
         (
             (scan, "-o", "a.png", "--no-gl", "--set", "normals=60"),
@@ -174,6 +190,7 @@ def test_what_needs_opengl_or_is_settled_is_refused(run: Run, scans: Path, tmp_p
         ((scan, "-o", "a.png", "--no-gl", "--set", "sises=3"), "Did you mean 'sizes'"),
         ((scan, "-o", "a.png", "--no-gl", "--look", "color_by=heat"), "unknown colour source 'heat'"),
         ((words, "-o", "a.png", "--size", "10x10"), "--size: has no effect"),
+        ((words, "-o", "a.png", "--quality", "fine"), "--quality: has no effect"),
         ((words, "-o", "a.png", "--look", "light=flat"), "--look: has no effect"),
         ((words, "-o", words, "--force"), "is an input of this command"),
         ((words, "-o", "a.png", "--pose", 1), "there is no pose 1"),

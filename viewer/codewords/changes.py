@@ -86,7 +86,11 @@ def group_count(stream: WordStream) -> int:
 def _are_alike(one: WordStream, other: WordStream) -> bool:
     """Whether two pictures are divided into lines alike, and have the same arrays."""
     divided = one.size == other.size and one.stride == other.stride
-    return divided and (one.finer is None, one.shift) == (other.finer is None, other.shift)
+    return divided and (one.finer is None, one.shift, one.samples) == (
+        other.finer is None,
+        other.shift,
+        other.samples,
+    )
 
 
 def _keys(stream: WordStream) -> NDArray[np.int64]:

@@ -86,7 +86,7 @@ class Encoding:
 
     steps: of sizes and normals. exact: whether outlines and depths are not rounded to steps, see above.
     radius_scale: factor on radii. cull_back: whether elements that face away are left out. depth_bits: of the
-    depth buffer of exact outlines, see `WordStream`.
+    depth buffer of exact outlines, see `WordStream`. samples: along the edge of a pixel, 1, 2 or 4.
     """
 
     steps: Steps = PAPER
@@ -94,6 +94,7 @@ class Encoding:
     radius_scale: float = 1.0
     cull_back: bool = False
     depth_bits: int = PLANE_BITS[-1]
+    samples: int = 1
 
 
 class EmittedWords(NamedTuple):
@@ -121,6 +122,7 @@ def encode_elements(
     least and the largest depth that are drawn; None: they are these. Raises InputError where there are too
     many words.
     """
+    view = _of_samples(view, rules.samples)
     check_picture_size(view.size)
     found = project_elements(elements, view, light, rules)
     stream = _stream(found, elements, view, materials, rules)
@@ -143,6 +145,7 @@ def _stream(
     return WordStream(
         size=view.size, stride=strip_width(view.size[0]), **emitted._asdict(), near=found.near + view.base,
         far=found.far + view.base, materials=materials, perspective=view.perspective, camera=_camera(view),
+        samples=rules.samples,
     )  # fmt: skip
 
 
@@ -157,6 +160,18 @@ def _within_sight(found: Projected, stream: WordStream, view: View) -> Projected
     low, high = int(keys.min()), max(int(keys.max()), int(keys.min()) + FINE_DEPTHS // 16)
     near, far = (float(depth) - view.base for depth in stream.depths(np.array([low, high])))
     return replace(found, near=near, far=far)
+
+
+def _of_samples(view: View, samples: int) -> View:
+    """The view whose pixels are the samples of a view's pixels, so many along an edge."""
+    if samples == 1:
+        return view
+    width, height = view.size
+    right, down = view.shift
+    return replace(
+        view, size=(width * samples, height * samples), scale=view.scale * samples,
+        shift=(right * samples, down * samples),
+    )  # fmt: skip
 
 
 def _camera(view: View) -> NDArray[np.float64]:

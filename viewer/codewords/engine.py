@@ -9,6 +9,9 @@ lowest id; of these the first in the stream. Depth is Z, or, where the stream ha
 + y down at the pixel's position (x, y) in the word's bitmap. A depth buffer of 16 bits
 holds that sum, cut to 0 to 2^24 - 1, without its last 8 bits. What lies right of a strip or below the picture
 is cut off.
+
+With several samples along a pixel's edge, all of this is about samples. A pixel has the mean of its samples'
+light and of their alpha; depth and word are those of one of them, right of and below the pixel's middle.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..srgb import light_from_bytes
 from ..threads import ranges, threads_for, together
 from .lighting import LIGHT_BYTES
 from .stream import FINE_DEPTHS, WordStream
@@ -87,7 +91,7 @@ def draw_words(
         )
 
     together(_PIXELS * len(stream), [partial(drawn, *part) for part in _parts(stream)])
-    return picture
+    return resolved(picture)
 
 
 def _parts(stream: WordStream) -> list[tuple[int, int, int]]:
@@ -134,7 +138,31 @@ def draw_words_plainly(
             picture.image[y, part][seen, 3] = 255
             picture.keys[y, part], picture.indices[y, part] = keys[y % window], indices[y % window]
             keys[y % window], indices[y % window] = NO_KEY, NO_WORD
-    return picture
+    return resolved(picture)
+
+
+def resolved(picture: CodePicture) -> CodePicture:
+    """The picture that samples make."""
+    samples = picture.stream.samples
+    if samples == 1:
+        return picture
+    width, height = picture.stream.picture_size
+
+    def sums(values: NDArray[np.uint32]) -> NDArray[np.uint32]:
+        parts = values.reshape(height, samples, width, samples, -1)
+        return parts.sum(axis=(1, 3), dtype=np.uint32)
+
+    alpha = picture.image[..., 3:].astype(np.uint32)
+    light, weights = sums(light_from_bytes(picture.image[..., :3]) * alpha), sums(alpha)
+    weight = np.maximum(weights, 1)
+    colors = LIGHT_BYTES[(light + weight // 2) // weight]
+    opaque = (weights + samples * samples // 2) // (samples * samples)
+    middle = slice(samples // 2, None, samples)
+    return CodePicture(
+        picture.stream, np.concatenate([colors, opaque.astype(np.uint8)], axis=2),
+        np.ascontiguousarray(picture.keys[middle, middle]),
+        np.ascontiguousarray(picture.indices[middle, middle]),
+    )  # fmt: skip
 
 
 def _id(stream: WordStream, index: int) -> int:
@@ -142,8 +170,8 @@ def _id(stream: WordStream, index: int) -> int:
 
 
 def begun(stream: WordStream, window: int, background: NDArray[np.uint8] | None) -> CodePicture:
-    """A picture of which nothing is drawn yet. Raises InputError."""
-    width, height = stream.size
+    """Samples of which none is drawn yet. Raises InputError."""
+    width, height = stream.picture_size
     if window < BITMAP:
         raise InputError(
             f"a window with a height of {window} lines is too small",
@@ -154,7 +182,11 @@ def begun(stream: WordStream, window: int, background: NDArray[np.uint8] | None)
             f"the background has the shape {background.shape}, but the picture has {width} x {height} pixels"
         )
         raise InputError(what, hint="Give a background of shape (height, width, 4)")
-    image = np.empty((height, width, 4), np.uint8)
-    image[:] = stream.background if background is None else background
-    keys = np.full((height, width), NO_KEY, np.int32)
-    return CodePicture(stream, image, keys, np.full((height, width), NO_WORD, np.uint32))
+    columns, lines = stream.size
+    image = np.empty((lines, columns, 4), np.uint8)
+    if background is None:
+        image[:] = stream.background
+    else:
+        image[:] = background.repeat(stream.samples, axis=0).repeat(stream.samples, axis=1)
+    keys = np.full((lines, columns), NO_KEY, np.int32)
+    return CodePicture(stream, image, keys, np.full((lines, columns), NO_WORD, np.uint32))

@@ -7,8 +7,8 @@ over a plane in the picture, as depth buffers do: depth in parallel views, and i
 A packed stream, all little-endian, is a file of one picture:
 
     8 bytes    "SCAN4DCW"
-    uint32     version 1; flags (1: perspective, 2: finer depths, 4: camera, 8: depth buffer of 16 bits);
-               width; height; strips; materials
+    uint32     version 1; flags (1: perspective, 2: finer depths, 4: camera, 8: depth buffer of 16 bits,
+               16: 2 samples along a pixel's edge, 32: 4); width; height; strips; materials
     uint64     words
     float64    nearest depth (Z = 0); farthest depth (Z = 511), scan units
     4 bytes    background, sRGB and alpha
@@ -43,6 +43,7 @@ STEEPEST_DEPTHS = 1 << 26  # that finer depths may grow by in a pixel
 MAGIC = b"SCAN4DCW"  # of every file of code words
 _VERSION = 1
 _PERSPECTIVE, _FINER, _CAMERA, _SIXTEEN = 1, 2, 4, 8  # flags
+_SAMPLES = {1: 0, 2: 16, 4: 32}  # samples along the edge of a pixel -> flag
 _CAMERA_NUMBERS = 15
 _HEADER = struct.Struct("<8s6IQdd4s")
 _CHECKSUM = struct.Struct("<I")
@@ -71,6 +72,9 @@ class WordStream:
     views; the pixel of the line of sight, right and down; then, row by row, the (3, 4) matrix that takes
     points of the scan's world to the camera, which looks down -z.
 
+    samples: along the edge of a pixel of the finished picture, 1, 2 or 4. With several, each pixel of the
+    stream is a sample, and a pixel of the picture has the mean of its samples.
+
     Raises InputError where it is no stream that an engine can draw.
     """
 
@@ -87,6 +91,7 @@ class WordStream:
     finer: NDArray[np.int32] | None = field(default=None)
     camera: NDArray[np.float64] | None = None
     depth_bits: int = 24
+    samples: int = 1
 
     def __post_init__(self) -> None:
         check_picture_size(self.size)
@@ -96,6 +101,10 @@ class WordStream:
         self._check_depths()
         self._check_words()
         self._check_camera()
+        if self.samples not in _SAMPLES or any(edge % self.samples for edge in self.size):
+            raise InputError(
+                f"the samples do not form whole pixels of {self.samples} x {self.samples} samples"
+            )
 
     def _check_lines(self) -> None:
         count = len(self.words)
@@ -156,6 +165,11 @@ class WordStream:
         return -(-self.size[0] // self.stride)
 
     @property
+    def picture_size(self) -> tuple[int, int]:
+        """(width, height) of the finished picture."""
+        return self.size[0] // self.samples, self.size[1] // self.samples
+
+    @property
     def nbytes(self) -> int:
         """Bytes of what an engine is sent, without the materials."""
         finer = 0 if self.finer is None else self.finer.nbytes
@@ -206,7 +220,7 @@ def strip_width(width: int) -> int:
 def stream_to_bytes(stream: WordStream) -> bytes:
     """The bytes of a stream, as a file of one picture holds them."""
     flags = _PERSPECTIVE * stream.perspective | _FINER * (stream.finer is not None)
-    flags |= _CAMERA * (stream.camera is not None) | _SIXTEEN * (stream.shift > 0)
+    flags |= _CAMERA * (stream.camera is not None) | _SIXTEEN * (stream.shift > 0) | _SAMPLES[stream.samples]
     header = _HEADER.pack(
         MAGIC, _VERSION, flags, *stream.size, stream.strips, len(stream.materials), len(stream),
         stream.near, stream.far, bytes(stream.background),
@@ -250,7 +264,7 @@ def stream_bytes(header: bytes) -> int:
     _, version, flags, width, height, strips, materials, words, *_ = _HEADER.unpack_from(header)
     if version != _VERSION:
         raise InputError(f"is of version {version}", hint=f"This version of Scan4D reads version {_VERSION}")
-    if flags & ~(_PERSPECTIVE | _FINER | _CAMERA | _SIXTEEN):
+    if flags & ~(_PERSPECTIVE | _FINER | _CAMERA | _SIXTEEN | sum(_SAMPLES.values())):
         raise InputError(f"has unknown flags: {flags}")
     check_picture_size((width, height))
     if not -(-width // COLUMNS) <= strips <= width:
@@ -291,5 +305,6 @@ def _stream_of(data: bytes) -> WordStream:
         background=tuple(background),
         perspective=bool(flags & _PERSPECTIVE),
         camera=camera,
+        samples=next((each for each, flag in _SAMPLES.items() if flag == flags & sum(_SAMPLES.values())), 0),
         depth_bits=PLANE_BITS[0] if flags & _SIXTEEN else PLANE_BITS[-1],
     )

@@ -39,9 +39,10 @@ from ._scans import chosen_poses, first_readable, frame_title, open_timeline, re
 BACKEND = "codeword"
 _SUFFIXES = (".png", ".npz", FILM_SUFFIX, SUFFIX)
 _SIZE = (1920, 1280)
+SAMPLES = {"fast": 1, "balanced": 2, "fine": 4}  # along the edge of a pixel, by the look's quality
 # Arguments of `scan4d render` that are for OpenGL's pictures alone, and those that a stream has settled.
-_NEED_GL = ("marks", "stats", "repeat", "replay", "anonymous", "quality", "budget", "error")
-_SETTLED = ("size", "set", "look", "camera", "orbit", "turntable")
+_NEED_GL = ("marks", "stats", "repeat", "replay", "anonymous", "budget", "error")
+_SETTLED = ("size", "set", "look", "camera", "orbit", "turntable", "quality")
 
 
 def is_asked(args: Namespace) -> bool:
@@ -94,7 +95,7 @@ def _replay(args: Namespace, path: Path) -> None:
         def words(index: int) -> WordStream:
             return files[0].read(index) if len(files) == 1 else files[index].read(0)
 
-        size = words(shots[0].pose).size
+        size = words(shots[0].pose).picture_size
         draw = partial(draw_words, background=_background(args.behind, size))
         with (
             _written(args.out, size, times, draw, len(shots)) as put,
@@ -102,8 +103,9 @@ def _replay(args: Namespace, path: Path) -> None:
         ):
             for shot in shots:
                 stream = words(shot.pose)
-                if stream.size != size and (times is not None or args.behind):
-                    what = "has {} x {} pixels, but the first picture has {} x {}".format(*stream.size, *size)
+                drawn = stream.picture_size
+                if drawn != size and (times is not None or args.behind):
+                    what = "has {} x {} pixels, but the first picture has {} x {}".format(*drawn, *size)
                     raise InputError(what, timeline.label(shot.pose), "Draw this picture alone")
                 put(shot, stream, None)
                 tick()
@@ -117,6 +119,7 @@ def _check_output(out: Path, several: bool) -> None:
 def _draw(args: Namespace) -> None:
     """Encode poses of a scan, and draw them or write their code words."""
     look, params = parse(Look, dict(args.look), "look"), _params(args)
+    samples = SAMPLES[args.quality or dict(args.look).get("quality", "fast")]
     camera = Camera.load(args.camera) if args.camera else None
     with open_timeline(args, args.scan or DEMO) as timeline:
         indices, size = chosen_poses(args, timeline) or [0], args.size or _SIZE
@@ -146,7 +149,7 @@ def _draw(args: Namespace) -> None:
                 for shot in shots:
                     if shot.pose == pose.index:
                         view = view_of(Request(pose, camera_of(shot)), size)
-                        put(shot, words_of(known, view, own, params, shared=shared), pose)
+                        put(shot, words_of(known, view, own, params, shared=shared, samples=samples), pose)
                         tick()
 
 

@@ -24,7 +24,8 @@ def stream_facts(path: str) -> dict[str, Any]:
         "keys": file.keys,
         "times": None if file.times is None else {"first": file.times[0], "last": file.times[-1]},
         "file_bytes": file.nbytes,
-        "size": list(stream.size),
+        "size": list(stream.picture_size),
+        "samples": stream.samples**2,
         "strips": stream.strips,
         "words": len(stream),
         "tiles": int(fields["mode"].sum()),
@@ -47,6 +48,7 @@ def stream_as_text(facts: dict[str, Any]) -> str:
         ("code words", facts["name"]),
         *_sequence_lines(facts),
         ("picture", "{} x {} pixels".format(*facts["size"])),
+        ("samples", f"{facts['samples']} a pixel"),
         ("strips", f"{facts['strips']}"),
         (
             "words",

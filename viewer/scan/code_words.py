@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from .pose import Pose
 from .ranges import robust_range
 from .spacing import typical_spacing
 
+_MOST_SIZES = 65  # of a table
 _RADIUS_PER_SPACING = 1.5  # closes a surface that is evenly covered
 _BEYOND = 1 / 16  # of the depths of the first picture, that a sequence's reach beyond them at each end
 _LEAST_FILLED = 0.5  # of the depths of a sequence, that a picture fills
@@ -110,11 +111,13 @@ class Params:
         """Steps of the table. Raises InputError."""
         return Steps(self.sizes, self.size_parts, self.normals, self.normal_parts)
 
-    @property
-    def rules(self) -> Encoding:
-        """Rules of encoding. Raises InputError."""
+    def rules(self, samples: int = 1) -> Encoding:
+        """Rules of encoding. samples: along the edge of a pixel. With several, the table has more sizes: then
+        it reaches to the same radius, as far as a table may. Raises InputError."""
         bits = PLANE_BITS[0] if self.quality == "planes" else PLANE_BITS[-1]
-        return Encoding(self.steps, self.quality != "table", self.radius_scale, self.cull_back, bits)
+        sizes = min(samples * (self.sizes - 1) + 1, max(self.sizes, _MOST_SIZES))
+        steps = replace(self.steps, sizes=sizes)
+        return Encoding(steps, self.quality != "table", self.radius_scale, self.cull_back, bits, samples)
 
 
 class Shared:
@@ -174,9 +177,11 @@ def words_of(
     params: Params,
     layers: Layers = NO_LAYERS,
     shared: Shared | None = None,
+    samples: int = 1,
 ) -> WordStream:
     """Code words of a pose as a view shows it; ids are rows of its cloud. view: from an origin of positions.
-    shared: with other pictures of a sequence; None: the picture stands alone.
+    shared: with other pictures of a sequence; None: the picture stands alone. samples: along the edge
+    of a pixel, 1, 2 or 4.
 
     Points without a normal face the eye, those without a radius have one for all. Raises InputError for what
     the scan or the parameters do not allow.
@@ -187,7 +192,7 @@ def words_of(
         view,
         materials,
         lights,
-        params.rules,
+        params.rules(samples),
         background=rgba(look.background),
         range_of=None if shared is None else partial(shared.range_of, perspective=view.perspective),
     )

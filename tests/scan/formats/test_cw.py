@@ -38,10 +38,12 @@ def ball() -> Pose:
     )
 
 
-def words(projection: str = "perspective", quality: str = "exact") -> WordStream:
+def words(projection: str = "perspective", quality: str = "exact", samples: int = 1) -> WordStream:
     pose = ball()
     camera = Camera.orbit(pose.bounds, 30, 20, aspect=1.5, projection=projection)
-    return words_of(pose, view_of(Request(pose, camera), SIZE), Look(), Params(quality=quality))
+    return words_of(
+        pose, view_of(Request(pose, camera), SIZE), Look(), Params(quality=quality), samples=samples
+    )
 
 
 def view_read(path: Path, frame: int = 0) -> RangeView:
@@ -50,9 +52,10 @@ def view_read(path: Path, frame: int = 0) -> RangeView:
     return found[0]
 
 
+@pytest.mark.parametrize("samples", [1, 4])
 @pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-def test_pixels_lie_on_the_surface(tmp_path: Path, projection: str) -> None:
-    stream = words(projection)
+def test_pixels_lie_on_the_surface(tmp_path: Path, projection: str, samples: int) -> None:
+    stream = words(projection, samples=samples)
     write_stream(stream, tmp_path / "a.cw")
     view = view_read(tmp_path / "a.cw")
     assert np.array_equal(view.valid(), draw_words(stream).covered)

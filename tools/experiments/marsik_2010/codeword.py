@@ -35,6 +35,9 @@ EXPERIMENT = Suite(
             ("scene", "projection", "quality", "ids", "nearest", "covered", "depth", "normal"),
             words.measure_pixels,
         ),
+        "truth": Part(
+            ("scene", "quality", "samples", "psnr", "psnr_edges", "normal"), words.measure_truth
+        ),
         "tables": Part(
             ("steps", "sizes", "normals", "busy_ms", "nbytes", "bitmap_bytes"), words.measure_tables
         ),
@@ -60,6 +63,15 @@ EXPERIMENT = Suite(
                 Column("normals, degrees", "normal", "{:.2f}"),
             ],
             "pixels",
+        ),
+        Table(
+            "truth",
+            [
+                code("scene"), Column("quality"), Column("samples a pixel", "samples", "{}"),
+                Column("PSNR, dB", "psnr", "{:.1f}"), Column("PSNR at outlines, dB", "psnr_edges", "{:.1f}"),
+                Column("normals, degrees", "normal", "{:.2f}"),
+            ],
+            "truth",
         ),
         Table(
             "tables",

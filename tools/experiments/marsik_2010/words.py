@@ -14,26 +14,34 @@ from itertools import cycle
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from experiments.suite import row_of, subjects
 from experiments.tables import Row
 from experiments.timing import by_turns
 from viewer.backends import backend
 from viewer.bench.run import LOOK, Bench
+from viewer.bench.truth.surface import reference_surface
 from viewer.camera import PROJECTIONS, Camera
-from viewer.codewords.engine import draw_words
+from viewer.codewords.engine import CodePicture, draw_words
 from viewer.codewords.stream import WordStream
 from viewer.codewords.tables import PAPER, Steps, shape_table
 from viewer.drawing.frame import render_frame
 from viewer.drawing.request import Request, view_of
 from viewer.drawing.timing import draw
 from viewer.gpu.constants import NOTHING
+from viewer.mesh.reference import Reference, trace
 from viewer.picture.surface import Surface
 from viewer.scan import code_words as words
 from viewer.scan.pose import Pose
+from viewer.srgb import bytes_from_light, light_from_bytes
 
 SCENES = ("torus", "horse", "armadillo")
+TRUTH_SCENES = ("torus", "bunny", "horse", "armadillo")
 COUNT = 25_816  # elements of the paper's bone, Fig. 6
+QUALITIES = ("table", "planes", "exact")
+TRUTH_SIZE = (320, 240)
+_TRUE_SAMPLES = 4  # along the edge of a pixel
 SIZES = ((640, 480), (1024, 768))
 BACKEND = "codeword"
 WITHOUT_GL = "without OpenGL"
@@ -101,7 +109,7 @@ def measure_pixels(
             camera = _camera(pose, size, subject.up, projection)
             discs = _surface(bench, surfels.backend, surfels.params, pose, camera, size)
             stream = words.words_of(pose, discs.view, LOOK, words.Params())
-            for quality in ("table", "planes", "exact"):
+            for quality in QUALITIES:
                 drawn = _surface(bench, BACKEND, {"quality": quality}, pose, camera, size)
                 yield {
                     **row_of(bench, scene=subject.name, n=pose.count, size=list(size)),
@@ -147,6 +155,60 @@ def nearest_to_a_step(drawn: Surface, discs: Surface, stream: WordStream) -> flo
         met = 1 + np.vecdot(points - starts, normals) / np.vecdot(ends - starts, normals)
         steps = stream.steps_of(met + view.base) - stream.steps_of(discs.depth[both])
     return round(100 * float((np.abs(steps) <= 1).mean()), 2)
+
+
+def measure_truth(
+    bench: Bench, scenes: Sequence[str] = TRUTH_SCENES, count: int = COUNT, size: tuple[int, int] = TRUTH_SIZE
+) -> Iterator[Row]:
+    """Yield a row for each scene, quality and number of samples: errors of pictures without OpenGL against
+    the ray-traced surface, whose pixels are means of `_TRUE_SAMPLES` squared samples."""
+    for subject in subjects(bench, scenes, count):
+        moment = subject.moment(0)
+        camera = _camera(moment.pose, size, subject.up)
+        fine = (size[0] * _TRUE_SAMPLES, size[1] * _TRUE_SAMPLES)
+        reference = trace(moment.truth, camera, fine)
+        surface = reference_surface(reference, bench.renderer.gpu, LOOK)
+        light = _means(light_from_bytes(surface.image()[..., :3]).astype(np.float64))
+        true = bytes_from_light(light).astype(np.float64)
+        covered = _means(reference.covered[..., None].astype(np.float64))[..., 0]
+        surface.release()
+        view = view_of(Request(moment.pose, camera), size)
+        for quality in QUALITIES:
+            for samples in (1, 2, 4):
+                params = words.Params(quality=quality)
+                stream = words.words_of(moment.pose, view, LOOK, params, samples=samples)
+                picture = draw_words(stream)
+                squares = np.square(picture.image[..., :3] - true).mean(axis=2)
+                yield {
+                    **row_of(bench, scene=subject.name, n=moment.pose.count, size=list(size)),
+                    "quality": quality,
+                    "samples": samples**2,
+                    "psnr": _psnr(squares[covered > 0]),
+                    "psnr_edges": _psnr(squares[(covered > 0) & (covered < 1)]),
+                    "normal": _normal_error(picture, reference, moment.pose),
+                }
+
+
+def _means(samples: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The means of the samples of each pixel, (H, W, C)."""
+    height, width, channels = samples.shape
+    parts = samples.reshape(height // _TRUE_SAMPLES, _TRUE_SAMPLES, width // _TRUE_SAMPLES, -1, channels)
+    return parts.mean(axis=(1, 3))
+
+
+def _psnr(squares: NDArray[np.float64]) -> float:
+    return round(float(10 * np.log10(255**2 / squares.mean())), 2)
+
+
+def _normal_error(picture: CodePicture, reference: Reference, pose: Pose) -> float:
+    """Median angle between the normals of the shown points and those of the surface, degrees."""
+    middle = slice(_TRUE_SAMPLES // 2, None, _TRUE_SAMPLES)
+    true, is_true = reference.normal[middle, middle], reference.covered[middle, middle]
+    both = picture.covered & is_true
+    assert pose.cloud.normals is not None
+    shown = pose.cloud.normals[picture.ids()[both]]
+    cosines = np.abs(np.vecdot(shown, true[both])).clip(0, 1)
+    return round(float(np.degrees(np.arccos(np.median(cosines)))), 2)
 
 
 def measure_tables(bench: Bench, scenes: Sequence[str] = ()) -> Iterator[Row]:

@@ -64,7 +64,10 @@ def _view_of(picture: CodePicture) -> RangeView:
         )
     if not picture.covered.any():
         raise EmptyFrame("shows no disc")
-    scale, center_x, center_y = stream.camera[:3]
+    samples = stream.samples
+    scale = stream.camera[0] / samples
+    # The sample that a pixel's depth is of lies right of and below its middle.
+    center_x, center_y = (stream.camera[1:3] - samples // 2 - 0.5) / samples + 0.5
     world_to_camera = np.vstack([stream.camera[3:].reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
     return RangeView(
         depth=picture.depths(), kind="z" if stream.perspective else "height", mask=picture.covered,
