@@ -43,6 +43,14 @@ def test_surfaces_have_no_noise() -> None:
         assert not noise_of(PointCloud.from_arrays(points)).stands_out
 
 
+def test_what_float32_rounds_off_far_from_the_origin_is_no_noise() -> None:
+    """Offsets from the origin are rounded to about a spacing there; their remainders are not."""
+    cloud = PointCloud.from_arrays(noisy(0) + 1e5, origin=np.zeros(3))
+    assert cloud.remainders is not None
+    assert not noise_of(cloud).stands_out
+    assert noise_of(cloud).deviation < 0.02 * SPACING
+
+
 def test_copies_are_no_noise_and_hide_none() -> None:
     points = noisy(0.5 * SPACING)
     once, often = (noise_of(PointCloud.from_arrays(np.repeat(points, times, axis=0))) for times in (1, 30))

@@ -68,10 +68,10 @@ def _noise(cloud: PointCloud) -> Noise:
     for nearest in _NEAREST:
         if 2 * nearest > len(cloud):
             break
-        near = [cloud.positions[nearest_rows(cloud, row, nearest)] for row in rows]
+        near = [_exact(cloud, nearest_rows(cloud, row, nearest)) for row in rows]
         if nearest == _NEAREST[0] and any(len(np.unique(points, axis=0)) < nearest for points in near):
             return _noise_of_distinct(cloud)
-        shares, reaches = np.array([_off_quadric(points.astype(np.float64)) for points in near]).T
+        shares, reaches = np.array([_off_quadric(points) for points in near]).T
         spacing = float(np.median(reaches)) * float(np.sqrt(np.pi / nearest))
         noise = Noise(float(np.median(shares * reaches)), spacing)
         if np.median(shares) < _NEAR:
@@ -84,8 +84,15 @@ def _noise_of_distinct(cloud: PointCloud) -> Noise:
 
     The positions stay in order, so that copies do not change the result.
     """
-    rows = np.sort(np.unique(cloud.positions, axis=0, return_index=True)[1])
-    return _noise(PointCloud(positions=cloud.positions[rows], origin=cloud.origin))
+    rows = np.sort(np.unique(_exact(cloud, slice(None)), axis=0, return_index=True)[1])
+    remainders = None if cloud.remainders is None else cloud.remainders[rows]
+    return _noise(PointCloud(positions=cloud.positions[rows], origin=cloud.origin, remainders=remainders))
+
+
+def _exact(cloud: PointCloud, rows: NDArray[np.intp] | slice) -> NDArray[np.float64]:
+    """Positions of rows relative to the cloud's origin, (R, 3), with what float32 rounds off far from it."""
+    points = cloud.positions[rows].astype(np.float64)
+    return points if cloud.remainders is None else points + cloud.remainders[rows]
 
 
 def _sample_rows(cloud: PointCloud) -> list[int]:
@@ -126,9 +133,7 @@ def steady_positions(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
 def steadied(cloud: PointCloud, noise: Noise) -> SteadyPoints:
     """The points of a cloud on planes through the points around."""
     edge = float(np.hypot(_CELLS[0] * noise.spacing, _CELLS[1] * noise.deviation))
-    points = cloud.positions.astype(np.float64)
-    if cloud.remainders is not None:
-        points += cloud.remainders
+    points = _exact(cloud, slice(None))
     farthest, times = _FARTHEST * noise.deviation, 2 if noise.deviation > _OUTLIERS * noise.spacing else 1
     for _ in range(times):
         points, normals = _moved_to_planes(points, edge, farthest)
