@@ -19,9 +19,11 @@ def column_through(
 ) -> Column:
     """The points (n, 3) that are so near to the ray through a place, both relative to the view's origin."""
     pixel = VIEW.project(place[None])[0][0]
-    away = Ray(place, VIEW.along(pixel)).away(points)
+    step = VIEW.along(pixel)
+    ray = Ray(VIEW.unproject(pixel[None], np.ones(1))[0] - step, step)
+    away = ray.away(points)
     near = away <= reach
     pixels, depths = VIEW.project(points[near])
     return Column(
-        VIEW, np.flatnonzero(near), points[near], pixels - pixel, depths, away[near], reach, spacing
+        VIEW, ray, np.flatnonzero(near), points[near], pixels - pixel, depths, away[near], reach, spacing
     )

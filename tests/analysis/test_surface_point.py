@@ -130,6 +130,15 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     assert made.uncertainty is not None
 
 
+def test_a_place_where_another_surface_may_be_meant_is_refused_unless_allowed() -> None:
+    pose = Pose(0, 0.0, "", plane(40, depth=4.0))
+    picked = Picked(np.array([0.01, 0.01, -4.0]), level=0, doubt=0.12)
+    with pytest.raises(InputError, match=r"in front or behind \(12%\)\. Click here again"):
+        SurfacePoint.of(picked, pose)
+    assert SurfacePoint.of(picked, pose, doubtful=True).at_outline
+    assert not SurfacePoint.of(replace(picked, doubt=0.04), pose).at_outline
+
+
 def test_on_a_measured_surface_without_a_point_the_spacing_counts() -> None:
     cloud = plane(40, depth=4.0)
     made = SurfacePoint.of(Picked(np.array([0.01, 0.01, -4.0]), level=0), Pose(0, 0.0, "", cloud))

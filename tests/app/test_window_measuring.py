@@ -32,6 +32,12 @@ def grid(scale: float) -> NDArray[np.float64]:
     return np.stack([x.ravel(), y.ravel(), np.zeros(165)], axis=1) * 8 * scale
 
 
+def wall(columns: range, z: float) -> NDArray[np.float64]:
+    """Points at a depth in the same steps, 17 in each column, (17 n, 3)."""
+    x, y = np.meshgrid(np.array(columns), np.arange(17) - 8)
+    return np.stack([8.0 * x.ravel(), 8.0 * y.ravel(), np.full(x.size, z)], axis=1)
+
+
 def pixel_of(app: RunningApp, points: NDArray[np.float64], number: int) -> tuple[int, int]:
     """Where the screen shows a point."""
     left, top, width, height = app.view()
@@ -222,3 +228,41 @@ def test_a_double_click_in_a_slow_window_sets_one_end(screen: Screen, tmp_path: 
         measure(app, points, 34, 128)
         after = app.settle()
         assert (after.is_under_way, len(after.distances)) == (False, 1)
+
+
+@pytest.mark.slow
+def test_where_another_surface_may_be_meant_the_second_click_counts(screen: Screen, tmp_path: Path) -> None:
+    """Beside the last points of a wall before another, these do not tell which of the two is seen."""
+    front, behind = (wall(*extent) for extent in ((range(-5, 1), 0.0), (range(-5, 6), -40.0)))
+    points = np.concatenate([front, behind, [(3.0, 8.0, 0.0)]])
+    write_mesh(tmp_path / "scan.ply", points[:-1], FACES)
+    with running_app(screen, tmp_path, tmp_path / "scan.ply") as app:
+        screen.do("key", "m")
+        app.see(clicking="measuring")
+        place = pixel_of(app, points, -1)
+        click(app, place)
+        app.told(r"may be on the surface in front or behind \(\d+%\)\. Click here again")
+        assert not app.settle().is_under_way
+        inside = int(np.flatnonzero((points == (-16.0, 8.0, 0.0)).all(axis=1))[0])
+        click(app, pixel_of(app, points, inside))
+        app.see(is_under_way=True)
+        click(app, place)
+        app.told("Click here again")
+        assert not app.settle().distances, "a click elsewhere takes back what the first one was for"
+        click(app, place)
+        if not app.settle().distances:
+            click(app, place)  # the one before was the second of a double click
+        made = app.see(lambda state: state.distances).distances[-1]
+        assert abs(made["distance"] - (16 + 3)) < made["uncertainty"]
+
+        app.do(("key", "Escape"))
+        app.see(clicking=None)
+        screen.do("key", "k")
+        app.see(clicking="landmarks")
+        click(app, place)
+        app.told("Click here again")
+        assert not app.settle().landmarks
+        click(app, place)
+        if not app.settle().landmarks:
+            click(app, place)
+        app.see(lambda state: len(state.landmarks) == 1)

@@ -20,9 +20,6 @@ _START = 0.5  # spacings behind the nearest point
 _BEHIND = 2.0  # spacings behind a certain surface, from which on nothing is looked for
 _TRIES = 12  # depths at most
 _SAME = 1.0, 2.0  # spacings and deviations within which two surfaces are one
-# Cosines of the angle to the picture: a steeper surface than the first may as well pass the ray by, one that
-# is flatter than the second meets it.
-_STEEP, _FLAT = 0.1, 0.3
 _CERTAIN = 1e-3  # doubt below which nothing is looked for behind a surface
 _FEW = 4  # points at least that hide what lies behind them
 _WIDEST = 5 / 6 * np.pi  # angle without any of those that lie all round
@@ -55,17 +52,14 @@ def _surfaces(column: Column, shown: float) -> tuple[list[LocalSurface], dict[fl
     found: list[LocalSurface] = []
     unclear: dict[float, Unclear] = {}
 
-    def look(start: float, steepest: float) -> None:
+    def look(start: float) -> None:
         surface = local_surface(column, start)
         if isinstance(surface, Unclear):
             unclear[start] = surface
-            return
-        meets = np.clip((1 / surface.lean(column.view) - _STEEP) / (_FLAT - _STEEP), steepest, 1.0)
-        surface = surface._replace(doubt=float(1 - (1 - surface.doubt) * meets))
-        if surface.doubt < 1 and not any(_are_one(surface, other) for other in found):
+        elif surface.doubt < 1 and not any(_are_one(surface, other) for other in found):
             found.append(surface)
 
-    look(shown, 1.0)
+    look(shown)
     back, spacing = (found[0].depth, found[0].spacing) if found else (shown, column.spacing)
     start, tries = -np.inf, 0
     for depth in np.sort(column.depths[column.away < _BESIDE * spacing]):
@@ -76,7 +70,7 @@ def _surfaces(column: Column, shown: float) -> tuple[list[LocalSurface], dict[fl
         if tries == _TRIES or (is_certain and start > back + _BEHIND * spacing):
             break
         if all(abs(start - surface.depth) >= spacing for surface in found):
-            look(start, 0.0)
+            look(start)
             tries += 1
     return sorted(found, key=lambda surface: surface.depth), unclear
 

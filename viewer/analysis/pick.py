@@ -208,9 +208,10 @@ def _column(surface: Surface, pixel: NDArray[np.float64], depth: float, reach: f
     view = surface.view
     ids, points = surface.points_along(pixel, depth, reach)
     pixels, depths = view.project(points)
-    ray = Ray(view.unproject(pixel[None], np.array([depth]))[0], view.along(pixel))
+    step = view.along(pixel)
+    ray = Ray(view.unproject(pixel[None], np.ones(1))[0] - step, step)
     usual = surface.scanned.pose.spacing
-    return Column(view, ids, points, pixels - pixel, depths, ray.away(points), reach, usual)
+    return Column(view, ray, ids, points, pixels - pixel, depths, ray.away(points), reach, usual)
 
 
 def _pitch(surface: Surface, depth: float) -> float:

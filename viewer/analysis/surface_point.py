@@ -51,19 +51,33 @@ class SurfacePoint:
     averaged: int = 0
 
     @classmethod
-    def of(cls, picked: Picked, pose: Pose, *, filled: bool = False, place: Rigid = STILL) -> SurfacePoint:
+    def of(
+        cls,
+        picked: Picked,
+        pose: Pose,
+        *,
+        filled: bool = False,
+        doubtful: bool = False,
+        place: Rigid = STILL,
+    ) -> SurfacePoint:
         """The surface point that was picked, with its spacing, in scan coordinates. place: the motion by
         which the picture shows the pose.
 
         filled: whether a place may be taken that no point shows, also where it is not between points of one
         surface that lie a few spacings away. Where the points around do not tell of a
-        surface, it is as uncertain as they are apart, or as the nearest is far. Raises InputError for a
-        filled place where it may not be taken.
+        surface, it is as uncertain as they are apart, or as the nearest is far. doubtful: whether a place
+        may be taken where another surface may be meant (`Picked.at_outline`). Raises InputError for a
+        filled or doubtful place where it may not be taken.
         """
         if not (picked.measured or picked.between or filled):
             hint = "Zoom in, or tick 'Allow clicks on filled holes'"
             raise InputError(
                 "there are no measured points here, because the renderer has filled a hole", hint=hint
+            )
+        if picked.at_outline and not doubtful:
+            raise InputError(
+                f"this position may be on the surface in front or behind ({picked.doubt:.0%})",
+                hint="Click here again to use it anyway, or turn the view to see the surface from its front",
             )
         spacing, neighbors = picked.spacing, picked.neighbors
         if picked.point is None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ....analysis.landmarks import Landmark, Template
 from ....analysis.landmarks.mirroring import Proposal, proposal_for
 from ....analysis.pick import are_seen
-from ....analysis.surface_point import SurfacePoint, slack_before
+from ....analysis.surface_point import slack_before
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector, vector
@@ -230,9 +230,7 @@ class Tool:
 
     def _set(self, landmark: Landmark, click: Click, name: str, merge: object = None) -> None:
         """Set one at what is seen, and go on to the next. name, merge: of the step of the history."""
-        if click.picked is None:
-            raise InputError("No surface here: click on the scan.")
-        point = SurfacePoint.of(click.picked, click.pose, place=click.motion)
+        point = click.surface_point()
         if click.through_gap:
             self.context.note(
                 "You clicked on a gap between points. Scan4D used the nearest surface in front of the gap."

@@ -121,9 +121,7 @@ class Tool:
 
     def on_click(self, click: Click) -> bool:
         """Set an end at what was clicked; raises InputError where it cannot be."""
-        if click.picked is None:
-            raise InputError("No surface here: click on the scan.")
-        end = SurfacePoint.of(click.picked, click.pose, filled=self.filled, place=click.motion)
+        end = click.surface_point(filled=self.filled)
         if click.through_gap:
             self.context.note(
                 "You clicked on a gap between points. Scan4D used the nearest surface in front of the gap."

@@ -89,11 +89,12 @@ class Lasso:
         self.put_away()
 
     def _surface_point(self, position: NDArray[np.float64]) -> SurfacePoint | None:
-        """The point at a position that was drawn over; None where nothing was measured there."""
+        """The point at a position that was drawn over; None where nothing was measured there, or another
+        surface may be meant."""
         click = self._context.seen_at(vector(position))
         if click is None or click.picked is None or not click.picked.measured:
             return None
-        return SurfacePoint.of(click.picked, click.pose, place=click.motion)
+        return None if click.picked.at_outline else click.surface_point()
 
     def draw(self, canvas: Canvas, view: ScreenView) -> None:
         """Draw the outline as far as it goes."""
