@@ -59,3 +59,38 @@ def test_few_points_tell_no_surface_and_a_narrow_column_tells_that_it_is() -> No
     assert local_surface(column_through(PLACE, points[nearest[:8]], SPACING), DEPTH) is Unclear.FEW
     narrow = column_through(PLACE, points, SPACING, 2 * SPACING)
     assert local_surface(narrow, DEPTH) is Unclear.NARROW
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.3])
+@pytest.mark.parametrize("inside", [0.5, 1.0, 3.0])
+def test_a_surface_seen_edge_on_is_met_as_far_as_it_reaches(noise: float, inside: float) -> None:
+    """At the outline of a ball, where the ray runs so many spacings below its surface, or above."""
+    rng, radius, held, doubts = np.random.default_rng(5), 15.0, [], []
+    turned = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])  # the cap faces right
+    middle = PLACE - np.array([radius * SPACING, 0.0, 0.0])
+    for _ in range(60):
+        points = (cap(rng, radius, noise) - PLACE) @ turned.T + PLACE
+        place = PLACE - np.array([inside * SPACING, 0.0, 0.0])
+        ahead = place / np.linalg.norm(place)
+        below = np.linalg.norm(np.cross(middle, ahead))
+        true = -(ahead * (middle @ ahead - np.sqrt((radius * SPACING) ** 2 - below**2)))[2]
+        found = local_surface(column_through(place, points, SPACING), true)
+        assert isinstance(found, LocalSurface)
+        doubts.append(found.doubt)
+        held.append(abs(found.depth - true) <= SURE * found.deviation + 0.02 * SPACING)
+        past = PLACE + np.array([(1 + 4 * noise) * SPACING, 0, 0])
+        beyond = local_surface(column_through(past, points, SPACING), DEPTH)
+        assert isinstance(beyond, Unclear) or beyond.doubt > 0.9
+    assert np.mean(held) >= 0.9
+    assert np.mean(doubts) < 0.2
+
+
+@pytest.mark.parametrize("apart", [1.0, 1.5, 2.0])
+def test_of_two_sides_of_a_thin_part_the_front_is_found(apart: float) -> None:
+    """Sides whose points together would tell a surface between them."""
+    rng, right = np.random.default_rng(6), []
+    for _ in range(40):
+        front, back = cap(rng, 1000.0, 0.0), cap(rng, 1000.0, 0.0) - np.array([0, 0, apart * SPACING])
+        found = local_surface(column_through(PLACE, np.concatenate([front, back]), SPACING), DEPTH)
+        right.append(isinstance(found, LocalSurface) and abs(found.depth - DEPTH) < 0.05 * SPACING)
+    assert np.mean(right) > 0.85

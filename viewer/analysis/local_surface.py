@@ -39,8 +39,8 @@ _NORMAL = 1.4826  # standard deviation of a normal distribution, in median absol
 # 0.45 or more (99 %). A surface with noise of 0.6 spacings has 0.29, 0.23 and 0.16 (median).
 _THICKEST = {MOST: 0.18, 2 * MOST: 0.3, 4 * MOST: 0.4}
 # Two sides of a thin part: spacings between them, at least, and the variance that is left where each has a
-# mean of its own, at most. Of one side, 0.25 and more are left.
-_APART, _LEFT = 0.4, 0.12
+# mean of its own, at most, in each turn of looking for them. Of one side, 0.25 and more are left.
+_APART, _LEFT = 0.4, (0.3, 0.2, 0.12)
 _NOISES = (0.0, *(10.0 ** (n / 2) for n in range(-6, 5)))  # variances that are tried, of noise to bending
 _EXACT = 1e-9  # of the bending, added where there is no noise: so that rounding does not count
 _ROUND = 12  # nearest points that lie all round a place in the surface (99.4 % of cases by chance)
@@ -221,6 +221,7 @@ def _patch(column: Column, start: float, count: int, thickest: float) -> _Patch 
     for round_ in range(_ROUNDS):
         apart = column.positions - (column.ray.start + depth * column.ray.step)
         normal = _across(apart) if normal is None else normal
+        normal = normal * math.copysign(1.0, normal @ column.ahead)  # away from the eye
         near, away = _nearest(apart, normal, count, max(_WINDOW[0] * spacing, _WINDOW[1] * noise))
         if len(near) <= LEAST and np.isinf(column.reach):
             return Unclear.FEW
@@ -277,21 +278,18 @@ def _least(values: Float, count: int) -> NDArray[np.intp]:
 
 
 def _paraboloid_over(apart: Float, near: NDArray[np.intp], away: Float, normal: Float) -> _Patch:
-    """The paraboloid of the points that are near, over the plane through the origin; of one side alone where
-    they are of two. away: how far these and the next are, ascending."""
+    """The paraboloid of the points that are near, over the plane through the origin; of those on the lower
+    side alone where they are of two. away: how far these and the next are, ascending."""
     axes = np.vstack([np.linalg.svd(normal[None])[2][1:], normal])
     framed = apart[near] @ axes.T
     flat, up = framed[:, :2], framed[:, 2]
     reach = max(float(away[-1]), _TINY)
     closeness = (1 - np.minimum(away[: len(near)] / reach, 1) ** 3) ** 3 + _CLOSENESS  # tricube
     factors, off = _robust(flat, up, closeness)
-    lower = _lower_side(off, _APART * reach * math.sqrt(math.pi / len(near)))
+    lower = _lower_side(flat / reach, up, closeness, _APART * reach * math.sqrt(math.pi / len(near)))
     if lower is not None:
-        below, above = factors[0] + off[lower].mean(), factors[0] + off[~lower].mean()
-        side = lower if abs(below) < abs(above) else ~lower
-        factors, off_side = _robust(flat[side], up[side], closeness[side])
         off = np.full(len(near), np.inf)
-        off[side] = off_side
+        factors, off[lower] = _robust(flat[lower], up[lower], closeness[lower])
     usual = _median(np.abs(off[np.isfinite(off)]))
     belongs = (np.abs(off) <= _CUT * usual) | ((usual <= 0) & np.isfinite(off))
     return _Patch(0.0, axes, near, flat, up, belongs, factors, _NORMAL * usual, reach)
@@ -330,9 +328,28 @@ def _median(values: Float) -> float:
     return float(np.partition(values, len(values) // 2)[len(values) // 2])
 
 
-def _lower_side(off: Float, apart: float) -> NDArray[np.bool_] | None:
-    """The lower points of two groups, (n,), by heights (n,) that lie so far apart, and far for how they vary;
-    None where they are one (two means: MacQueen 1967)."""
+def _lower_side(flat: Float, up: Float, closeness: Float, apart: float) -> NDArray[np.bool_] | None:
+    """The lower points of two surfaces of one shape that lie so far apart, (n,), by turns of which points are
+    whose and what their shape is (switching regression: Quandt 1958); None where they are one surface.
+
+    flat, up: (n, 2), (n,) where points lie. closeness: (n,) their weights.
+    """
+    heights, lower = up, None
+    for most_left in _LEFT:
+        lower = _lower_group(heights, most_left, apart)
+        if lower is None:
+            return None
+        terms = np.column_stack([_terms(flat, is_bent=True), lower])
+        weighted = terms.T * closeness
+        square = weighted @ terms
+        square.flat[:: len(square) + 1] += _RIDGE * np.trace(square)
+        heights = up - terms[:, :-1] @ np.linalg.solve(square, weighted @ up)[:-1]
+    return lower
+
+
+def _lower_group(off: Float, most_left: float, apart: float) -> NDArray[np.bool_] | None:
+    """The lower of two groups, (n,), of heights (n,) whose means lie so far apart and leave at most a share
+    of their variance; None where they are one (two means: MacQueen 1967)."""
     order = np.argsort(off)
     values = off[order] - off.mean()
     counts = np.arange(LEAST, len(values) - LEAST + 1)
@@ -342,7 +359,7 @@ def _lower_side(off: Float, apart: float) -> NDArray[np.bool_] | None:
     sums = np.cumsum(values)[counts - 1]
     each = 1 / counts + 1 / (len(values) - counts)
     best = int((sums**2 * each).argmax())
-    if sums[best] ** 2 * each[best] < (1 - _LEFT) * total or abs(sums[best]) * each[best] < apart:
+    if sums[best] ** 2 * each[best] < (1 - most_left) * total or abs(sums[best]) * each[best] < apart:
         return None
     lower = np.zeros(len(off), np.bool_)
     lower[order[: counts[best]]] = True
