@@ -218,10 +218,11 @@ def _patch(column: Column, start: float, count: int, thickest: float) -> _Patch 
     they reach.
     """
     depth, noise, spacing, normal = start, 0.0, column.spacing, None
+    ahead, rate, before = column.ahead, column.rate, np.empty(0, np.intp)
     for round_ in range(_ROUNDS):
         apart = column.positions - (column.ray.start + depth * column.ray.step)
         normal = _across(apart) if normal is None else normal
-        normal = normal * math.copysign(1.0, normal @ column.ahead)  # away from the eye
+        normal = normal * math.copysign(1.0, normal @ ahead)  # away from the eye
         near, away = _nearest(apart, normal, count, max(_WINDOW[0] * spacing, _WINDOW[1] * noise))
         if len(near) <= LEAST and np.isinf(column.reach):
             return Unclear.FEW
@@ -229,23 +230,24 @@ def _patch(column: Column, start: float, count: int, thickest: float) -> _Patch 
             return Unclear.NARROW
         patch = _paraboloid_over(apart, near[:count], away, normal)._replace(depth=depth)
         noise, spacing = patch.noise, patch.spacing
-        along = _way(column, patch)
-        if round_ < _ROUNDS - 1:
-            depth += along * column.rate
-            normal = patch.normal(along * patch.axes[:2] @ column.ahead)
+        along = _way(patch, ahead)
+        if round_ == _ROUNDS - 1 or np.array_equal(near, before):
+            break
+        depth, before = depth + along * rate, near
+        normal = patch.normal(along * patch.axes[:2] @ ahead)
     if np.count_nonzero(patch.belongs) < LEAST or (column.view.perspective and depth <= 0):
         return Unclear.FEW
     if noise > thickest * patch.reach:
         return Unclear.THICK
-    drift = (depth + along * column.rate - start) / column.rate
-    across = abs(patch.crossing(column.ahead).steepness(along) * drift)
+    drift = (depth + along * rate - start) / rate
+    across = abs(patch.crossing(ahead).steepness(along) * drift)
     is_there = abs(along) < patch.reach and across <= _DRIFT[0] * spacing + _DRIFT[1] * noise
     return patch if is_there else Unclear.AWAY
 
 
-def _way(column: Column, patch: _Patch) -> float:
-    """The way along the ray from a place on it to its paraboloid, as far as the points reach."""
-    crossing = patch.crossing(column.ahead)
+def _way(patch: _Patch, ahead: Float) -> float:
+    """The way along the ray from the place of a patch to its paraboloid, as far as the points reach."""
+    crossing = patch.crossing(ahead)
     first = crossing.first(patch.reach)
     return float(np.clip(crossing.nearest if first is None else first, -patch.reach, patch.reach))
 
@@ -303,9 +305,7 @@ def _robust(flat: Float, up: Float, closeness: Float) -> tuple[Float, Float]:
     weights = closeness
     for round_ in range(_REWEIGHTED + 1):
         weighted = terms.T * weights
-        square = weighted @ terms
-        square.flat[:: len(square) + 1] += _RIDGE * np.trace(square)  # of points on a line
-        found = np.linalg.solve(square, weighted @ up)
+        found = _solved(weighted @ terms, weighted @ up)
         off = up - terms @ found
         usual = _median(np.abs(off))
         if round_ == _REWEIGHTED or usual <= 0:
@@ -315,6 +315,14 @@ def _robust(flat: Float, up: Float, closeness: Float) -> tuple[Float, Float]:
     factors = np.zeros(6)
     factors[: len(found)] = found
     return factors / scale ** np.array([0, 1, 1, 2, 2, 2]), off
+
+
+def _solved(square: Float, sides: Float) -> Float:
+    """The solution of normal equations, of points on a line too."""
+    diagonal = square.reshape(-1)[:: len(square) + 1]
+    diagonal += _RIDGE * diagonal.sum()
+    found: Float = np.linalg.solve(square, sides).astype(np.float64, copy=False)
+    return found
 
 
 def _terms(flat: Float, *, is_bent: bool) -> Float:
@@ -341,9 +349,7 @@ def _lower_side(flat: Float, up: Float, closeness: Float, apart: float) -> NDArr
             return None
         terms = np.column_stack([_terms(flat, is_bent=True), lower])
         weighted = terms.T * closeness
-        square = weighted @ terms
-        square.flat[:: len(square) + 1] += _RIDGE * np.trace(square)
-        heights = up - terms[:, :-1] @ np.linalg.solve(square, weighted @ up)[:-1]
+        heights = up - terms[:, :-1] @ _solved(weighted @ terms, weighted @ up)[:-1]
     return lower
 
 
@@ -369,7 +375,7 @@ def _lower_group(off: Float, most_left: float, apart: float) -> NDArray[np.bool_
 def _plate(column: Column, patch: _Patch) -> LocalSurface | Unclear:
     """The thin plate through the points of a patch, where the ray meets it."""
     used = np.flatnonzero(patch.belongs)[:MOST]
-    foot = patch.axes[:2] @ column.ahead * _way(column, patch)
+    foot = patch.axes[:2] @ column.ahead * _way(patch, column.ahead)
     flat = patch.flat[used] - foot
     scale = max(float(np.sqrt((flat**2).sum(axis=1).max())), _TINY)
     places = np.concatenate([flat, patch.spacing * _SIDES]) / scale
