@@ -124,8 +124,8 @@ class _Crossing(NamedTuple):
     height: float
 
     def first(self, reach: float) -> float | None:
-        """Where the ray first meets the paraboloid, of what lies within reach; else the nearest; None where
-        it passes it by."""
+        """The first place within reach where the ray meets the paraboloid; else the nearest such place; None
+        if it misses the paraboloid."""
         if abs(self.bend) * reach <= _EXACT * abs(self.rise):
             return -self.height / self.rise
         below = self.rise**2 - 4 * self.bend * self.height
@@ -138,7 +138,7 @@ class _Crossing(NamedTuple):
 
     @property
     def nearest(self) -> float:
-        """Where the ray runs along the paraboloid: deepest in it, or nearest to it."""
+        """The place where the ray runs along the paraboloid: deepest in it, or nearest to it."""
         return -self.rise / (2 * self.bend) if self.bend else math.inf
 
     def at(self, t: float) -> float:
@@ -190,7 +190,7 @@ class _Patch(NamedTuple):
         return _Crossing(-(xx * x * x + xy * x * y + yy * y * y), z - a * x - b * y, -level)
 
     def normal(self, flat: Float) -> Float:
-        """Its unit normal at a place, (3,)."""
+        """The unit normal of the paraboloid at a place, (3,)."""
         x, y = flat.tolist()
         _, a, b, xx, xy, yy = self.factors.tolist()
         across = np.array([-(a + 2 * xx * x + xy * y), -(b + 2 * yy * y + xy * x), 1.0]) @ self.axes
@@ -406,8 +406,8 @@ def _plate(column: Column, patch: _Patch) -> LocalSurface | Unclear:
 
 
 def _crossed(crossing: _Crossing, reach: float, deviation: float) -> tuple[float, float, float]:
-    """Where a ray meets a paraboloid, the chance that it does, and the standard deviation of where, where the
-    paraboloid may be higher or lower by a deviation."""
+    """The place where a ray meets a paraboloid, the chance that it does, and the standard deviation of the
+    place if the paraboloid may be higher or lower by a deviation."""
     first = crossing.first(_FARTHER * reach)
     way = crossing.nearest if first is None else first
     deepest = way + float(np.clip(crossing.nearest - way, -reach, reach))
