@@ -146,7 +146,7 @@ class Surfels(Backend):
         "each point 1000 times in a row": Limit(0.5, _SEEN_THROUGH, _SORTED),
         "the list of points 1000 times": Limit(0.5, _SEEN_THROUGH, _SORTED),
         "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
-        "each point 1000 times, without radii": Limit(0.5, _SEEN_THROUGH, _SORTED),
+        "each point 1000 times, without radii": Limit(0.6, _SEEN_THROUGH, _SORTED),
         "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
