@@ -1,4 +1,4 @@
-"""What surfels choose by themselves is never worse than what a user could choose, on the scans of the suite
+"""What surfels choose by themselves is never worse than what a user could choose, on all scans of the suite
 "surface"."""
 
 from __future__ import annotations
@@ -12,7 +12,15 @@ import pytest
 from viewer.backends import backend
 from viewer.bench.metrics import Errors
 from viewer.bench.scenes import catalog
-from viewer.bench.surface_suite import CONDITIONS, Amount, PictureTruth, ScanCondition, _cameras
+from viewer.bench.surface_suite import (
+    CONDITIONS,
+    MODELS,
+    Amount,
+    PictureTruth,
+    ScanCondition,
+    _cameras,
+    scenes_of,
+)
 from viewer.drawing.frame import render_frame
 from viewer.drawing.request import Request
 from viewer.look import Look
@@ -23,14 +31,17 @@ if TYPE_CHECKING:
     from viewer.drawing.renderer import Renderer
 
 AMOUNT = Amount(points=10_000, views=1, size=(240, 160))
-REAL = ("horse-gallop", "crane")  # scenes of the data folder
-QUICK = ("blue noise", "stretched grid, with normals")
 LEAST, LEAST_SLITS = 0.02, 0.05  # percent of the subject: a pixel or two more are not worse
+# Scenes where automatic radii are worse by a few pixels: mistakes to mend.
+WORSE = {
+    ("noise 0.3", "armadillo"): "0.052 % slits, of own radii none",
+    ("noise 0.6", "horse"): "0.18 % more faults than own radii: open 1.5 % in place of 0.6 %",
+}
 Draw = Callable[[dict[str, Any]], Errors]
 
 
-def drawn(renderer: Renderer, condition: ScanCondition, data: Path | None) -> Draw:
-    subject = catalog.subject(condition.scene or "torus", data)
+def drawn(renderer: Renderer, condition: ScanCondition, scene: str, data: Path) -> Draw:
+    subject = catalog.subject(scene, data)
     moment = subject.moment(0)
     cloud, _ = condition.scan(moment, AMOUNT.points, (0, 0))
     (camera,) = _cameras(moment, subject.up, condition, AMOUNT, 0)
@@ -53,21 +64,24 @@ def faults(errors: Errors) -> float:
     return errors["open_percent"] + errors["wrong_layer_percent"] + errors["spill_percent"]
 
 
-def marks_of(condition: ScanCondition) -> list[pytest.MarkDecorator]:
-    """Slow but for a few."""
-    return [] if condition.name in QUICK else [pytest.mark.slow]
+def marks_of(condition: ScanCondition, scene: str) -> list[pytest.MarkDecorator]:
+    reason = WORSE.get((condition.name, scene))
+    return [] if reason is None else [pytest.mark.xfail(reason=reason, strict=True)]
 
 
 @pytest.mark.parametrize(
-    "condition",
-    [pytest.param(each, marks=marks_of(each), id=each.name) for each in CONDITIONS],
+    ("condition", "scene"),
+    [
+        pytest.param(condition, scene, marks=marks_of(condition, scene), id=f"{condition.name}-{scene}")
+        for condition in CONDITIONS
+        for scene in scenes_of(condition, ("torus", *MODELS))
+    ],
 )
 @pytest.mark.slow
 def test_automatic_radii_and_passes_are_never_worse(
-    renderer: Renderer, condition: ScanCondition, request: pytest.FixtureRequest
+    renderer: Renderer, condition: ScanCondition, scene: str, data_dir: Path
 ) -> None:
-    data = request.getfixturevalue("data_dir") if condition.scene in REAL else None
-    errors = drawn(renderer, condition, data)
+    errors = drawn(renderer, condition, scene, data_dir)
     auto = errors({})
     for chosen in ({"radius": "own"}, {"passes": "two"}, {"radius": "own", "passes": "two"}):
         other = errors(chosen)
