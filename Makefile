@@ -46,7 +46,7 @@ mutate: setup ## test the tests: do they find small random mistakes? make mutate
 fuzz: setup ## read thousands of damaged files: make fuzz MINUTES=60 SEED=7
 	$(PYTHON) tests/fuzz/campaign.py --minutes $(MINUTES) --seed $(SEED)
 
-bench: setup ## measure run time and error: out/bench/report.html in two minutes; in full: make bench QUICK=
+bench: setup ## measure run time and error: out/bench/report.html in about three minutes; in full: make bench QUICK=
 	.venv/bin/scan4d bench $(QUICK) -o out/bench --force
 
 lint: setup ## ruff and mypy

@@ -50,11 +50,14 @@ def mesh(tmp_path: Path) -> Path:
 @pytest.mark.slow
 def test_a_mesh_of_ones_own_is_measured_reported_and_compared(run: Run, mesh: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    scenes = ("--scene", mesh, "--suite", "scenes")
+    scenes = ("--scene", mesh)
     done = run("bench", *scenes, *SMALL, "-o", out)
     assert done.code == 0, done.err
-    first, *_, last = done.out.splitlines()
+    first, *steps, last = done.out.splitlines()
     assert "about" in first
+    assert steps[-1] == f"Measuring 3 combinations on {mesh}; after that, 0 are left"
+    assert "leaves out the stability suite" in done.err
+    assert not (out / "numerics.jsonl").exists()
     assert last == str(out / "report.html")
     rows = read_rows(out)
     assert {row["backend"] for row in rows} == {"gl-points", "mesh", "points"}

@@ -26,8 +26,8 @@ from ._outputs import add_output_argument, claim
 _BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data"  # of a checkout
 _LEAST = 32  # pixels of a picture's edge, for metrics that look at windows
 _MINUTES = 100  # seconds from which a time is shown in minutes
-# Enough to see whether a change helps, in two minutes on two cores.
-QUICK = BenchSettings(size=(384, 256), views=4, repeat=1, frames=3)
+# Enough to see whether a change helps, in three minutes on two cores.
+QUICK = BenchSettings(size=(384, 256), views=2, repeat=1, frames=2)
 
 
 def add_measuring_arguments(parser: ArgumentParser) -> None:
@@ -43,7 +43,7 @@ def add_measuring_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="quick run with few scenes, few views and small pictures, about two minutes",
+        help="quick run with few scenes, few views and small pictures, about three minutes",
     )
     parser.add_argument(
         "--report",
@@ -171,9 +171,12 @@ class MeasuringPlan(NamedTuple):
 
 def _drawn(bench: Bench, groups: Sequence[Group]) -> Iterator[Row]:
     """The rows of all groups until Ctrl-C. A scene that turns out damaged is noted and left out."""
-    for group in groups:
+    rows = [len(group.contenders) for group in groups]
+    for number, group in enumerate(groups):
         if bench.stopped:
             return
+        left = sum(rows[number + 1 :])
+        tell(f"Measuring {rows[number]} combinations on {group.scene}; after that, {left} are left")
         try:
             yield from bench.measure(group)
         except InputError as error:

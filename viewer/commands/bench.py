@@ -43,7 +43,7 @@ from ._outputs import claim
 
 _LIBRARIES = ("jinja2", "matplotlib", "scipy", "skimage")
 _QUICK_SCENES = ("torus", "bunny", "demo", "torus-simulated")
-_QUICK_COUNTS = (10_000, 1_000_000)
+_QUICK_COUNTS = (10_000, 300_000)
 _QUICK_NOISES = (2.0,)
 _SUITES = ("scenes", "numerics", "surface")
 _CALIBRATION = BenchSettings(views=4, repeat=2, frames=0)
@@ -61,7 +61,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="measure only these renderers; gl-points and mesh are always included",
     )
     parser.add_argument(
-        "--suite", choices=_SUITES, help="name of the suite to run; default: scenes and numerics"
+        "--suite",
+        choices=_SUITES,
+        help="name of the suite to run; default: scenes and numerics, or only scenes with --quick",
     )
     parser.add_argument(
         "--calibrate", action="store_true",
@@ -101,10 +103,13 @@ def run(args: Namespace) -> int:
     settings = settings_of(args, QUICK if args.quick else BenchSettings())
     groups, missing = _groups(args, settings, names) if args.suite != "numerics" else ([], {})
     others = {}
-    if args.suite != "scenes":
+    if args.suite == "numerics" or not (args.suite or args.quick):
         lines = sum(row.is_for(backend(name)) for name in names for row in numerics.rows())
         others[NUMERICS] = RowSource(partial(Bench.numerics, names=names), lines)
-    chosen = MeasuringPlan(groups, others, left_out(missing), _report_files(args.out))
+    notes = left_out(missing)
+    if args.quick and not args.suite:
+        notes.append("--quick leaves out the stability suite. 'scan4d bench --suite numerics' measures it")
+    chosen = MeasuringPlan(groups, others, notes, _report_files(args.out))
     bench = Bench(drawing.renderer(args.device), settings, args.out)
     chosen.claim(args, settings, [args.compare, args.compare / "results.jsonl"] if args.compare else [])
     chosen.measure(bench, args.out, lambda: tell(write_report(args.out)))

@@ -53,6 +53,7 @@ from experiments.speed.idle_driver import Driver
 from experiments.speed.sketches import CudaScatter, GlPoints, Sketch, elapsed_ms, has_cuda
 from experiments.tables import Column, Row, Table, at, code
 from viewer.backends import backend as find_backend
+from viewer.backends.voxels import cuts
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
 from viewer.drawing.request import Request
@@ -279,6 +280,7 @@ def cpu(options: Namespace) -> Iterator[Row]:
     limit, gpu = Limit(options), renderer().gpu
     _threads_at_rest()
     _choose(options)
+    cuts.ON_SOFTWARE = True  # as on graphics cards: else the CPU does a work of the driver's
     for points in _sizes(options):
         for name, case in CASES.items():
             if points > case.most or not limit.wants(name):
