@@ -19,6 +19,7 @@ const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the sec
 const float OPEN = 1.75;    // radii by share: a cell that reaches farther has no end there
 const float LEAST_SHARE = 0.9, MOST_SHARE = 1.39;  // of the radius by share, bounds of that by the cell
 const float FLAT = 0.3;  // of the second eigenvalue, up to which the least one is that of a plane
+const float NOISY = 2.0; // of the variance of noise, what a plane has of it at most
 const int CLOSE = 3;     // the neighbor that a splat reaches halfway to where there is no plane
 const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good as in one pixel
 // Of the largest eigenvalue, below which the second is that of points on a line; radii that lines beside are within.
@@ -97,9 +98,10 @@ vec4 closing(vec4 bounds, float share) {
 }
 
 // How far a splat may reach, in radii of the neighborhood. At tips and on horns, points lie on no plane: a splat that
-// is wider than they are would stand out of the surface.
+// is wider than they are would stand out of the surface. Noise makes no tip.
 float flat_reach(Extent extent, vec3 values, int count, float scale) {
-    float spread = sqrt(2.0 * values.y / float(count)), flatness = FLAT * values.y / max(values.x, 1e-9);
+    float blur = noise * unit * scale, thickness = values.x - NOISY * blur * blur * float(count);
+    float spread = sqrt(2.0 * values.y / float(count)), flatness = FLAT * values.y / max(thickness, 1e-9);
     float halfway = 0.5 * LEANING * scale * sqrt(near_squared[min(CLOSE, extent.count - 1)]);
     return max(halfway, spread * max(flatness, 1.0));
 }

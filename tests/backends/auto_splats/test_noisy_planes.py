@@ -174,6 +174,15 @@ def test_the_nearest_splats_stay_at_their_points(draw: Callable[..., Surface]) -
     assert np.mean(nearest[both] - local[both]) < -0.3 * typical_spacing(sphere(6000))
 
 
+def test_a_noisy_floor_of_few_digits_stays_closed(draw: Callable[..., Surface]) -> None:
+    """Steps of a hundredth are as wide as points are apart, and many points coincide: these make no tips."""
+    rng = np.random.default_rng(3)
+    floor = rng.uniform(-1, 1, (28_000, 3)) * (1, 0, 1) + rng.normal(0, 0.008, (28_000, 3)) * (0, 1, 0)
+    cloud = PointCloud.from_arrays(floor.round(2))
+    camera = Camera((0, 3, 0.5), (0, 0, 0), fov_y=25)
+    assert (draw(cloud, camera, SIZE, NAME).coverage > 0).mean() > 0.999
+
+
 @pytest.mark.parametrize(("noise", "params"), [(0.0, {}), (0.5, {"adaptive": False})])
 def test_other_planes_are_those_of_neighborhoods(
     draw: Callable[..., Surface], noise: float, params: dict[str, Any]

@@ -261,6 +261,7 @@ def search_of(params: Params, pose: GpuPose, noise: Noise) -> Search:
         elliptical=params.elliptical,
         by_scanner=params.orient == "scanner" and bool(pose.views),
         widening=_widening(noise, params.k),
+        noise=noise.deviation,
     )
 
 

@@ -32,8 +32,8 @@ class Grids:
     border: pixels round the picture shown that the picture of these grids has more, at each edge.
     typical: radius of neighborhoods as points are dense in the picture, pixels; typical_in_space: as they are
     over a body of the scan's size, a rough one, scan units; widest: from which on splats grow no more, scan
-    units. culls, growth, alone, drops:
-    as `Search` has them.
+    units. culls, growth, alone, drops,
+    noise: as `Search` has them.
     """
 
     fine_size: tuple[int, int]
@@ -46,6 +46,7 @@ class Grids:
     growth: float
     alone: float
     drops: bool
+    noise: float
     unit: float
     typical: float = 1.0
     typical_in_space: float = 0.0
@@ -63,7 +64,7 @@ class Grids:
         """The grids over a picture of a size, pixels, with its border, before anything typical is known."""
         margin = 1 << coarse_shift
         fine, coarse = _cells(size, margin, 0), _cells(size, margin, coarse_shift)
-        rules = search.culls, search.growth, search.alone, search.drops
+        rules = search.culls, search.growth, search.alone, search.drops, search.noise
         return cls(fine, coarse, 0, coarse_shift, margin, border, *rules, unit)
 
     def refined(self, size: tuple[int, int], typical: float, in_space: float, widest: float) -> Grids:
