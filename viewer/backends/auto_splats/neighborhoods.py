@@ -65,8 +65,8 @@ class Search:
     whether normals point to the side that a range view saw, not to the eye. adaptive: whether planes go
     through as few of the nearest as noise allows. elliptical: whether splats are longer where neighbors are
     farther apart; else only those of lines of points are no discs. widening: radius of the ball
-    whose points determine a plane, in radii of the neighborhood; up to 1: the neighborhood determines it. noise: standard deviation of the
-    points along the normals, scan units.
+    whose points determine a plane, in radii of the neighborhood; up to 1: the neighborhood determines it.
+    noise: standard deviation of the points along the normals, scan units.
     """
 
     k: int = 10
