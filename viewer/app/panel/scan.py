@@ -150,7 +150,7 @@ class ScanSection(WindowPart):
             by = (
                 "set on the command line"
                 if pacing.is_stated
-                else f"from {self.playback.timeline.reading['times'].shown_source}"
+                else self.playback.timeline.reading["times"].shown_source
             )
             widgets.fact("Rate", f"{pacing.rate:.4g} Hz, {by}")
             return
