@@ -152,7 +152,7 @@ class SceneView(WindowPart):
         elif self.tools.clicking and is_hovered:
             imgui.set_mouse_cursor(imgui.MouseCursor_.hand)
             is_released = imgui.is_item_deactivated() and imgui.is_mouse_released(0)
-            is_first = imgui.get_io().mouse_clicked_last_count[0] == 1  # not the second of a double click
+            is_first = imgui.get_io().mouse_clicked_last_count[0] % 2 == 1  # not the second of a double click
             if is_released and is_first and widgets.is_click() and not imgui.get_io().key_shift:
                 self.tools.click(self._pixel())
         if camera := self.session.document.camera:
