@@ -18,7 +18,7 @@ const float MOST = 3.0;
 const float COLLINEAR = 1e-5;  // of the largest eigenvalue, below which the second makes no plane
 const float OPEN = 1.75;    // radii by share: a cell that reaches farther has no end there
 const float LEAST_SHARE = 0.9, MOST_SHARE = 1.39;  // of the radius by share, bounds of that by the cell
-const float FLAT = 0.3;  // of the second eigenvalue, up to which the least one is that of a plane
+const float FLAT = 0.38;  // of the second eigenvalue, up to which the least one is that of a plane
 const float NOISY = 2.0; // of the variance of noise, what a plane has of it at most
 const int CLOSE = 3;     // the neighbor that a splat reaches halfway to where there is no plane
 const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good as in one pixel

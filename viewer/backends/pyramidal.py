@@ -31,7 +31,6 @@ class Pyramidal(Backend):
     limits = {
         "the eye inside the scan": Limit(0.01, _BY_CELLS),
         "coplanar points": Limit(0.008, _BY_CELLS),
-        "collinear points": Limit(0.035, _BY_CELLS),
         "collinear points, viewed along their line, perspective": Limit(0.08, NO_SPACING),
         "collinear points, viewed along their line, orthographic": Limit(0.08, NO_SPACING),
     }

@@ -43,10 +43,7 @@ EXACT = 4e-6  # of a radius: some roundings of float32
 # Bounds of splats in radii of a point's share, and the factor on what cells reach.
 LEAST_SHARE, MOST_SHARE, OPEN, LEANING = 0.9, 1.39, 1.75, 1.19
 CROWDED = 4.0  # pixels within which hidden neighbours have no cell
-FLAT, CLOSE = (
-    0.3,
-    3,
-)  # of the second eigenvalue, up to which points lie on a plane; the neighbour that counts else
+FLAT, CLOSE = 0.38, 3  # of the second eigenvalue, up to which points lie on a plane; which neighbour counts
 LINE, APART, BESIDE = 0.1, 0.4, 6.0  # when neighbours are on a line; radii that others beside it are away
 DISTINCT = 1e-2  # shares of the largest eigenvalue between the lowest two, from which a normal is well known
 

@@ -36,7 +36,7 @@ _HELD = (
     "code words store positions, shapes, depths and colours as whole steps: rounding can change a value "
     "by one step, and added points change the steps"
 )
-_OF_TABLE, _OF_PALETTE = {"quality": ("table",)}, {"lighting": ("own",)}
+_OF_TABLE, _OF_PLANES, _OF_PALETTE = {"quality": ("table",)}, {"quality": ("planes",)}, {"lighting": ("own",)}
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ class CodeWords(Backend):
         "an outlier at a million times the scan's width": Limit(0.0, _HELD, _OF_PALETTE),
         "the eye inside the scan": Limit(1.0, _HELD, _OF_TABLE),
         "zoomed out x10^6": Limit(0.07, _HELD, _OF_TABLE),
+        "telephoto x10^6": Limit(0.02, _HELD, _OF_PLANES),
         "zero radii": Limit(0.0, _HELD, _OF_TABLE),
         "negative radii": Limit(0.0, _HELD, _OF_TABLE),
         "NaN radii": Limit(0.0, _HELD, _OF_TABLE),
