@@ -241,6 +241,7 @@ def test_a_key_that_shows_nothing_says_why_and_offers_what_does(polygons: Runnin
     app.press("4", "shift+p")
     assert params(app.state)["primitive"] == "polygons"
     assert params(app.state)["level_4"] is True
+    app.send_notes_away()  # of level 4, which changes few pixels
     app.screen.do("key", "2", "key", "shift+p")  # the key that the message names
     assert params(app.settle())["primitive"] == "points"
     assert not app.state.shown_notes

@@ -20,14 +20,15 @@ def test_rows_become_tables(renderer: Renderer) -> None:
     times = list(words.measure_times(bench, ["torus"], 500, [SIZE]))
     pixels = list(words.measure_pixels(bench, ["torus"], 500, SIZE))
     built = list(words.measure_tables(bench))
+    truth = list(words.measure_truth(bench, ["torus"], 500, SIZE))
     assert [list(row["busy_ms"]) for row in times] == [[drawing.name for drawing in words.DRAWINGS]]
     assert min(times[0]["wall_ms"].values()) > 0
     assert [(row["projection"], row["quality"]) for row in pixels] == [
         (projection, quality)
         for projection in ("perspective", "orthographic")
-        for quality in ("table", "exact")
+        for quality in ("table", "planes", "exact")
     ]
-    run = codeword.EXPERIMENT.digest({"times": times, "pixels": pixels, "tables": built})
+    run = codeword.EXPERIMENT.digest({"times": times, "pixels": pixels, "truth": truth, "tables": built})
     made = codeword.EXPERIMENT.made([run])
     assert all(f"| {drawing.name} |" in made["times"] for drawing in words.DRAWINGS)
     assert "303\N{NARROW NO-BREAK SPACE}748" in made["tables"]

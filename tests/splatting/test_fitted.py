@@ -93,7 +93,7 @@ def plain(positions: NDArray[np.float64], normals: NDArray[np.float64], row: int
     lengths = np.array([rough.lengths[0], max(rough.lengths[1], rough.lengths[0] / 16)])
     along, across = (np.cos(a) * u + np.sin(a) * v for a in (rough.turn, rough.turn + np.pi / 2))
     reach = reaches(np.stack([d @ along, d @ across], axis=1) * lengths / squares[:, None], directions(16))
-    found = ellipse_round(1.25 * np.minimum(reach, 1.5)[:, None] * lengths * directions(16), 4)
+    found = ellipse_round(1.25 * np.where(reach > 1.5, 1.2, reach)[:, None] * lengths * directions(16), 4)
     farthest = np.linalg.norm(found.middle) + found.lengths[0]
     is_round = found.lengths.prod() > 0.75 * radius**2 and farthest < 1.2 * radius
     first = np.cos(found.turn) * along + np.sin(found.turn) * across

@@ -45,7 +45,8 @@ _SPARE = 1.2  # times the radii found: these go by some directions, in a plane
 _FIT = {
     "SPARE_FIT": 1.25,  # times how far cells reach: how far ellipses do
     "THINNEST": 16.0,  # times as long as wide, at first
-    "OPEN": 1.5,  # times as far as the rough ellipse: how far a side counts at most
+    "OPEN": 1.5,  # times as far as the rough ellipse: from where on a side has no end,
+    "ENDLESS": 1.2,  # and counts as reaching so far: more would fill holes
     "ROUNDS": 4,  # towards the smallest ellipse
     "ROUND_SHARE": 0.75,  # of the disc's area, from which on the disc is drawn, where
     "ROUND_FAR": 1.2,  # radii that the ellipse reaches at most

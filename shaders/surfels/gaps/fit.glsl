@@ -157,8 +157,12 @@ vec3 packed_planes(float turn, float longer) {
     return words;
 }
 
-// A side that does not end near the rough ellipse counts as ending there. inverse: one over twice how far a side reaches.
-vec4 ended(vec4 inverse) { return min(0.5 / max(inverse, 1e-30), OPEN); }
+// How far sides reach. One that does not end near the rough ellipse counts as little more than that, so that splats do
+// not fill holes. inverse: one over twice how far they reach.
+vec4 ended(vec4 inverse) {
+    vec4 reaches = 0.5 / max(inverse, 1e-30);
+    return mix(reaches, vec4(ENDLESS), greaterThan(reaches, vec4(OPEN)));
+}
 
 void store_fit(uint row, vec3 place, vec3 n) {
     find_cuts(place, n);

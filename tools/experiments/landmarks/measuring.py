@@ -147,10 +147,10 @@ def measured_in(
 
 
 def _end(surface: Surface, pose: Pose, x: int, y: int) -> SurfacePoint:
-    """The end that a click sets."""
+    """The end that a click sets, the second one where the first says that it is in doubt."""
     picked = pick(surface, x, y, shown=before_gap(surface, x, y))
     assert picked is not None
-    return SurfacePoint.of(picked, pose, filled=True)
+    return SurfacePoint.of(picked, pose, filled=True, doubtful=True)
 
 
 # --- as a table -----------------------------------------------------------------------
