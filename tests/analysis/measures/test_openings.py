@@ -239,6 +239,7 @@ def test_lips_that_part_are_measured_along_the_skin() -> None:
     assert shares[16] < shares[24] < shares[12] < shares[8] < 0.93
 
 
+@pytest.mark.slow
 def test_why_a_frame_has_no_value_is_told_with_the_series() -> None:
     places = sheet(44, 44)
     holed = PointCloud.from_arrays(np.pad(places[np.linalg.norm(places, axis=1) > 6], ((0, 0), (0, 1))))

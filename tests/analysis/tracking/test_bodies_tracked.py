@@ -51,6 +51,7 @@ def keyed(sigma: float, scale: float = 1.0) -> list[Landmark]:
     ]
 
 
+@pytest.mark.slow
 def test_landmarks_of_a_file_without_deviations_are_tracked_on_a_moving_body(tmp_path: Path) -> None:
     file = tmp_path / "ends.mrk.json"
     write_landmarks(file, LandmarkSet.of(["a", "b", "c", "d"], PATHS[:1], notes=LandmarkNotes("mm")))

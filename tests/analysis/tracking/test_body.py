@@ -20,6 +20,7 @@ from viewer.scan.timeline import Timeline
 ENDS = np.array([[THICK, 0.0, 3 - LONG], [-THICK, 0.0, 3 - LONG], [THICK, 0.0, -LONG / 2]])
 
 
+@pytest.mark.slow
 def test_limbs_that_swing_past_each_other_are_not_taken_for_one_another() -> None:
     body = DeformableBody(arms(0), SPACING)
     grips = {side: [body.gripped(place) for place in on_arm(0, side, ENDS)] for side in (-1, 1)}
