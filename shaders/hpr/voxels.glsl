@@ -3,8 +3,11 @@ layout(binding = TEXTURE_POSITIONS) uniform samplerBuffer positions;
 uniform float per_voxel;  // voxels a scan unit
 uniform uint table_mask;
 
-// In voxels.
-vec3 point_at(uint row) { return per_voxel * texelFetch(positions, int(row)).xyz; }
+// In voxels. `precise`: a product that is contracted with a difference would leave a rest between equal points.
+vec3 point_at(uint row) {
+    precise vec3 point = per_voxel * texelFetch(positions, int(row)).xyz;
+    return point;
+}
 
 ivec3 voxel_of(vec3 point) { return ivec3(floor(clamp(point, -1e9, 1e9))); }
 

@@ -304,9 +304,7 @@ def test_uploaded_octants_are_counted(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, by_shaders: bool
 ) -> None:
     """Those of each new view, or, where shaders find these, the octree once."""
-    if not (by_shaders or renderer.gpu.software):
-        pytest.skip("graphics cards find octants by shaders alone")
-    monkeypatch.setattr(cuts, "ON_SOFTWARE", by_shaders)
+    monkeypatch.setattr(cuts, "BY_SHADERS", by_shaders)
     pose, surface = Pose(0, 0.0, "test", CLOUD), Surface(renderer.gpu, SIZE)
     request = Request(pose, CAMERAS["perspective"], "voxels", Params())
     for camera in (CAMERAS["perspective"], CAMERAS["close"]):
@@ -352,8 +350,14 @@ def test_fig_5_leaves_of_few_points_are_of_all_sizes(draw: Draw) -> None:
     assert occupancy.max() >= 4 * np.median(sizes["occupancy"].pose.cloud.radii)
 
 
-def test_a_budget_gives_coarser_pictures_that_get_finer_and_never_open(renderer: Renderer) -> None:
-    """No pixel loses what it showed, but for few at the outline, and none shows the far side in its place."""
+def test_a_budget_gives_coarser_pictures_that_get_finer_and_never_open(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No pixel loses what it showed, but for few at the outline, and none shows the far side in its place.
+
+    Of the CPU's cut: shaders find all octants at once.
+    """
+    monkeypatch.setattr(cuts, "BY_SHADERS", False)
     cloud = sphere(300_000)
     camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3)
     pose, surface = Pose(0, 0.0, "test", cloud), Surface(renderer.gpu, (640, 480))
@@ -392,7 +396,7 @@ def test_no_unfinished_cut_is_coarser_than_the_picture_before(
     renderer: Renderer, monkeypatch: pytest.MonkeyPatch, change: str, on_gpu: bool
 ) -> None:
     """With no time at all, a new pose would begin with the root: one disc as large as the picture."""
-    monkeypatch.setattr(cuts, "ON_SOFTWARE", on_gpu)
+    monkeypatch.setattr(cuts, "BY_SHADERS", on_gpu)
     camera = Camera.orbit(CLOUD.bounds(), 30, 20, aspect=4 / 3)
     request = Request(Pose(0, 0.0, "a", CLOUD), camera, "voxels", Params(pixel_threshold=0.25))
     surface, small = Surface(renderer.gpu, (640, 480)), Surface(renderer.gpu, (320, 240))

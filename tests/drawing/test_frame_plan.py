@@ -87,6 +87,8 @@ def test_a_plan_says_what_is_missing_and_why(renderer: Renderer) -> None:
     assert looked.why == "Estimating normals"
     assert own.nbytes == own.work.unfinished == 0, "looking begins nothing"
     made = make_plan(own, bare, SIZE)
+    if isinstance(made, Failed):
+        raise made.error  # that says which library is missing
     assert isinstance(made, Ready)
     assert made.pose.cloud.normals is not None
     own.release()

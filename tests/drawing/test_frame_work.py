@@ -71,7 +71,7 @@ def test_a_frame_costs_few_calls_whatever_the_number_of_points(
     fresh: Renderer, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     gpu, most = fresh.gpu, MOST[name]
-    monkeypatch.setattr(cuts, "ON_SOFTWARE", True)
+    monkeypatch.setattr(cuts, "BY_SHADERS", True)
     clears: list[int] = []
     clear = gpu.clear
     monkeypatch.setattr(gpu, "clear", lambda *args: (clears.append(1), clear(*args))[1])

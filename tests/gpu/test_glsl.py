@@ -275,7 +275,7 @@ def draw_nodes(renderer: Renderer) -> None:
     _, rich, *_ = clouds()
     surface = Surface(renderer.gpu, (40, 30))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(cuts, "ON_SOFTWARE", True)
+        patched.setattr(cuts, "BY_SHADERS", True)
         pose = Pose(0, 0.0, "test", rich)
         request = Request(pose, Camera.orbit(pose.bounds, **CAMERA), "voxels", backend("voxels").params())
         render_frame(renderer, request, surface)

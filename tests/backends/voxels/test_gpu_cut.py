@@ -89,7 +89,7 @@ class Found:
 @pytest.fixture
 def by_shaders(monkeypatch: pytest.MonkeyPatch) -> Callable[[bool], None]:
     """by_shaders(True): octants are found by shaders from now on, whichever the device."""
-    return lambda wanted: monkeypatch.setattr(cuts, "ON_SOFTWARE", wanted)
+    return lambda wanted: monkeypatch.setattr(cuts, "BY_SHADERS", wanted)
 
 
 def both(

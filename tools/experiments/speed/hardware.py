@@ -280,7 +280,7 @@ def cpu(options: Namespace) -> Iterator[Row]:
     limit, gpu = Limit(options), renderer().gpu
     _threads_at_rest()
     _choose(options)
-    cuts.ON_SOFTWARE = True  # as on graphics cards: else the CPU does a work of the driver's
+    cuts.BY_SHADERS = True  # as on graphics cards: else the CPU does a work of the driver's
     for points in _sizes(options):
         for name, case in CASES.items():
             if points > case.most or not limit.wants(name):

@@ -24,7 +24,7 @@ from .. import FrameView
 from .gpu_cut import CutOptions, GpuOctree
 from .shown import CutCounts, ScalarsOfRows, ShownOctants, StrayPoints, ids_of
 
-ON_SOFTWARE = False  # whether software drivers find octants by shaders, too: for tests
+BY_SHADERS: bool | None = None  # whether shaders find octants, for tests; None: on graphics cards
 _UNLIKE = 0.02  # share by which sizes differ of cubes that overlap
 _PRIMES = np.array([73856093, 19349663, 83492791], np.uint32)  # spatial hash (Teschner et al. 2003, 4.1)
 
@@ -129,7 +129,7 @@ class OctreeCuts:
 
     def _may_cut_on_gpu(self, params: OctantSettings) -> bool:
         """Whether shaders find the nodes: discs, and as many as a shader can see."""
-        wanted = ON_SOFTWARE or not self._gpu.software
+        wanted = not self._gpu.software if BY_SHADERS is None else BY_SHADERS
         return wanted and params.shape == "discs" and GpuOctree.fits(self._gpu, self.octree)
 
     def _find_on_gpu(self, pose: GpuPose, frame: FrameView, options: CutOptions) -> ShownOctants:
