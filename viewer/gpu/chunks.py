@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..scan.points import PointCloud
 from ..scan.rays import Ray
-from ..task import Task, in_background
+from ..task import Task, checkpoint, in_background
 from ..view import View
 from .context import Gpu
 from .pose import GpuPose
@@ -115,11 +115,7 @@ def in_coarse_order(cloud: PointCloud) -> Ordered:
         codes[part] = x | y << 1 | z << 2
     rows = np.argsort(codes, kind="stable").astype(np.uint32)  # of 16 bits: by their digits, in linear time
     chunk = chunk_size(len(cloud))
-    many = max(_PART, chunk)  # both powers of two; more at a time would hold the interpreter's lock for long
-    starts = range(0, len(rows), many)
-    boxes = [_boxes(positions[rows[start : start + many]], chunk) for start in starts]
-    low, high = (np.concatenate(corners) for corners in zip(*boxes, strict=True))
-    return Ordered(chunk, rows, low, high)
+    return Ordered(chunk, rows, *_boxes(positions, chunk, rows))
 
 
 def chunk_size(count: int, chunks: int = _CHUNKS, least: int = _CHUNK) -> int:
@@ -127,10 +123,24 @@ def chunk_size(count: int, chunks: int = _CHUNKS, least: int = _CHUNK) -> int:
     return max(least, 1 << max(count // chunks, 1).bit_length() - 1)
 
 
-def _boxes(positions: NDArray[np.float32], chunk: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Lower and upper corners of each so many points."""
-    starts = np.arange(0, len(positions), chunk)
-    return np.minimum.reduceat(positions, starts, axis=0), np.maximum.reduceat(positions, starts, axis=0)
+def _boxes(
+    positions: NDArray[np.float32], chunk: int, rows: NDArray[np.uint32] | None = None
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Lower and upper corners of each so many points, (C, 3). chunk: a power of two. rows: the order of
+    points; None: that of the file.
+
+    `reduceat` holds the interpreter's lock, so it gets some points at a time.
+    """
+    lows, highs = [], []
+    many = max(_PART, chunk)
+    for start in range(0, len(positions), many):
+        checkpoint()
+        run = slice(start, start + many)
+        part = positions[run if rows is None else rows[run]]
+        starts = np.arange(0, len(part), chunk)
+        lows.append(np.minimum.reduceat(part, starts, axis=0))
+        highs.append(np.maximum.reduceat(part, starts, axis=0))
+    return np.concatenate(lows), np.concatenate(highs)
 
 
 def best_order(cloud: PointCloud) -> Ordered:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from .copies import distinct_rows
 from .points import PointCloud
 from .spacing import nearest_rows
 
@@ -68,7 +69,7 @@ def _noise(cloud: PointCloud) -> Noise:
     for nearest in _NEAREST:
         if 2 * nearest > len(cloud):
             break
-        near = [_exact(cloud, nearest_rows(cloud, row, nearest)) for row in rows]
+        near = [_exact(cloud, found) for found in nearest_rows(cloud, rows, nearest)]
         if nearest == _NEAREST[0] and any(len(np.unique(points, axis=0)) < nearest for points in near):
             return _noise_of_distinct(cloud)
         shares, reaches = np.array([_off_quadric(points) for points in near]).T
@@ -84,7 +85,7 @@ def _noise_of_distinct(cloud: PointCloud) -> Noise:
 
     The positions stay in order, so that copies do not change the result.
     """
-    rows = np.sort(np.unique(_exact(cloud, slice(None)), axis=0, return_index=True)[1])
+    rows = np.sort(distinct_rows(_exact(cloud, slice(None)))[0])
     remainders = None if cloud.remainders is None else cloud.remainders[rows]
     return _noise(PointCloud(positions=cloud.positions[rows], origin=cloud.origin, remainders=remainders))
 

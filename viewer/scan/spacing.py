@@ -19,7 +19,11 @@ _NEAREST = (128, 8192)  # of these: six neighbours, each with twenty copies or w
 _NEIGHBOR = 6  # on a surface, the ring of nearest neighbours
 _CHUNK = 1 << 14  # points compared at a time, so that they stay in the processor's cache
 _SPARSEST = 2.0  # times the usual spacing: what is sparser is left aside
+_RUN = 64 * _CHUNK  # points between two looks at whether the search was cancelled
+_LOADING = 64_000_000  # distances, which numpy compares in the time that numba takes to load
 _CUT = 4  # times the points that are wanted: so many candidates are thinned out
+
+_compared = 0  # distances in this process so far
 
 
 def typical_spacing(cloud: PointCloud) -> float:
@@ -74,9 +78,10 @@ def spacing_at(cloud: PointCloud, row: int) -> float | None:
     return _spacings_at(cloud.positions, [row])[0]
 
 
-def nearest_rows(cloud: PointCloud, row: int, count: int = ENOUGH) -> NDArray[np.intp]:
-    """Rows of the points nearest to one, itself among them, in any order. It looks at every point once."""
-    return _nearest(cloud.positions, [row], count)[0]
+def nearest_rows(cloud: PointCloud, rows: Sequence[int], count: int = ENOUGH) -> list[NDArray[np.intp]]:
+    """Rows of the points nearest to each of some points, itself among them, in any order. It looks at every
+    point once."""
+    return _nearest(cloud.positions, rows, count)
 
 
 def nearest_row(cloud: PointCloud, position: NDArray[np.float64]) -> tuple[int, float]:
@@ -140,12 +145,31 @@ def _nearest(points: NDArray[np.float32], rows: Sequence[int], count: int) -> li
     Each one's own surroundings in the file give a distance that nearly all others exceed, so that
     few remain to be compared with one another.
     """
-    total, count = len(points), min(count, len(points))
-    limits = []
-    for row in rows:
-        start = min(max(row - _CHUNK // 2, 0), max(total - _CHUNK, 0))
-        around = _squared(points[start : start + max(_CHUNK, count)].T, points[row])
-        limits.append(np.partition(around, count - 1)[count - 1] if len(around) >= count else np.inf)
+    count = min(count, len(points))
+    limits = np.array([_limit(points, row, count) for row in rows], np.float32)
+    search = _compiled_near if points.flags.carray and _is_compiling_worth(len(points) * len(rows)) else _near
+    return search(points, rows, limits, count)
+
+
+def _limit(points: NDArray[np.float32], row: int, count: int) -> float:
+    """A squared distance of a point that `count` points do not exceed, by those around it in the file."""
+    start = min(max(row - _CHUNK // 2, 0), max(len(points) - _CHUNK, 0))
+    around = _squared(points[start : start + max(_CHUNK, count)].T, points[row])
+    return float(np.partition(around, count - 1)[count - 1]) if len(around) >= count else np.inf
+
+
+def _is_compiling_worth(distances: int) -> bool:
+    """Whether to search with the compiled loop: once all searches so far have taken as long as it takes to
+    load numba, which would keep a first picture waiting."""
+    global _compared
+    _compared += distances
+    return _compared > _LOADING
+
+
+def _near(
+    points: NDArray[np.float32], rows: Sequence[int], limits: NDArray[np.float32], count: int
+) -> list[NDArray[np.intp]]:
+    """`_nearest` among points within squared distances (R,), by numpy."""
     near = [np.empty(0, np.intp)] * len(rows)
     far = [np.empty(0, np.float32)] * len(rows)
     for start, part, x in _chunks(points):
@@ -157,6 +181,26 @@ def _nearest(points: NDArray[np.float32], rows: Sequence[int], count: int) -> li
                 near[number], far[number] = _least(near[number], far[number], count)
                 limits[number] = far[number].max()
     return [_least(some, squared, count)[0] for some, squared in zip(near, far, strict=True)]
+
+
+def _compiled_near(
+    points: NDArray[np.float32], rows: Sequence[int], limits: NDArray[np.float32], count: int
+) -> list[NDArray[np.intp]]:
+    """`_near` by a compiled loop, to the same bits, in a quarter of the time; other threads go on."""
+    from .spacing_kernels import Near, note_near
+
+    most = _CUT * count
+    shape = len(rows), most + _CHUNK
+    near = Near(np.empty(shape, np.int64), np.empty(shape, np.float32), np.zeros(len(rows), np.int64), limits)
+    start, at = 0, points[list(rows)]
+    while start < len(points):
+        checkpoint()
+        start = note_near(points[: start + _RUN], at, near, start, _CHUNK, most)
+        for number in np.flatnonzero(near.held > most).tolist():
+            found, squared = near.of(number)
+            near.rows[number, :count], near.squared[number, :count] = _least(found, squared, count)
+            near.held[number], limits[number] = count, near.squared[number, :count].max()
+    return [_least(*near.of(number), count)[0] for number in range(len(rows))]
 
 
 def _least(

@@ -31,6 +31,7 @@ from ..gpu.constants import UNKNOWN
 from ..gpu.context import Gpu, Program
 from ..gpu.pose import GpuPose
 from ..gpu.scatter import Visits
+from ..scan.copies import distinct_rows
 from ..scan.points import PointCloud
 
 _LEAST, _WANTED, _MOST = 4.0, 6.0, 9.0  # points that share a point's cell, itself included
@@ -356,7 +357,7 @@ def _searching(pose: GpuPose) -> Iterator[tuple[_Search, Any, Any]]:
     search = _Search(gpu, pose.array("positions"), pose.array("normals"), len(cloud), extent)
     try:
         if search.crowded:
-            rows, copies = _distinct(cloud.positions)
+            rows, copies = distinct_rows(cloud.positions)
             assert cloud.normals is not None
             positions, normals = held = (
                 gl.BufferTexture(gpu.buffer(cloud.positions[rows]), gl.RGB32F),
@@ -384,14 +385,3 @@ def _sample(positions: NDArray[np.float32]) -> NDArray[np.uint32]:
     mixed = (mixed ^ mixed >> np.uint32(15)) * np.uint32(0x2C1B3C6D)
     share = min(_SAMPLE / len(positions), 1.0)
     return np.flatnonzero(mixed <= share * 0xFFFFFFFF).astype(np.uint32)
-
-
-def _distinct(positions: NDArray[np.float32]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """The first row of each position, (M,), and which of these positions each row has, (N,)."""
-    order = np.lexsort(positions.T)
-    ordered = positions[order]
-    first = np.ones(len(order), bool)
-    first[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
-    group = np.empty(len(order), np.intp)
-    group[order] = np.cumsum(first) - 1
-    return order[first], group
