@@ -36,9 +36,10 @@ test-all: setup ## run all tests
 test-tenth: setup ## run a tenth of the slow tests, chosen by the commit, in five minutes
 	$(PYTHON) -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder -m slow --tenth $(COMMIT) --seconds 300
 
-test-drivers: setup ## run backend tests on a second driver (Zink) and on used memory; check shaders
+test-drivers: setup ## run backend tests on a second driver (Zink), on used memory and as on a graphics card; check shaders
 	$(PYTHON) tests/drivers/zink.py $(DRAWING) -m "not slow"
 	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p poisoned $(DRAWING) -m "not slow"
+	PYTHONPATH=tests/drivers $(PYTHON) -m pytest -p as_card $(DRAWING) -m "not slow"
 
 mutate: setup ## test the tests: do they find small random mistakes? make mutate COUNT=40 SEED=7
 	$(PYTHON) tools/mutate.py $(COUNT) $(SEED)

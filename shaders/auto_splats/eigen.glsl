@@ -1,5 +1,5 @@
 // Eigenvalues and -vectors of a symmetric matrix by Jacobi's rotations: right for equal ones, and for very
-// different ones.
+// different ones. `sweeps` is a parameter, as graphics cards take long to compile what they unroll.
 
 // The rotation that makes the element pq zero.
 void rotate(inout float pp, inout float qq, inout float pq, inout float rp, inout float rq, inout vec3 p,
@@ -32,7 +32,7 @@ void put_in_order(inout float less, inout float more, inout vec3 p, inout vec3 q
 vec3 eigen(vec3 diagonal, vec3 others, out mat3 vectors) {
     float xx = diagonal.x, yy = diagonal.y, zz = diagonal.z, yz = others.x, zx = others.y, xy = others.z;
     vec3 x = vec3(1.0, 0.0, 0.0), y = vec3(0.0, 1.0, 0.0), z = vec3(0.0, 0.0, 1.0);
-    for (int sweep = 0; sweep < 5; ++sweep) {
+    for (int sweep = 0; sweep < sweeps; ++sweep) {
         rotate(xx, yy, xy, zx, yz, x, y);
         rotate(yy, zz, yz, xy, zx, y, z);
         rotate(zz, xx, zx, yz, xy, z, x);

@@ -26,6 +26,17 @@ const float CROWDED = 4.0;  // pixels within which hidden neighbors are as good 
 const float LINE = 0.1, BESIDE = 6.0;
 const float LEAST = 1e-30;  // radius where all are in one place: none is drawn smaller than a pixel
 
+// From the point, over the neighborhood's radius: small numbers, whatever the scan's place and size.
+vec3 near_offsets[K];
+
+void take_offsets(vec3 place, Extent extent) {
+    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0;
+    for (int k = 0; k < K; ++k) {
+        int row = k < extent.count ? int(near_rows[k] >> 1) : 0;
+        near_offsets[k] = (texelFetch(positions, row).xyz * unit - place) * scale;
+    }
+}
+
 #if ADAPTIVE
 // A plane is told by as few of the nearest as tell it for certain: their residuals let its normal turn by no more
 // than this, the root of their variance over the sum of squares along the narrower side; and some more turn it by no
@@ -33,45 +44,33 @@ const float LEAST = 1e-30;  // radius where all are in one place: none is drawn 
 const float CERTAIN = 0.08;        // radians
 const float MOST_TURNED = 0.9781;  // cosine of 12 degrees
 
-int count_of_plane(vec3 place, Extent extent) {
-    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0;
-    vec3 sum = vec3(0.0), squares = vec3(0.0), products = vec3(0.0), normal = vec3(0.0);
-    int best = 0, before = 0, tried = LEAST_COUNT;  // before: how many tell the plane that is compared, 0: none
-    for (int k = 0; k < K; ++k) {
-        int count = k + 1, row = count <= extent.count ? int(near_rows[k] >> 1) : 0;
-        vec3 offset = (texelFetch(positions, row).xyz * unit - place) * scale;
-        sum += offset;
-        squares += offset * offset;
-        products += offset.yzx * offset.zxy;
-        if (count == tried) {
-            tried += tried / 3;
-            mat3 vectors;
-            vec3 mean = sum / float(count);
-            vec3 values = eigen(squares - sum * mean, products - sum.yzx * mean.zxy, vectors);
-            bool is_there = best == 0 && count <= extent.count;
-            if (is_there && before > 0 && abs(dot(normal, vectors[0])) >= MOST_TURNED) best = before;
-            float turned = max(values.x, 0.0) / float(count - 3);
-            bool is_certain = values.y > COLLINEAR * values.z && turned <= CERTAIN * CERTAIN * values.y;
-            before = is_there && is_certain ? count : 0;
-            normal = vectors[0];
+int count_of_plane(Extent extent) {
+    vec3 normal = vec3(0.0);
+    int best = 0, before = 0;  // before: how many tell the plane that is compared, 0: none
+    for (int count = LEAST_COUNT; count <= extent.count && best == 0; count += count / 3) {
+        vec3 sum = vec3(0.0), squares = vec3(0.0), products = vec3(0.0);
+        for (int k = 0; k < K; ++k) {
+            vec3 offset = k < count ? near_offsets[k] : vec3(0.0);
+            sum += offset;
+            squares += offset * offset;
+            products += offset.yzx * offset.zxy;
         }
+        mat3 vectors;
+        vec3 mean = sum / float(count);
+        vec3 values = eigen(squares - sum * mean, products - sum.yzx * mean.zxy, vectors);
+        if (before > 0 && abs(dot(normal, vectors[0])) >= MOST_TURNED) best = before;
+        float turned = max(values.x, 0.0) / float(count - 3);
+        bool is_certain = values.y > COLLINEAR * values.z && turned <= CERTAIN * CERTAIN * values.y;
+        before = is_certain ? count : 0;
+        normal = vectors[0];
     }
     return best > 0 ? best : extent.count;
 }
 #endif
 
-vec3 near_offsets[K];  // from the point, over the neighborhood's radius
-
-// Means are of offsets from the point, over the neighborhood's radius: small numbers, whatever the scan's
-// place and size.
-vec3 fit_plane(vec3 place, Extent extent, int count, out mat3 vectors) {
-    float scale = extent.squared > 0.0 ? inversesqrt(extent.squared) : 0.0;
+vec3 fit_plane(int count, out mat3 vectors) {
     vec3 mean = vec3(0.0);
-    for (int k = 0; k < K; ++k) {
-        int row = k < extent.count ? int(near_rows[k] >> 1) : 0;
-        near_offsets[k] = (texelFetch(positions, row).xyz * unit - place) * scale;
-        mean += k < count ? near_offsets[k] : vec3(0.0);
-    }
+    for (int k = 0; k < K; ++k) mean += k < count ? near_offsets[k] : vec3(0.0);
     mean /= float(count);
     vec3 squares = vec3(0.0), products = vec3(0.0);
     for (int k = 0; k < K; ++k) {
@@ -102,7 +101,9 @@ vec4 closing(vec4 bounds, float share) {
 float flat_reach(Extent extent, vec3 values, int count, float scale) {
     float blur = noise * unit * scale, thickness = values.x - NOISY * blur * blur * float(count);
     float spread = sqrt(2.0 * values.y / float(count)), flatness = FLAT * values.y / max(thickness, 1e-9);
-    float halfway = 0.5 * LEANING * scale * sqrt(near_squared[min(CLOSE, extent.count - 1)]);
+    float close = 0.0;  // by no index that compilers do not know, as the array would go to memory
+    for (int k = 1; k <= CLOSE; ++k) close = k < extent.count ? near_squared[k] : close;
+    float halfway = 0.5 * LEANING * scale * sqrt(close);
     return max(halfway, spread * max(flatness, 1.0));
 }
 
@@ -137,11 +138,12 @@ float splat_radius(Extent extent, int count, vec3 values, vec3 normal, float cro
 // Returns how far lines beside it are looked for where all neighbors are on a line, scan units; else 0.
 float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     int count = extent.count;
+    take_offsets(place, extent);
 #if ADAPTIVE
-    count = count_of_plane(place, extent);
+    count = count_of_plane(extent);
 #endif
     mat3 vectors;
-    vec3 values = max(fit_plane(place, extent, count, vectors), 0.0), to_eye = seen_from(row);
+    vec3 values = max(fit_plane(count, vectors), 0.0), to_eye = seen_from(row);
     vec3 normal = vectors[0];
     if (values.y <= COLLINEAR * values.z) {
         // Of points on a line, or one: what faces the eye most.

@@ -2,16 +2,14 @@
 //
 // Cells are searched that the image of a ball may reach. What they do not hold is behind one of the four planes
 // through the eye and their outline, so that all within the distance to the nearest of these is known. Where k are
-// not known yet, a larger ball follows: in ROUND 0 and 1 with the next, in ROUND 2, with LANES invocations for each
-// point, until they are. Distances are between places as stored, so that they do not depend on the view.
-#if ROUND == 2
+// not known yet, a larger ball follows: `again`, for those that one search has left; with several LANES for those that
+// two have left, until they are known. Distances are between places as stored, so that they do not depend on the view.
+#if LANES > 1
 layout(local_size_x = LANES) in;
 #else
 #include "common/item.glsl"
 #endif
-#if ROUND > 0
 #include "common/list.glsl"
-#endif
 #include "auto_splats/ball.glsl"
 #include "auto_splats/k_nearest.glsl"
 #include "auto_splats/fit.glsl"
@@ -21,7 +19,7 @@ layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of tho
 layout(std430, binding = STORAGE_NEXT) buffer Next { float next[]; };
 layout(binding = TEXTURE_USUAL) uniform samplerBuffer usual;  // radius in each coarse cell, pixels
 
-#if ROUND == 2
+#if LANES > 1
 shared float lanes_squared[LANES * K];
 shared uint lanes_rows[LANES * K];
 
@@ -33,7 +31,8 @@ void merge_lanes(int lane) {
     }
     barrier();
     clear_nearest();
-    for (int i = 0; i < LANES * K; ++i) take_squared(lanes_squared[i], lanes_rows[i]);
+    int taken = list_count > 0u ? LANES * K : 0;  // graphics cards take long to compile what they unroll
+    for (int i = 0; i < taken; ++i) take_squared(lanes_squared[i], lanes_rows[i]);
     barrier();
 }
 #endif
@@ -43,7 +42,7 @@ Extent search(vec3 place, float radius, float usual_radius, int lane) {
     ivec4 cells = cells_of(radius);
     clear_nearest();
     take_from(cells, place, lane);
-#if ROUND == 2
+#if LANES > 1
     merge_lanes(lane);
 #endif
     float known = known_within(cells);
@@ -53,8 +52,9 @@ Extent search(vec3 place, float radius, float usual_radius, int lane) {
 // The radius that is searched next, 0: none. A little wider: what it touches is within.
 float wider(Extent extent) { return extent.search / unit * 1.0001; }
 
-#if ROUND == 0
-uniform uint first;
+#if LANES == 1
+uniform bool again;
+uniform uint first;  // of those listed, else
 
 // The radius that is searched first: as large as this row's neighborhood was in the last picture that it had one in, of
 // whatever pose; else what most are within.
@@ -65,14 +65,10 @@ float first_ball(uint row, float usual_radius) {
 #endif
 
 void main() {
-#if ROUND == 0
+#if LANES == 1
     uint i = item();
-    if (i >= item_count) return;
-    uint n = first + i;
-#elif ROUND == 1
-    uint i = item();
-    if (i >= list_count) return;
-    uint n = list[i];
+    if (i >= (again ? list_count : item_count)) return;
+    uint n = again ? list[i] : first + i;
 #else
     uint i = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (i >= list_count) return;
@@ -83,14 +79,16 @@ void main() {
     vec3 place = uintBitsToFloat(slot.xyz);
     center = to_view(texelFetch(positions, int(row)).xyz);
     float usual_radius = texelFetch(usual, coarse_cell(to_pixel(center))).r / scale_at(-center.z);
-#if ROUND == 0
-    Extent extent = search(place, first_ball(row, usual_radius), usual_radius, 0);
-#elif ROUND == 1
-    Extent extent = search(place, next[n], usual_radius, 0);
+#if LANES == 1
+    Extent extent = search(place, again ? next[n] : first_ball(row, usual_radius), usual_radius, 0);
 #else
     int lane = int(gl_LocalInvocationIndex);
-    Extent extent = search(place, next[n], usual_radius, lane);
-    while (extent.search > 0.0) extent = search(place, wider(extent), usual_radius, lane);
+    float radius = next[n];
+    Extent extent;
+    do {
+        extent = search(place, radius, usual_radius, lane);
+        radius = wider(extent);
+    } while (extent.search > 0.0);
     if (lane > 0) return;
 #endif
     float across = fit(n, row, place, usual_radius, extent);

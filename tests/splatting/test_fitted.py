@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from splat_scenes import assert_agree
 
 from viewer.bench.scenes.samples import on_torus
 from viewer.bench.scenes.subjects import with_rows
@@ -230,9 +231,7 @@ def test_feeds_draw_the_same_bits(draw: Draw, passes: str) -> None:
         np.testing.assert_array_equal(other.depth, first.depth)
         np.testing.assert_array_equal(other.image(), first.image())
     for other in (by_geometry, tiles):
-        assert (other.id != first.id).mean() < 0.002
-        same = other.id == first.id
-        np.testing.assert_allclose(other.depth[same], first.depth[same], rtol=1e-4)
+        assert_agree(other, first, 0.005)
 
 
 def random_sphere(count: int) -> PointCloud:

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hardware import at_borders, moved
 from numpy.typing import NDArray
 from scenes import BUFFERS, rarely, sphere
 
@@ -159,17 +160,20 @@ def test_without_noise_it_is_the_nearest_splat(draw: Draw, name: str, params: di
 @pytest.mark.backend("surfels")
 @pytest.mark.parametrize("enlarge", [1.0, 2.0])
 def test_feeds_give_the_same_bits(draw: Draw, enlarge: float) -> None:
+    """Where a rasteriser moves corners, a pixel may have another one of its splats in its layer."""
     cloud = noisy_sphere(0.3)
-    first, *others = (
-        surfels(draw, cloud, looking_at(cloud), instancing=feed, enlarge=enlarge).arrays() for feed in BUFFERS
+    first, *others, tiles = (
+        surfels(draw, cloud, looking_at(cloud), instancing=feed, enlarge=enlarge)
+        for feed in (*BUFFERS, "tiles")
     )
     for other in others:
-        for channel, values in first.items():
-            np.testing.assert_array_equal(values, other[channel], channel)
-    tiles = surfels(draw, cloud, looking_at(cloud), instancing="tiles", enlarge=enlarge).arrays()
-    same = (tiles["id"] == first["id"]) & np.isfinite(first["depth"])
-    assert same.mean() > 0.98 * np.isfinite(first["depth"]).mean()
-    np.testing.assert_allclose(tiles["depth"][same], first["depth"][same], rtol=1e-4)
+        for channel, values in first.arrays().items():
+            np.testing.assert_array_equal(values, other.arrays()[channel], channel)
+    same = (tiles.id == first.id) & np.isfinite(first.depth)
+    assert same.mean() > 0.98 * np.isfinite(first.depth).mean()
+    splats = len(cloud) * float(cloud.radii[0]) ** 2 / 4  # that a pixel shows of a unit sphere
+    error = np.abs(tiles.depth[same] / first.depth[same] - 1)
+    assert np.count_nonzero(error > 1e-4 + moved(first)[same]) <= splats * at_borders(first)
 
 
 @pytest.mark.backend("surfels")

@@ -32,8 +32,8 @@ class Grids:
     border: pixels round the picture shown that the picture of these grids has more, at each edge.
     typical: radius of neighborhoods as points are dense in the picture, pixels; typical_in_space: as they are
     over a body of the scan's size, a rough one, scan units; widest: from which on splats grow no more, scan
-    units. culls, growth, alone, drops,
-    noise: as `Search` has them.
+    units. culls, growth, alone, drops, noise: as `Search` has them. sweeps: of rotations, by which
+    eigenvectors are found.
     """
 
     fine_size: tuple[int, int]
@@ -51,6 +51,7 @@ class Grids:
     typical: float = 1.0
     typical_in_space: float = 0.0
     widest: float = 0.0
+    sweeps: int = 5
 
     @classmethod
     def of(

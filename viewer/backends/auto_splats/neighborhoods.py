@@ -382,7 +382,6 @@ class Neighborhoods:
         far as it takes. listed: those not known yet, but at first."""
         defines = {
             "K": search.k,
-            "ROUND": number,
             "FIRST_BALL": _FIRST_BALL,
             "LANES": _LANES if number == 2 else 1,
             "HAS_COLORS": int(pose.cloud.colors is not None),
@@ -396,8 +395,10 @@ class Neighborhoods:
                 pose.array("colors").bind(Texture.COLORS)
             self["usual"].bind(Texture.USUAL)
             self._bind_storage(found=Storage.FOUND)
+            if number < 2:
+                self._gpu.set(program, first=first, again=listed is not None)
             if listed is None:
-                self._gpu.set(program, first=first)
+                self._pixels.bind()  # which the program declares
                 self._gpu.dispatch(program, self.count - first)
             else:
                 listed.run(program)
