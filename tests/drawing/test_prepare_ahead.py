@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import os
+import threading
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scenes import sphere
 
-from viewer.backends import Backend, Derives, FrameView
+from viewer.backends import Backend, Derives, FrameView, backends
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
 from viewer.drawing.plan import Effort, Waiting, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
@@ -24,7 +26,8 @@ from viewer.params import param
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
-from viewer.task import checkpoint
+from viewer.task import Task, checkpoint, in_background
+from viewer.testing.backends import draws_points
 from viewer.view import View
 
 BYTES = 12_000  # of what is derived of a pose
@@ -250,3 +253,52 @@ def test_releasing_ends_all_processes_at_work(renderer: Renderer, poses: list[Po
     for process in {int(task.progress) for task in tasks if task.progress}:
         with pytest.raises(ProcessLookupError):
             os.kill(process, 0)
+
+
+@pytest.mark.parametrize("name", [name for name, one in backends().items() if draws_points(one)])
+@pytest.mark.parametrize("lacks", [(), ("radii",), ("radii", "normals")], ids=["nothing", "radii", "normals"])
+def test_a_prepared_picture_looks_at_no_point_again(own: Renderer, name: str, lacks: tuple[str, ...]) -> None:
+    """What a picture reads of all points is found before; the picture is the same to the bit."""
+    lacking: dict[str, None] = dict.fromkeys(lacks)
+    given = sphere(3000)
+    given = PointCloud.from_arrays(
+        given.positions,
+        normals=given.positions,
+        radii=np.full(len(given), 0.05),
+        colors=given.positions * 0.5 + 0.5,
+        origin=given.origin,
+    )
+    plain, prepared = (
+        Request(Pose(number, 0.0, "x", cloud), CAMERA, find_backend(name))
+        for number, cloud in enumerate(replace(given, **lacking) for _ in range(2))  # type: ignore[arg-type]
+    )
+    own.work.prepare(prepared)
+    cloud = prepared.pose.cloud
+    facts, is_there = set(cloud._facts), is_prepared(own, prepared)
+    pictures = []
+    for request in (plain, prepared):
+        surface = Surface(own.gpu, (64, 48))
+        while render_frame(own, request, surface):
+            pass
+        pictures.append((surface.image().tobytes(), surface.id.tobytes(), surface.depth.tobytes()))
+        surface.release()
+    assert pictures[0] == pictures[1]
+    assert is_there
+    assert set(cloud._facts) == facts
+
+
+def test_a_fact_that_two_threads_ask_for_is_found_once() -> None:
+    cloud, is_asked, calls = sphere(100), threading.Event(), []
+
+    def slowly_found(cloud: PointCloud) -> int:
+        calls.append(len(cloud))
+        assert is_asked.wait(60)
+        return len(cloud)
+
+    first = in_background(Task("first"), lambda: cloud.remember(slowly_found))
+    while not calls:
+        time.sleep(0.001)
+    second = in_background(Task("second"), lambda: cloud.remember(slowly_found))
+    is_asked.set()
+    assert first.result(60) == second.result(60) == 100
+    assert calls == [100]

@@ -13,9 +13,11 @@ from ..errors import InputError
 from ..gpu.pose import GpuPose
 from ..params import param
 from ..picture.surface import Surface
+from ..scan.points import PointCloud
 from ..scan.pose import Pose
-from ..splatting.squares import LARGEST_SQUARE, draw_squares
+from ..splatting.squares import LARGEST_SQUARE, draw_squares, foresee_squares
 from ..visibility.search import mark_visible
+from ..visibility.spacing import foresee_spacing
 from . import Backend, FrameView, Suited, share_param, with_levels
 
 
@@ -64,6 +66,15 @@ class PointSquares(Backend):
     def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
         """Squares that touch, and pixels; of range views, the points would have to be merged."""
         return () if pose.views else with_levels(pose, {"point_size": 0}, {})
+
+    def foresee(self, cloud: PointCloud, params: Params) -> None:
+        """Find the spacing of points where squares or the search for visible points go by it."""
+        if not len(cloud):
+            return
+        if params.point_size == 0:
+            foresee_squares(cloud)
+        if params.hide_hidden:
+            foresee_spacing(cloud)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Scatter the points; complete where all shall be drawn."""

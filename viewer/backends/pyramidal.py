@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from ..gpu.pose import GpuPose
 from ..picture.surface import Surface
-from ..projection.filled import draw_filled
+from ..projection.filled import draw_filled, foresee_filled
 from ..projection.settings import ProjectionParams
+from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from . import NO_SPACING, Backend, FrameView, Limit, Suited
 
@@ -49,6 +50,10 @@ class Pyramidal(Backend):
     def offers(self, pose: Pose) -> tuple[dict[str, object], ...]:
         """Polygons, and points, of range views; clouds are drawn by splats faster and better."""
         return ({}, {"primitive": "points"}) if pose.views else ()
+
+    def foresee(self, cloud: PointCloud, params: ProjectionParams) -> None:
+        """Find the spacing of points."""
+        foresee_filled(cloud)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Scatter, show, hide, fill; complete where all samples shall be drawn."""

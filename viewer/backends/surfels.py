@@ -178,8 +178,10 @@ class Surfels(Backend):
         )
 
     def foresee(self, cloud: PointCloud, params: Params) -> None:
-        """Estimate the noise of points."""
+        """Estimate the noise of points, and find how large their discs are."""
         foresee_noise(cloud, params)
+        if len(cloud):
+            _foresee_sizes(cloud, params)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Splat in as many passes as are asked for; complete where all points are drawn in their size."""
@@ -269,7 +271,7 @@ def _sizes(pose: GpuPose, frame: FrameView, surface: Surface) -> tuple[_Sizes, b
             return _Sizes(True, gaps.usual, gaps.largest, gaps.buffers), True
     # The spacing takes longer to find than many a pose takes to draw.
     suffices = own and pose.cloud.remember(_has_radii, np.all)
-    uniform = 0.0 if suffices else _uniform_radius(pose)
+    uniform = 0.0 if suffices else _uniform_radius(pose.stored)
     return _Sizes(own, uniform, max(uniform, pose.cloud.longest_reach() if own else 0.0)), known
 
 
@@ -390,5 +392,15 @@ def _has_radii(cloud: PointCloud, of: Callable[[NDArray], bool] = np.any) -> boo
     return cloud.radii is not None and bool(of((cloud.radii > 0) & (cloud.radii < np.float32(UNKNOWN))))
 
 
-def _uniform_radius(pose: GpuPose) -> float:
-    return _RADIUS_PER_SPACING * pose.stored.remember(typical_spacing)
+def _uniform_radius(cloud: PointCloud) -> float:
+    return _RADIUS_PER_SPACING * cloud.remember(typical_spacing)
+
+
+def _foresee_sizes(cloud: PointCloud, params: Params) -> None:
+    """Find the facts that sizes of discs go by."""
+    cloud.whole_bounds()
+    if params.radius != "uniform" and cloud.remember(_has_radii):
+        cloud.reaches()
+        if cloud.remember(_has_radii, np.all):
+            return
+    _uniform_radius(cloud)

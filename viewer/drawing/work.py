@@ -12,6 +12,7 @@ from typing import Any
 from ..errors import InputError
 from ..helper import Job, Workers
 from ..task import Task
+from .foresight import Foresight
 from .jobs import Begun, Preparation
 from .request import Request
 from .residents import Resident, Residents
@@ -29,6 +30,7 @@ class BackgroundWork:
     def __init__(self, residents: Residents) -> None:
         self._residents = residents
         self._workers = Workers()
+        self._foresight = Foresight()
         self._latencies: deque[float] = deque(maxlen=_LATELY)
         self._turned = -math.inf  # by the clock, when other pictures were asked for ahead
 
@@ -59,6 +61,7 @@ class BackgroundWork:
         """Let workers make what these pictures need, the first ones first, and take in what is ready of any
         pose. What depends on the view is left out.
 
+        Threads find the facts that pictures read but do not wait for (`Backend.foresee`).
         A few jobs run at a time, and no more than the budget holds beside what is drawn sooner. Jobs that
         wait for other pictures are dropped. Running jobs finish, and their results are kept. afresh: the
         pictures are others than in the last call. Then running jobs end if they keep these waiting.
@@ -66,6 +69,8 @@ class BackgroundWork:
         if afresh:
             self._turned = time.monotonic()
         self._take_finished()
+        requests = list(requests)
+        self._foresight.begin(requests)
         wanted: set[int] = set()
         for request in requests:
             resident = self._residents.find(request.pose)
@@ -87,6 +92,16 @@ class BackgroundWork:
         is_urgent = any(job.is_waiting for job in self._unfinished if id(job) in wanted)
         for resident in self._residents:
             resident.jobs.drop_others(wanted, is_urgent, self._turned)
+
+    def prepare(self, request: Request) -> None:
+        """Let workers make what `prepare_ahead` does for the pictures of one request, and wait for it."""
+        while True:
+            self.prepare_ahead([request])
+            running: list[futures.Future[Any]] = [job.future for job in self._unfinished]
+            running += self._foresight.running
+            if not running:
+                return
+            futures.wait(running, return_when=futures.FIRST_COMPLETED)
 
     @property
     def latency(self) -> float:

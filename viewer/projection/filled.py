@@ -194,6 +194,11 @@ def _source(pose: GpuPose, params: ProjectionParams, surface: Surface, normals: 
     return ViewSource(pose, surface, params, values, normals)
 
 
+def foresee_filled(cloud: PointCloud) -> None:
+    """Find what the projection reads of points (`Backend.foresee`)."""
+    cloud.remember(_spacing)
+
+
 def _spacing(cloud: PointCloud) -> float:
     """The spacing of points, in half octaves of the scan's size: pictures depend neither on which points it
     was judged by nor on the unit."""

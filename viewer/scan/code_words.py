@@ -215,8 +215,12 @@ def elements_of(pose: Pose, view: View, params: Params, materials: NDArray[np.ui
 
 def uniform_radius(cloud: PointCloud, params: Params) -> float:
     """The radius of points without one of their own, scan units; 1 where there is none of these."""
-    suffices = params.radius != "uniform" and cloud.radii is not None and bool((cloud.radii > 0).all())
+    suffices = params.radius != "uniform" and cloud.remember(_has_all_radii)
     return 1.0 if suffices or not len(cloud) else _RADIUS_PER_SPACING * cloud.remember(typical_spacing)
+
+
+def _has_all_radii(cloud: PointCloud) -> bool:
+    return cloud.radii is not None and bool((cloud.radii > 0).all())
 
 
 class WordLook(NamedTuple):
@@ -271,11 +275,16 @@ def point_materials(
         return palette_of(_id_colors(np.arange(len(cloud)) if cloud.ids is None else cloud.ids))
     if look.color_by in ("plain", "normal") or cloud.colors is None:
         return np.array([rgba(look.plain)[:3]], np.uint8), np.zeros(len(cloud), np.uint8)
-    palette, index = cloud.remember(_own_palette)
+    palette, index = own_palette(cloud)
     if look.color_by == "level":  # all of it was measured, which is grey
         grey = bytes_from_light(light_from_bytes(palette) @ _LUMA)
         return np.repeat(grey[:, None], 3, axis=1), index
     return palette, index
+
+
+def own_palette(cloud: PointCloud) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """The palette of the points' own colours, (M, 3), and the entry of each point, (N,). Found once."""
+    return cloud.remember(_own_palette)
 
 
 def _own_palette(cloud: PointCloud) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:

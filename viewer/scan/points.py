@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from threading import RLock
 from typing import Any, Concatenate, Literal, ParamSpec, Protocol, TypedDict, TypeVar, Unpack, get_args
 
 import numpy as np
@@ -100,6 +101,7 @@ class PointCloud:
     orientation: Orientation = "auto"
     octree: Held | None = None
     _facts: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, repr=False)
+    _finding: dict[tuple[Any, ...], RLock] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def from_arrays(
@@ -298,10 +300,14 @@ class PointCloud:
         return self.remember(PointCloud._find_reaches)
 
     def remember(self, find: Callable[Concatenate[PointCloud, P], T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Find a small fact about the points, once for the same arguments."""
+        """Find a small fact about the points, once for the same arguments. While one thread finds it, others
+        that ask for it wait."""
         key = (find, *args, *kwargs.items())
         if key not in self._facts:
-            self._facts[key] = find(self, *args, **kwargs)
+            with self._finding.setdefault(key, RLock()):
+                if key not in self._facts:
+                    self._facts[key] = find(self, *args, **kwargs)
+            self._finding.pop(key, None)
         return self._facts[key]
 
     def recall(self, find: Callable[[PointCloud], T]) -> T | None:
@@ -310,7 +316,7 @@ class PointCloud:
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the facts, which another process finds again where it needs them."""
-        return {**self.__dict__, "_facts": {}}
+        return {**self.__dict__, "_facts": {}, "_finding": {}}
 
     def _find_whole_bounds(self) -> Bounds:
         if not len(self):

@@ -223,6 +223,11 @@ def _defines(
     return {name: int(value) for name, value in given.items()}
 
 
+def foresee_squares(cloud: PointCloud) -> None:
+    """Find what the size of squares that touch goes by (`Backend.foresee`)."""
+    cloud.remember(_reach)
+
+
 def _touching(pose: GpuPose, view: View) -> float:
     """The size at which squares in the middle of the scan touch their neighbours, pixels, at most that of the
     largest ones."""

@@ -13,11 +13,11 @@ moved    messages of the driver in ten frames that a buffer moved from the memor
 
 sketch, GL_POINTS and CUDA draw the same points with nothing beside: a plain compute shader in the same
 context, points of OpenGL, a kernel by CuPy. Rows whose name begins with "new" bring other points with
-each picture, which are on the CPU already. "cold" is the time to the first picture in a process of its
-own, once without and once with what the process before stored. "cpu" is what the CPU does for a picture
-outside the driver, at any number of points, and how many programs the first picture compiles: the driver does
-nothing meanwhile, so that its threads disturb nothing. "frame" is
-the time of a frame on the GPU, with what is in no pass.
+each picture, which the CPU has prepared as during playback. "cold" is the time to the first picture in a
+process of its own, once without and once with what the process before stored. "cpu" is what the CPU does for
+a picture outside the driver, at any number of points, and how many programs the first picture compiles: the
+driver does nothing meanwhile, so that its threads disturb nothing. "frame" is the time of a frame on the GPU,
+with what is in no pass.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
@@ -514,7 +514,7 @@ def _series(case: Case, points: int, options: Namespace) -> Row:
         cloud = replace(shapes[number % _POSES], **{name: getattr(shapes[number % _POSES], name).copy()
                                                     for name in ("positions", *case.of)})  # fmt: skip
         drawn.pose = Pose(number, 0.1 * number, "new", cloud)
-        drawn.pose.drawn_bounds(), cloud.longest_reach()  # which the thread that reads finds
+        renderer().work.prepare(drawn.request(number))  # as a player does before the pose is due
         drawn.finish()
         start = time.perf_counter()
         drawn.submit(number)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...document.document import Document
-from ...drawing.foresight import Foresight
 from ...drawing.plan import Effort, Waiting, make_plan
 from ...drawing.renderer import Renderer
 from ...drawing.request import Request
@@ -32,7 +31,6 @@ class Ahead(WindowPart):
 
     def __post_init__(self) -> None:
         self._asked: Any = None
-        self.foresight = Foresight()
         self.playback.is_prepared = self.is_prepared
         self.renderer.steps_to = self._steps_to
 
@@ -51,7 +49,6 @@ class Ahead(WindowPart):
         requests = [self._request(pose) for pose in (playback.pose, *reversed(ahead)) if pose is not None]
         wanted = [request for request in requests if request is not None]
         self.renderer.work.prepare_ahead(wanted, afresh=asked != self._asked)
-        self.foresight.begin(wanted)
         self._asked = asked
 
     def _next(self) -> list[int]:

@@ -30,7 +30,7 @@ from ...splatting.local import (
 from ...splatting.packed import VARIANTS, draw_depths, draw_splats
 from .. import NO_SPACING, Backend, FrameView, Limit, Suited
 from .grids import border_of
-from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
+from .neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search, foresee_neighborhoods
 from .values import VALUES, give_value
 
 _HIDDEN_COPIES = (
@@ -182,10 +182,12 @@ class AutoSplats(Backend):
         return () if pose.views or self.suits(pose) is None else ({}, {"passes": "one", "surface": "nearest"})
 
     def foresee(self, cloud: PointCloud, params: Params) -> None:
-        """Estimate the noise of points."""
+        """Estimate the noise of points, and how far apart they are."""
         if params.adaptive:
             noise_of(cloud)
         foresee_noise(cloud, params)
+        if len(cloud):
+            foresee_neighborhoods(cloud)
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Find neighborhoods and draw their splats; complete where all points shall be drawn."""

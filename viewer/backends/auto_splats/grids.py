@@ -117,6 +117,12 @@ def border_of(cloud: PointCloud, view: View, k: int) -> int:
     return _BORDER_STEP * math.ceil(wanted / _BORDER_STEP)
 
 
+def foresee_border(cloud: PointCloud) -> None:
+    """Find the facts that `border_of` reads (`Backend.foresee`)."""
+    cloud.remember(_sample_of)
+    sparse_spacing(cloud)
+
+
 def _sample_of(cloud: PointCloud) -> NDArray[np.float32]:
     """Positions of some points, spread evenly over the file, (n, 3) relative to the cloud's origin."""
     rows = np.linspace(0, len(cloud) - 1, min(len(cloud), _SAMPLE)).astype(int)

@@ -34,7 +34,7 @@ from ...scan.points import PointCloud
 from ...scan.range_points import RangePoints
 from ...scan.spacing import spacing_quantile
 from ...view import View
-from .grids import COARSEST, FINEST_COARSE, Grids
+from .grids import COARSEST, FINEST_COARSE, Grids, foresee_border
 
 # Bytes of a pose's row, of a participant, of a point that is seen.
 _SPLAT, _LOOK, _PLACE, _SLOT, _FOUND = 12, 8, 12, 16, 16
@@ -463,6 +463,12 @@ def _unit(pose: GpuPose) -> float:
 def _typical_radius(pose: GpuPose, k: int) -> float:
     """The radius of neighborhoods of k if points lay evenly on a ball of the scan's size, scan units."""
     return 2 * pose.bounds.radius * math.sqrt(k / max(len(pose.cloud), 1))
+
+
+def foresee_neighborhoods(cloud: PointCloud) -> None:
+    """Find the facts that searches for neighborhoods read (`Backend.foresee`)."""
+    foresee_border(cloud)
+    cloud.remember(spacing_quantile, _SPARSE)
 
 
 def _widest_radius(pose: GpuPose, k: int) -> float:

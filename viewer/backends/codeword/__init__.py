@@ -23,7 +23,7 @@ from ...look import Look
 from ...params import param
 from ...picture.surface import Surface
 from ...scan import code_words
-from ...scan.code_words import uniform_radius, word_look, words_of
+from ...scan.code_words import own_palette, uniform_radius, word_look, words_of
 from ...scan.layers import Layers
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
@@ -75,6 +75,12 @@ class CodeWords(Backend):
     def needs(self, pose: Pose, params: Params) -> tuple[str, ...]:
         """Normals, and radii where they shall be the points' own."""
         return ("normals", "radii") if params.radius == "own" else ("normals",)
+
+    def foresee(self, cloud: PointCloud, params: Params) -> None:
+        """Find the radius of points without one of their own, and their palette."""
+        uniform_radius(cloud, params)
+        if cloud.colors is not None:
+            own_palette(cloud)
 
     def suits(self, pose: Pose) -> Suited | None:
         """None: `surfels` draws the same points better."""
