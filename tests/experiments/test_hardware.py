@@ -9,12 +9,14 @@ import sys
 
 import numpy as np
 import pytest
-from experiments.speed.hardware import CASES, TABLES, Drawn, counted_reads, shape, view
+from experiments.speed.hardware import CASES, TABLES, Drawn, Plain, counted_reads, shape, view
 from experiments.speed.idle_driver import Driver
 from experiments.speed.sketches import Sketch
 from experiments.suite import ROOT
 
+from viewer.camera import Camera
 from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.scan.pose import Pose
 
 LACKING = "open3d", "imgui_bundle", "av"
@@ -73,6 +75,22 @@ def test_a_driver_that_does_nothing_leaves_the_picture() -> None:
     assert driver.calls == calls
     drawn.submit(5)
     assert (drawn.surface.image() != first).any()
+
+
+def test_what_is_drawn_is_made_before_anything_is_timed(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cloud, size = shape(2000), (64, 48)
+    contenders = (
+        Drawn(CASES["points"], Pose(0, 0.0, "", cloud), size),
+        Plain(Sketch(renderer.gpu, cloud, size, 32), cloud, size),
+    )
+    for made in (Camera, Request):
+        monkeypatch.delattr(made, "__init__")
+    for each in contenders:
+        each.submit(2)
+        each.submit(25)
+        each.release()
 
 
 @pytest.mark.slow
