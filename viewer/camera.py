@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
 from pathlib import Path
@@ -151,15 +150,17 @@ class Camera:
 
     def rotation(self) -> NDArray[np.float64]:
         """World to view rotation, (3, 3): its rows are the picture's right, up and backward axes."""
-        back = np.subtract(self.eye, self.target)
-        back /= np.linalg.norm(back)
+        # A view turns this for each picture, and numpy takes several times as long for three numbers.
+        (ex, ey, ez), (tx, ty, tz) = self.eye, self.target
+        back = ex - tx, ey - ty, ez - tz
+        back = _divided(back, _norm(back))
         right = _across(self.up, back)
-        length = np.linalg.norm(right)
-        if length <= 1e-12 * np.linalg.norm(self.up):
+        length = _norm(right)
+        if length <= 1e-12 * math.hypot(*self.up):
             # Up is parallel to the view axis: any right will do; take the most orthogonal axis.
-            right = _across(np.eye(3)[np.abs(back).argmin()], back)
-            length = np.linalg.norm(right)
-        right = right / length
+            right = _across(np.eye(3)[np.abs(back).argmin()].tolist(), back)
+            length = _norm(right)
+        right = _divided(right, length)
         return np.array([right, _across(back, right), back])
 
     def place_in_picture(self, point: Vector) -> tuple[float, float] | None:
@@ -370,7 +371,18 @@ def _rotate(v: NDArray[np.float64], axis: NDArray[np.float64], angle: float) -> 
     return v * cos + np.cross(axis, v) * sin + axis * (axis @ v) * (1 - cos)
 
 
-def _across(a: Sequence[float] | NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The cross product of two vectors, (3,): that of np.cross without its checks, for each view."""
+def _norm(v: Vector) -> float:
+    """The length, to the bit that of np.linalg.norm."""
+    numbers = np.array(v)
+    return math.sqrt(numbers.dot(numbers))
+
+
+def _divided(v: Vector, length: float) -> Vector:
+    x, y, z = v
+    return x / length, y / length, z / length
+
+
+def _across(a: Vector, b: Vector) -> Vector:
+    """The cross product."""
     (ax, ay, az), (bx, by, bz) = a, b
-    return np.array([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx])
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx

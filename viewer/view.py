@@ -57,6 +57,7 @@ class View:
         small numbers. bounds: of the pose, where it is not moved."""
         to_view = camera.rotation()
         rotation = to_view if world_from_pose.is_identity else to_view @ world_from_pose.rotation
+        (x, y, z), (ex, ey, ez) = world_from_pose.points(origin).tolist(), camera.eye
         perspective = camera.projection == "perspective"
         extent = 2 * math.tan(math.radians(camera.fov_y) / 2) if perspective else camera.view_height
         near, far = camera.clip_range()
@@ -64,7 +65,7 @@ class View:
             size=size,
             origin=origin,
             rotation=rotation,
-            translation=to_view @ (world_from_pose.points(origin) - np.array(camera.eye)),
+            translation=to_view @ np.array([x - ex, y - ey, z - ez]),
             scale=size[1] / extent,
             near=near,
             far=far,
@@ -97,7 +98,8 @@ class View:
     @cached_property
     def center(self) -> NDArray[np.float64]:
         """Pixel coordinates, (2,), of the line of sight."""
-        return np.array(self.size) / 2 + self.shift
+        width, height = self.size
+        return np.array([width / 2 + self.shift[0], height / 2 + self.shift[1]])
 
     @cached_property
     def key(self) -> tuple[object, ...]:
@@ -201,5 +203,9 @@ def origin_near(
     """
     pixel = camera.view_height / size[1]
     grid = 4.0 ** math.ceil(math.log(pixel * _FAR, 4))
-    away = world_from_pose.inverse.points(np.array(camera.target)) - origin
-    return origin + np.round(away / grid) * grid
+    target = camera.target
+    if not world_from_pose.is_identity:
+        target = world_from_pose.inverse.points(np.array(target)).tolist()
+    if all(abs(to - at) <= grid / 2 for to, at in zip(target, origin.tolist(), strict=True)):
+        return origin
+    return origin + np.round((target - origin) / grid) * grid

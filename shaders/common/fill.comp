@@ -1,9 +1,11 @@
-// Fills a buffer with one word. Bound beyond what other programs use, so that a fill leaves their bindings alone.
+// Fills buffers, each with its word. They are bound beyond what other programs use, so that a fill leaves their
+// bindings alone.
 #include "common/item.glsl"
-layout(std430, binding = FILLED) writeonly buffer Filled { uint filled[]; };
-uniform uint word, words;
+layout(std430, binding = FILLED) writeonly buffer Filled { uint filled[]; } fills[FILLS];
+uniform uvec4 words, counts;
 
 void main() {
-    uint groups = gl_NumWorkGroups.x * gl_NumWorkGroups.y;
-    for (uint i = item(); i < words; i += groups * uint(GROUP)) filled[i] = word;
+    uint step = gl_NumWorkGroups.x * gl_NumWorkGroups.y * uint(GROUP);
+    for (int each = 0; each < FILLS; each++)
+        for (uint i = item(); i < counts[each]; i += step) fills[each].filled[i] = words[each];
 }

@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from viewer.camera import Camera
+from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
+from viewer.drawing.request import Request
 from viewer.gpu.bindings import Storage
 from viewer.gpu.compact import prefix_sums
 from viewer.gpu.constants import NO_DEPTH, NOTHING
+from viewer.gpu.context import Fill
+from viewer.picture.surface import Surface
+from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 
 
 @pytest.mark.parametrize("by_shader", [False, True])
@@ -25,6 +32,42 @@ def test_the_first_words_are_filled(
         expected[:count] = word
         assert (gpu.read(buffer, np.uint32) == expected).all()
     buffer.release()
+
+
+@pytest.mark.parametrize("by_shader", [False, True])
+def test_several_buffers_are_filled_at_once(
+    by_shader: bool, renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gpu = renderer.gpu
+    monkeypatch.setattr(gpu, "clears_by_shader", by_shader)
+    counts = (7, None, 0, 600, 129, None)
+    before = np.arange(70_000, dtype=np.uint32)
+    buffers = [gpu.buffer(before[: 70_000 >> number]) for number in range(len(counts))]
+    gpu.fill(*(Fill(buffer, 11 * number, counts[number]) for number, buffer in enumerate(buffers)))
+    for number, (buffer, count) in enumerate(zip(buffers, counts, strict=True)):
+        expected = before[: buffer.size // 4].copy()
+        expected[:count] = 11 * number
+        assert (gpu.read(buffer, np.uint32) == expected).all()
+        buffer.release()
+
+
+def test_depths_rows_and_picture_are_filled_at_once(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surface, filled, fill = Surface(renderer.gpu, (64, 48)), list[set[object]](), renderer.gpu.fill
+
+    def noted(*fills: Fill) -> None:
+        filled.append({each.buffer for each in fills})
+        fill(*fills)
+
+    monkeypatch.setattr(renderer.gpu, "fill", noted)
+    points = np.random.default_rng(0).normal(size=(3000, 3))
+    pose = Pose(0, 0.0, "some", PointCloud.from_arrays(points))
+    pixels = {surface.depths.buffer, surface.rows.buffer, surface.picture}
+    for name in ("points", "surfels", "voxels", "pyramidal"):
+        render_frame(renderer, Request(pose, Camera.orbit(pose.bounds), name), surface)
+        assert [buffers for buffers in filled if buffers & pixels] == [pixels]
+        filled.clear()
 
 
 def test_a_fill_leaves_bindings_alone(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,7 @@ from ..errors import InputError
 from . import gl
 from .bindings import Storage, Texture
 from .compact import prefix_sums
-from .context import Gpu, Program
+from .context import Fill, Gpu, Program
 from .scatter import Visits
 
 _SPARE = 4  # times the room that is asked for, beyond which room is given up
@@ -48,10 +48,11 @@ class Bins:
         """
         gpu = self._gpu
         with gpu.timers.measure("count"):
-            self._gpu.clear(self.starts.buffer, 0)
+            cleared = [Fill(self.starts.buffer, 0)]
             if self.ordered:
                 self._cursors = self._at_least(self._cursors, 4 * visits.count)
-                self._gpu.clear(self._cursors, 0)
+                cleared.append(Fill(self._cursors, 0))
+            self._gpu.fill(*cleared)
             self._send(visits, 0, self.starts.buffer, self._cursors)
         with gpu.timers.measure("scan"):
             prefix_sums(gpu, self.starts.buffer, self.cells + 1)

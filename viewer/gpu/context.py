@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from typing import Any, Protocol, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import moderngl
 import numpy as np
@@ -34,7 +34,9 @@ REQUIRED_VERSION = 430
 WIDE_EXTENSIONS = {"GL_ARB_gpu_shader_int64", "GL_NV_shader_atomic_int64"}
 _OLDEST_VERSION = 330  # that moderngl takes
 REQUIRED_EXTENSIONS = ("GL_ARB_clip_control",)
-_FILLED = 4  # words that an invocation fills
+_FILLED = 4  # words of a buffer that an invocation fills
+_MOST_FILLS = 4  # buffers that a dispatch fills
+_MISSING = object()
 _MUCH = 64 << 20  # bytes to be given back at once
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader", "basic render", "gdi generic")
 
@@ -54,6 +56,19 @@ class Workspace(Resource, Protocol):
         """Bytes held on the GPU."""
 
 
+class Fill(NamedTuple):
+    """A 32-bit word in each place of a buffer. first: only in so many, the first ones."""
+
+    buffer: moderngl.Buffer
+    word: int
+    first: int | None = None
+
+    @property
+    def words(self) -> int:
+        """How many places that is."""
+        return self.buffer.size // 4 if self.first is None else self.first
+
+
 @dataclass
 class Attempts:
     """Attempts to get a context: (how, what came of it)."""
@@ -64,34 +79,46 @@ class Attempts:
         return "; ".join(f"{how}: {outcome}" for how, outcome in self.log)
 
 
+class _Uniform:
+    """A uniform of a program. value, packed: what it holds."""
+
+    __slots__ = ("member", "pack", "packed", "value")
+
+    def __init__(self, member: Any) -> None:
+        self.member, self.pack = member, struct.Struct(member.fmt).pack
+        self.value: Uniform | None = None
+        self.packed = b""
+
+
 class _Uniforms:
     """The uniforms of a program by name. Only values that change go to the driver."""
 
     def __init__(self, program: Program, sources: list[Source]) -> None:
         members = ((name, program[name]) for name in program)
-        self._members: dict[str, Any] = {
-            name: each for name, each in members if isinstance(each, moderngl.Uniform)
-        }
-        self._packers = {name: struct.Struct(each.fmt).pack for name, each in self._members.items()}
-        self._held = dict.fromkeys(self._members, b"")
+        self._used = {name: _Uniform(each) for name, each in members if isinstance(each, moderngl.Uniform)}
+        self._unused = set[str]()  # those that the compiler dropped
         self._sources = sources
 
-    def set(self, name: str, value: Uniform) -> None:
-        """Set one of them; see `Gpu.set`."""
-        pack = self._packers.get(name)
-        if pack is None:
-            self._check(name)
-            return
-        packed = pack(*value) if isinstance(value, tuple) else pack(value)
-        if packed != self._held[name]:
-            self._members[name].write(packed)
-            self._held[name] = packed
+    def set(self, values: Mapping[str, Uniform]) -> None:
+        """Set some of them; see `Gpu.set`."""
+        for name, value in values.items():
+            used = self._used.get(name)
+            if used is None:
+                if name not in self._unused:
+                    self._check(name)
+            elif value is not used.value:
+                packed = used.pack(*value) if isinstance(value, tuple) else used.pack(value)
+                if packed != used.packed:
+                    used.member.write(packed)
+                    used.packed = packed
+                used.value = value
 
     def _check(self, name: str) -> None:
-        """Raise ShaderError for a name that no source declares. The compiler drops those without a use."""
+        """Note a name without a use. Raises ShaderError for one that no source declares."""
         if not any(name in source.uniforms for source in self._sources):
             names = ", ".join(source.name for source in self._sources)
             raise ShaderError(f"no uniform is called '{name}'", f"shaders/{names}")
+        self._unused.add(name)
 
 
 @dataclass(frozen=True)
@@ -106,7 +133,7 @@ class Built:
 class Gpu:
     """A context with its shader programs and timers.
 
-    wide_atomics: whether passes use 64-bit atomics (`WIDE_EXTENSIONS`). clears_by_shader: see `clear`.
+    wide_atomics: whether passes use 64-bit atomics (`WIDE_EXTENSIONS`). clears_by_shader: see `fill`.
 
     Make one with `headless()`, or give it the context of a window. Raises NoOpenGLError
     where the context lacks what the project needs.
@@ -133,8 +160,9 @@ class Gpu:
         self.timers = Timers(ctx, self.software)
         self.staging = Staging(ctx, self.software)
         self.wide_atomics = False  # until they are measured to be faster and exact on a card
-        self._spare_binding = gl.storage_bindings() - 1
-        self.clears_by_shader = not self.software and self._spare_binding > max(Storage)
+        last = gl.storage_bindings() - 1
+        self._spare_bindings = range(max(last - _MOST_FILLS, *Storage) + 1, last + 1)
+        self.clears_by_shader = not self.software and bool(self._spare_bindings)
         self.max_storage_bytes = gl.max_storage_block_bytes()
         self.max_pixels = self.max_storage_bytes // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
@@ -176,7 +204,7 @@ class Gpu:
         params: Values | None,
     ) -> Any:
         declared = None if params is None else type(params)
-        given = tuple((defines or {}).items()), tuple((parts or {}).items())
+        given = tuple(defines.items()) if defines else (), tuple(parts.items()) if parts else ()
         program = self.cached(Gpu._compile, names, *given, declared)
         if params is not None:
             program.extra.values.write(params)
@@ -216,9 +244,9 @@ class Gpu:
     def cached(self, make: Callable[..., T], *args: Hashable) -> T:
         """Make, once for these arguments, `make(gpu, *args)`: small things that live as long as this."""
         key = (make, *args)
-        if key not in self._cached:
-            self._cached[key] = make(self, *args)
-        return self._cached[key]
+        if (found := self._cached.get(key, _MISSING)) is _MISSING:
+            found = self._cached[key] = make(self, *args)
+        return found
 
     def activate(self) -> None:
         """Make a headless context the current one, whatever else the process draws with.
@@ -245,20 +273,33 @@ class Gpu:
         return self.staging.read(buffer, nbytes, offset).view(kind)
 
     def clear(self, buffer: moderngl.Buffer, word: int, count: int | None = None) -> None:
-        """Fill a buffer with one 32-bit word. count: only so many words of it, the first ones.
+        """Fill a buffer with one 32-bit word. count: only so many words of it, the first ones."""
+        self.fill(Fill(buffer, word, count))
+
+    def fill(self, *fills: Fill) -> None:
+        """Fill buffers, each with its word: several at once, since a dispatch takes longer than most fills.
 
         By a shader, in a fortieth of the time of what drivers of graphics cards do; software drivers do it
         faster themselves.
         """
-        words = buffer.size // 4 if count is None else count
+        most = len(self._spare_bindings)
         with self.timers.measure("clear", only_alone=True):
-            if not self.clears_by_shader or buffer.size > self.max_storage_bytes:
-                gl.clear_words(buffer, word, words)
-            elif words:
-                program = self.compute("common/fill.comp", {"FILLED": self._spare_binding})
-                self.set(program, word=int(word), words=words)
-                buffer.bind_to_storage_buffer(self._spare_binding)
-                self.dispatch(program, -(-words // _FILLED))
+            if not self.clears_by_shader or any(each.buffer.size > self.max_storage_bytes for each in fills):
+                for buffer, word, first in fills:
+                    gl.clear_words(buffer, word, first)
+            else:
+                for first in range(0, len(fills), most):
+                    self._fill_by_shader(fills[first : first + most])
+
+    def _fill_by_shader(self, fills: Sequence[Fill]) -> None:
+        first = self._spare_bindings.start
+        program = self.compute("common/fill.comp", {"FILLED": first, "FILLS": len(fills)})
+        for binding, each in enumerate(fills, first):
+            each.buffer.bind_to_storage_buffer(binding)
+        none = (0,) * (_MOST_FILLS - len(fills))
+        counts = [each.words for each in fills]
+        self.set(program, words=(*(int(each.word) for each in fills), *none), counts=(*counts, *none))
+        self.dispatch(program, -(-max(counts) // _FILLED))
 
     def check_memory(self, *made: Resource) -> None:
         """Release what was just made, and raise Scan4DError, where there was no memory for it: drivers only
@@ -295,16 +336,14 @@ class Gpu:
         Those that the compiler found unused are passed over. Raises ShaderError for a name that the program's
         source does not declare.
         """
-        uniforms = program.extra.uniforms
-        for name, value in values.items():
-            uniforms.set(name, value)
+        program.extra.uniforms.set(values)
 
     def dispatch(self, program: moderngl.ComputeShader, count: int) -> None:
         """Run one invocation for each of `count` items: `item()` in shaders, which is less than `item_count`
         but for the last group's."""
         groups = -(-count // GROUP)
         if groups:
-            program.extra.uniforms.set("item_count", count)
+            program.extra.uniforms.set({"item_count": count})
             rows = -(-groups // GROUP_LIMIT)
             _bind_values(program)
             program.run(-(-groups // rows), rows)

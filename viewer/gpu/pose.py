@@ -175,7 +175,7 @@ class GpuPose:
     def center(self, origin: NDArray[np.float64]) -> None:
         """Count positions on the GPU from this origin, (3,). If it is another one, positions and packed
         arrays are uploaded again."""
-        if (origin == self.origin).all():
+        if origin is self.origin or (origin == self.origin).all():
             return
         self.origin = origin
         for part in self._parts:

@@ -45,7 +45,7 @@ from .constants import (
     RANGE_TILE_TEXELS,
     RANGE_Z,
 )
-from .context import Gpu
+from .context import Fill, Gpu
 from .pyramid import BOX, Filter, sizes
 
 LEVELS = 6
@@ -246,8 +246,7 @@ class RangeSamples:
             )
         known = self._normals
         if known.filter != self.filter:
-            self._gpu.clear(known.words.buffer, 0)
-            self._gpu.clear(known.rows, 0)
+            self._gpu.fill(Fill(known.words.buffer, 0), Fill(known.rows, 0))
             known.filter, known.complete = self.filter, False
         if known.complete:
             return known.words

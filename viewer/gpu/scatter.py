@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -18,7 +18,7 @@ from .bindings import Storage, Texture
 from .blocks import Values
 from .compact import IndexList
 from .constants import NO_DEPTH, NOTHING
-from .context import Gpu, Program
+from .context import Fill, Gpu, Program
 
 _LARGEST_SUM = 2**31 - 1
 
@@ -87,14 +87,19 @@ def scatter(
 
 @contextmanager
 def keeping_nearest(
-    gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture, shown: Callable[[], Visits] | None = None
+    gpu: Gpu,
+    keys: gl.BufferTexture,
+    best: gl.BufferTexture,
+    shown: Callable[[], Visits] | None = None,
+    beside: Callable[[], Sequence[Fill]] = tuple,
 ) -> Iterator[TwoPasses | OnePass]:
     """Keep the best of all visits that are taken inside, as `scatter` does of one.
 
-    shown: gives visits that have all the best ones; None: all of them may.
+    shown: gives visits that have all the best ones; None: all of them may. beside: gives what to fill at
+    once with keys and best, where these are filled.
     """
     is_wide = gpu.wide_atomics and 2 * keys.buffer.size <= gpu.max_storage_bytes
-    nearest = (OnePass if is_wide else TwoPasses)(gpu, keys, best)
+    nearest = OnePass(gpu, keys, best) if is_wide else TwoPasses(gpu, keys, best, beside())
     yield nearest
     nearest.finish(shown)
 
@@ -102,11 +107,13 @@ def keeping_nearest(
 class TwoPasses:
     """Visits whose keys are found first, then the items: 32-bit atomics, which all drivers have."""
 
-    def __init__(self, gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture) -> None:
+    def __init__(
+        self, gpu: Gpu, keys: gl.BufferTexture, best: gl.BufferTexture, beside: Sequence[Fill] = ()
+    ) -> None:
         self._gpu, self._keys, self._best = gpu, keys, best
         self._visits: list[Visits] = []
-        gpu.clear(keys.buffer, NO_DEPTH)  # a key buffer of depths reads as floats
-        gpu.clear(best.buffer, NOTHING)
+        # A key buffer of depths reads as floats.
+        gpu.fill(Fill(keys.buffer, NO_DEPTH), Fill(best.buffer, NOTHING), *beside)
 
     def take(self, visits: Visits) -> None:
         """Take visits to cells."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
 from typing import TypeVar
 
@@ -14,9 +15,10 @@ from ..gpu.bindings import Storage, Texture, UniformBlock
 from ..gpu.blocks import BlockBuffer
 from ..gpu.compact import IndexList, list_covered
 from ..gpu.constants import NO_DEPTH, NOTHING
-from ..gpu.context import Gpu, Resource, Workspace
+from ..gpu.context import Fill, Gpu, Resource, Workspace
+from ..gpu.scatter import OnePass, TwoPasses, Visits, keeping_nearest
 from ..gpu.view import ViewBlock
-from ..look import rgba
+from ..look import Look, rgba
 
 # What a backend may write for each pixel: the format of a texel, and its bytes.
 _CHANNELS = {"color": (gl.RGBA8, 4), "normal": (gl.RGB32F, 12), "value": (gl.R32F, 4), "level": (gl.R32UI, 4)}
@@ -31,6 +33,8 @@ class PictureBuffers:
     none. picture: RGBA8 sRGB. A pixel is covered where its depth is finite; covered: the list of these, as
     far as it is known. Backends may store what they work with (`cached`), and channels of their own.
     """
+
+    look: Look  # that the picture is drawn for, and was shaded in last
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self.gpu = gpu
@@ -57,6 +61,7 @@ class PictureBuffers:
         self._covered_known = self._slots_known = False
         self._clear_as: str | None = None  # the background of all pixels that `covered` does not list
         self._left_as: str | None = None  # the same of the picture before
+        self._filled_as: str | None = None  # what fills the picture until it is shaded
         self._resources = (self.depths, self.rows, self.picture, self._block, self.covered)
 
     def bind_view(self) -> None:
@@ -87,8 +92,7 @@ class PictureBuffers:
                 self.gpu.set(program, background=picture_word(background))
                 self.covered.run(program)
         else:
-            self.clear()
-            self.gpu.clear(self.picture, picture_word(background))
+            self.gpu.fill(*self._empty(), Fill(self.picture, picture_word(background)))
         self._clear_as, self._slots_known = background, True
         return self.covered
 
@@ -100,8 +104,10 @@ class PictureBuffers:
     def clear_picture(self, background: str) -> None:
         """Make the picture this colour, at least where nothing is shown."""
         if self._clear_as != background:
-            self.gpu.clear(self.picture, picture_word(background))
+            if self._filled_as != background:
+                self.gpu.clear(self.picture, picture_word(background))
             self._clear_as = background if self._slots_known else None
+        self._filled_as = None
 
     def list_shown(self) -> IndexList:
         """The list of the pixels that show something, in no order, which may have slots that are no pixel,
@@ -118,8 +124,25 @@ class PictureBuffers:
 
     def clear(self) -> None:
         """Nothing anywhere."""
-        self.gpu.clear(self.depths.buffer, NO_DEPTH)
-        self.gpu.clear(self.rows.buffer, NOTHING)
+        self.gpu.fill(*self._empty(), *self._fill_picture())
+
+    @contextmanager
+    def keeping_nearest(self, shown: Callable[[], Visits] | None = None) -> Iterator[TwoPasses | OnePass]:
+        """Keep the nearest of all visits to pixels that are taken inside, see `keeping_nearest`."""
+        with keeping_nearest(self.gpu, self.depths, self.rows, shown, self._fill_picture) as nearest:
+            yield nearest
+
+    def _empty(self) -> tuple[Fill, Fill]:
+        """Depths and rows of nothing."""
+        return Fill(self.depths.buffer, NO_DEPTH), Fill(self.rows.buffer, NOTHING)
+
+    def _fill_picture(self) -> Sequence[Fill]:
+        """What shading would fill the picture with, to be done beside other fills."""
+        background = self.look.background
+        if self._filled_as == background:
+            return ()
+        self._filled_as = background
+        return (Fill(self.picture, picture_word(background)),)
 
     def raster(self) -> gl.Raster:
         """The framebuffer of backends that rasterise; `take_raster` makes it the Surface.

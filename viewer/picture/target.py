@@ -74,6 +74,7 @@ class RenderTarget(PictureBuffers, Coloring):
         self.bind_view()
         self._covered_known = self._slots_known = self.is_whole = False
         self._left_as, self._clear_as = self._clear_as if self.drawn else None, None
+        self._filled_as = None
         self._written.clear()
         self.is_lit = False
         self.stats = Stats()

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..gpu.bindings import Texture
 from ..gpu.pose import GpuPose
-from ..gpu.scatter import Visits, scatter
+from ..gpu.scatter import Visits
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.spacing import sparse_spacing
@@ -73,7 +73,8 @@ def draw_filled(
     params = _coarser(params, share) if pose.views else params
     source = _source(pose, params, surface, merge is not None)
     visits = source.visits(surface, share)
-    scatter(surface.gpu, visits, surface.depths, surface.rows)
+    with surface.keeping_nearest() as nearest:
+        nearest.take(visits)
     refinable = share < 1 if pose.views else surface.stats.share < 1
     fills, hides = params.shown != (0,), params.hide and not source.is_closed
     channels = source.channels(surface)

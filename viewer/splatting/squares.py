@@ -17,7 +17,7 @@ from ..gpu.bindings import Texture
 from ..gpu.compact import IndexList
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
-from ..gpu.scatter import HitCells, Visits, keeping_nearest, scatter
+from ..gpu.scatter import HitCells, Visits, scatter
 from ..picture.frame_view import Before
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
@@ -93,7 +93,8 @@ def draw_squares(
     if count < _few(surface, size):
         _draw_listed(surface, visits, size)
     else:
-        scatter(pose.gpu, visits, surface.depths, surface.rows)
+        with surface.keeping_nearest() as nearest:
+            nearest.take(visits)
     return surface.stats.is_sample
 
 
@@ -106,7 +107,7 @@ def _draw_parts(pose: GpuPose, surface: Surface, size: int, share: float) -> boo
         stats.left_out = pose.count - sum(-(-part.pose.count // stride) for part in pose.parts)
         size = _enlarged(size, pose, surface)
     defines = {**_defines(size, None), "STRIDED": int(stride > 1), "PART": 1}
-    with keeping_nearest(pose.gpu, surface.depths, surface.rows) as nearest:
+    with surface.keeping_nearest() as nearest:
         for part in pose.parts:
             given = _Squares(size, part.pose.count, stride, first=part.first)
             count = -(-part.pose.count // stride)
@@ -152,7 +153,7 @@ def _draw_kept(pose: GpuPose, surface: Surface, size: int, share: float, before:
         Visits("points/cells.glsl", count, bind, {**defines, "KEPT": 1}, numbers, listed),
         Visits("points/cells.glsl", turns, bind, {**defines, "STRIDED": 1}, numbers),
     )
-    with keeping_nearest(pose.gpu, surface.depths, surface.rows) as nearest:
+    with surface.keeping_nearest() as nearest:
         for visits in both:
             nearest.take(visits)
     if _touching(pose, surface.view) <= size:
@@ -196,12 +197,10 @@ def _draw_chunks(
         surface.stats.skipped["points"] = f"{left_out:,} of {chunks.count:,} points are in groups out of view"
         return
     if not chunks.looks_for_hidden(surface):
-        with keeping_nearest(pose.gpu, surface.depths, surface.rows) as nearest:
+        with surface.keeping_nearest() as nearest:
             nearest.take(visits(chunks.in_view(surface, margin)))
         return
-    with keeping_nearest(
-        pose.gpu, surface.depths, surface.rows, lambda: visits(chunks.shown(surface))
-    ) as nearest:
+    with surface.keeping_nearest(lambda: visits(chunks.shown(surface))) as nearest:
         nearest.take(visits(chunks.start(surface, margin)))
         nearest.show_keys()
         nearest.take(visits(chunks.late(surface)))

@@ -11,7 +11,7 @@ import math
 from ..gpu.bindings import Storage
 from ..gpu.constants import LEAST_RADIUS
 from ..gpu.context import Gpu, Program
-from ..gpu.scatter import CellSums, FixedPoint, Visits, scatter
+from ..gpu.scatter import CellSums, FixedPoint, Visits
 from ..picture.surface import Surface
 from ..srgb import LIGHT_STEPS
 from .amplify import Points
@@ -66,7 +66,8 @@ def _colored_sums(gpu: Gpu, size: tuple[int, int]) -> CellSums:
 def splat_subpixel(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel, by scatter: what `tiles.splat` draws, up to rounding."""
     visits = Visits("surfels/scatter.glsl", points.count, points.bind, points.defines, splats)
-    scatter(surface.gpu, visits, surface.depths, surface.rows)
+    with surface.keeping_nearest() as nearest:
+        nearest.take(visits)
 
 
 def average(points: Points, surface: Surface, splats: Splats) -> None:

@@ -1,7 +1,7 @@
 """What a frame costs on this device, beside what its passes cost and what the plainest programs need.
 
-A dented sphere turns: each picture has a new view. All cameras, requests and views are made before anything is
-timed. Medians of some pictures, by turns with nothing else:
+A dented sphere turns: each picture has a new view. All cameras, requests and views are made before
+anything is timed. Medians of some pictures, by turns with nothing else:
 
 done     milliseconds from the call until the GPU is done, the picture not read
 picture  the same with the picture in numpy

@@ -25,7 +25,7 @@ from ...gpu.bins import Bins
 from ...gpu.blocks import BlockBuffer
 from ...gpu.compact import IndexList, list_covered, list_flagged
 from ...gpu.constants import GROUP, NO_DEPTH, UNKNOWN
-from ...gpu.context import Gpu, Program
+from ...gpu.context import Fill, Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, scatter
 from ...gpu.view import ViewBlock
@@ -280,8 +280,7 @@ class Neighborhoods:
         """Find how near each coarse cell sees anything; how many see any."""
         self._reserve("nearest", 4 * grids.coarse_cells, gl.R32UI)
         with self._gpu.timers.measure("nearest"):
-            self._gpu.clear(self["nearest"].buffer, NO_DEPTH)
-            self._gpu.clear(self._totals, 0)
+            self._gpu.fill(Fill(self["nearest"].buffer, NO_DEPTH), Fill(self._totals, 0))
             program = self._gpu.compute("auto_splats/nearest.comp", params=grids)
             self["depths"].bind(Texture.DEPTHS)
             self._bind_storage(nearest=Storage.KEYS)

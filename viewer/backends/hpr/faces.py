@@ -8,7 +8,7 @@ from ...gpu import gl
 from ...gpu.bindings import Storage, Texture
 from ...gpu.compact import IndexList
 from ...gpu.constants import GROUP, NOTHING
-from ...gpu.context import Gpu, Program
+from ...gpu.context import Fill, Gpu, Program
 from ...gpu.pose import GpuPose
 from ...gpu.scatter import Visits, take_items, take_keys
 from ...picture.surface import Surface
@@ -103,8 +103,8 @@ def draw_faces(
     for listed in (lists.small, lists.large):
         given = {"LANES": listed.each, **defines}
         drawn.append(Visits("hpr/face_pixels.glsl", 0, partial(bind_listed, listed), given, sectors, listed))
-    gpu.clear(surface.depths.buffer, NOTHING)  # behind all that is behind faces
-    gpu.clear(surface.rows.buffer, NOTHING)
+    # The depth lies behind all that is behind faces.
+    gpu.fill(*(Fill(texels.buffer, NOTHING) for texels in (surface.depths, surface.rows)))
     for visits in drawn:
         take_keys(gpu, visits, surface.depths)
     for visits in drawn:

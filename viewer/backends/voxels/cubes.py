@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ...gpu import gl
 from ...gpu.bindings import Texture
 from ...gpu.pose import GpuPose
-from ...gpu.scatter import Visits, scatter
+from ...gpu.scatter import Visits
 from ...picture.surface import Surface
 from ...splatting.amplify import FEEDS, Points, Shape, amplify
 from ...splatting.fastest import instancing_for
@@ -86,4 +86,5 @@ def _part(points: Points, chosen: NDArray[np.bool_]) -> Points:
 
 def _scatter(points: Points, surface: Surface) -> None:
     visits = Visits("voxels/scatter.glsl", points.count, points.bind, points.defines)
-    scatter(surface.gpu, visits, surface.depths, surface.rows)
+    with surface.keeping_nearest() as nearest:
+        nearest.take(visits)
