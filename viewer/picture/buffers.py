@@ -137,7 +137,7 @@ class PictureBuffers:
         return Fill(self.depths.buffer, NO_DEPTH), Fill(self.rows.buffer, NOTHING)
 
     def _fill_picture(self) -> Sequence[Fill]:
-        """What shading would fill the picture with, to be done beside other fills."""
+        """The fill of the picture before shading, to go with other fills; empty if it is filled."""
         background = self.look.background
         if self._filled_as == background:
             return ()
