@@ -1,6 +1,6 @@
-// How far apart points lie around each listed one: the mean squared distance of the NEAREST points gives it, so that the size
-// of voxels does not change it. A ball of half a voxel's edge is searched. Points that have too few others there go into
-// the next list, LAST into none.
+// How far apart points lie around each listed one: the FEWEST-th to the NEAREST-th nearest point tell a spacing each, and
+// the largest counts. The size of voxels does not change it. A ball of half a voxel's edge is searched. Points that have
+// too few others there go into the next list, LAST into none.
 #include "common/item.glsl"
 #include "hpr/next_list.glsl"
 #include "hpr/voxels.glsl"
@@ -26,6 +26,7 @@ void main() {
             vec3 other = point_at(texelFetch(listed, j).r), away = other - own;
             float square = dot(away, away);
             square = square > 0.0 && voxel_of(other) == voxel ? square : FARTHEST;
+            if (square >= squares[NEAREST - 1]) continue;
             for (int k = 0; k < NEAREST; ++k) {
                 float less = min(squares[k], square);
                 square = max(squares[k], square);
@@ -40,7 +41,7 @@ void main() {
     }
 #endif
     // Of one point for each square of the spacing, the k-th nearest lies within k / pi of them.
-    float sum = 0.0;
-    for (int k = 0; k < NEAREST; ++k) sum += squares[k];
-    spacings[row] = sqrt(sum * (2.0 * 3.14159265 / float(NEAREST * (NEAREST + 1)))) / per_voxel;
+    float most = 0.0;
+    for (int k = FEWEST; k <= NEAREST; ++k) most = max(most, squares[k - 1] / float(k));
+    spacings[row] = sqrt(3.14159265 * most) / per_voxel;
 }

@@ -24,7 +24,7 @@ from viewer.visibility.covering import CLEAR, REACH, STEEP, Covering, SpacedPoin
 from viewer.visibility.exact import SeenPoints, exact_visible_points, flipping, hull_rows
 from viewer.visibility.search import calibrated, visible_points
 from viewer.visibility.sectors import Sectors
-from viewer.visibility.spacing import NEAREST, Spacings
+from viewer.visibility.spacing import FEWEST, NEAREST, Spacings
 
 COUNT = 3000
 SPACING = np.sqrt(4 * np.pi / COUNT)
@@ -53,10 +53,10 @@ def before_horizon(points: Floats, eye: Floats) -> Floats:
 
 
 def apart_at(points: Floats) -> Floats:
-    """How far apart points lie around each, by the mean squared distance of the nearest ones."""
+    """How far apart points lie around each, by the distances of the nearest ones."""
     between = np.linalg.norm(points[:, None] - points[None], axis=2)
-    nearest = np.sort(between, axis=1)[:, 1 : NEAREST + 1]
-    return np.sqrt(2 * np.pi * np.square(nearest).mean(axis=1) / (NEAREST + 1))
+    nearest = np.sort(between, axis=1)[:, FEWEST : NEAREST + 1]
+    return (nearest * np.sqrt(np.pi / np.arange(FEWEST, NEAREST + 1))).max(axis=1)
 
 
 def uncovered_ones(away: Floats, spacings: Floats) -> Flags:

@@ -17,8 +17,8 @@ from ..scan.points import NOTHING, PointCloud
 from ..scan.spacing import typical_spacing
 from .calibration import body_of, copies
 
-NEAREST = 6  # points whose distances give the spacing
-_BALL = 2.0  # first radius of the search, in usual distances; it is doubled where it finds too few points
+NEAREST, FEWEST = 10, 8  # the nearest points that give the spacing are the eighth to the tenth
+_BALL = 2.5  # first radius of the search, in usual distances; it is doubled where it finds too few points
 _LEVELS = 6
 _NET_STEPS = 4095  # along an axis of an octahedron's net
 _PER_CELL = 4  # points, in the table of voxels
@@ -78,7 +78,8 @@ def foresee_spacing(cloud: PointCloud) -> None:
 class Spacings:
     """The distance between neighbours around each point of a pose, without noise.
 
-    The mean squared distance of the nearest points gives it. Other parts of the scan do not change it.
+    The `FEWEST`-th to the `NEAREST`-th nearest point each tell a spacing, and the largest counts, so that
+    splats beside a gap reach across it. Other parts of the scan do not change it.
 
     texels: R32F, a texel a row, scan units. They lie in space, so that they are the same for all eyes; kept
     with the pose (`GpuPose.cached`).
@@ -115,7 +116,8 @@ class Spacings:
             bins.count(visits)
             bins.fill(visits, count)
             last = level == _LEVELS - 1
-            program = gpu.compute("hpr/spacing.comp", {"LAST": int(last), "NEAREST": NEAREST})
+            counts = {"NEAREST": NEAREST, "FEWEST": FEWEST}
+            program = gpu.compute("hpr/spacing.comp", {"LAST": int(last), **counts})
             bind(program)
             bins.starts.bind(Texture.STARTS)
             bins.items.bind(Texture.LISTED)
