@@ -9,7 +9,7 @@ import pytest
 from scenes import NOTHING, sphere
 
 import viewer
-from viewer.backends import CHANGES, Backend, Derives, FrameView
+from viewer.backends import CHANGES, Backend, Derives, FrameView, backends
 from viewer.backends import backend as find_backend
 from viewer.camera import Camera
 from viewer.drawing.frame import render_frame
@@ -27,6 +27,7 @@ from viewer.scan.layers import Layers
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.task import checkpoint
+from viewer.testing.backends import draws_points
 from viewer.view import View
 
 SIZE = (64, 48)
@@ -428,12 +429,38 @@ def test_an_upload_that_has_begun_is_finished_when_something_reads_it(renderer: 
     np.testing.assert_array_equal(uploaded, pose.cloud.positions)
 
 
-def test_bringing_a_pose_uploads_what_the_backend_reads(renderer: Renderer) -> None:
+@pytest.mark.parametrize("name", [name for name, one in backends().items() if draws_points(one)])
+@pytest.mark.parametrize("look", [Look(), Look(light="flat"), Look(color_by="id"), Look(color_by="normal")])
+def test_a_picture_uploads_no_array_of_points_when_it_is_drawn(
+    renderer: Renderer, name: str, look: Look
+) -> None:
+    """Many points are uploaded in slices before: else a picture would take as long as its largest array."""
+    rng, own = np.random.default_rng(4), Renderer(renderer.gpu)
+    points = rng.standard_normal((3000, 3))
+    points /= np.linalg.norm(points, axis=1, keepdims=True)
+    cloud = PointCloud.from_arrays(
+        points, normals=points, colors=points * 0.5 + 0.5, radii=np.full(3000, 0.1)
+    )
+    cloud = cloud.of_rows(np.arange(0, 3000, 2))  # so that there are ids
+    pose = Pose(0, 0.0, "x", cloud)
+    request = Request(pose, Camera.orbit(cloud.bounds()), name, look=look)
+    while not isinstance(planned := make_plan(own, request, SIZE, Effort.WAIT, upload_ms=1000), Ready):
+        pass
+    before = set(planned.pose._arrays)
+    surface = Surface(own.gpu, SIZE)
+    while render_frame(own, request, surface):
+        pass
+    assert set(planned.pose._arrays) == before
+    surface.release()
+    own.release()
+
+
+def test_bringing_a_pose_uploads_what_the_picture_reads(renderer: Renderer) -> None:
     own = Renderer(renderer.gpu)
     pose = Pose(0, 0.0, "x", sphere(1000))
     request = Request(pose, Camera.orbit(pose.cloud.bounds()), "surfels")
     assert isinstance(make_plan(own, request, SIZE, Effort.BEGIN, upload_ms=1000), Ready)
-    assert own.bytes_of(pose) == 1000 * (12 + 12), "positions and normals"
+    assert own.bytes_of(pose) == 1000 * (12 + 12 + 4 + 4), "positions, normals, radii and colours"
     bare = Request(Pose(0, 0.0, "x", BARE), request.camera, "surfels", look=Look(color_by="normal"))
     waiting = make_plan(own, bare, SIZE, Effort.BEGIN, upload_ms=1000)
     assert isinstance(waiting, Waiting)

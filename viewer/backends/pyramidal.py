@@ -28,6 +28,7 @@ class Pyramidal(Backend):
     good_for = "Draws range images and fills holes"
     params_class = ProjectionParams
     blends = True
+    draws_with = ("colors", "normals")
     fills = True
     limits = {
         "the eye inside the scan": Limit(0.01, _BY_CELLS),

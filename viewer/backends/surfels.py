@@ -134,6 +134,7 @@ class Surfels(Backend):
     title = "Discs"
     good_for = "Best look for points with normals"
     params_class = Params
+    draws_with = ("colors", "radii", "axes")
     blends = True
     fills = True
     limits = {

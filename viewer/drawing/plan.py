@@ -84,7 +84,7 @@ def make_plan(
 ) -> Plan:
     """Resolve a request for a picture of this size, pixels, and make or order what it lacks.
 
-    size: None leaves out what depends on the view. upload_ms: how long to upload the arrays that the backend
+    size: None leaves out what depends on the view. upload_ms: how long to upload the arrays that the picture
     reads; the plan waits while some are missing. A window calls this again and again, so that neither
     uploads nor preparation stop it. None: arrays are uploaded when drawing reads them.
     """
@@ -147,7 +147,7 @@ def _check(request: Request, pose: GpuPose) -> None:
 
 
 def _upload(pose: GpuPose, request: Request, view: View | None, upload_ms: float) -> bool:
-    """Upload what the backend reads of the pose; whether all of it is there."""
+    """Upload what the picture reads of the pose; whether all of it is there."""
     if view is not None:
         pose.center(view.origin)
-    return pose.upload(pose.names_of(request.needs), upload_ms)
+    return pose.upload(pose.names_of(request.reads), upload_ms)

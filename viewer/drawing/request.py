@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 from ..backends import Backend, backends
 from ..backends import backend as find_backend
 from ..camera import Camera
-from ..look import Look, drawable
+from ..look import Look, drawable, is_lit
 from ..scan.layers import NO_LAYERS, Layers
 from ..scan.pose import Life, Pose
 from ..view import View, origin_near
@@ -62,6 +62,21 @@ class Request:
     def needs(self) -> tuple[str, ...]:
         """Names of what the backend needs of the pose, see `Backend.needs`; asked for once."""
         return self.backend.needs(self.pose, self.params)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """Names of what its picture reads of a pose that has it: what the backend needs, what else
+        it draws with, and what the look shows of points."""
+        if self.backend.rows != "points" or self.draws_samples:
+            return self.needs
+        look, names = self.look, [*self.needs, *self.backend.draws_with]
+        if look.color_by in ("auto", "level", "own"):
+            names.append("colors")
+        if is_lit(look) and not self.backend.finds_normals:
+            names.append("normals")
+        if look.color_by == "id":
+            names.append("ids")
+        return tuple(dict.fromkeys(names))
 
     @property
     def draws_samples(self) -> bool:

@@ -243,7 +243,7 @@ class GpuPose:
         return self._samples
 
     def names_of(self, needs: Iterable[str]) -> list[str]:
-        """The arrays that a backend with these needs reads, of those that are there, or "samples"."""
+        """The arrays to upload for pictures that read these, of those that are there, or "samples"."""
         names = [name for name in needs if name != "views" and self.has(name)]
         return [*names, _RANGES] if "views" in needs else ["positions", *names]
 

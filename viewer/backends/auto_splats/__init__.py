@@ -148,6 +148,7 @@ class AutoSplats(Backend):
     title = "Smooth surface"
     good_for = "Best look for points without normals"
     params_class = Params
+    draws_with = ("colors",)
     blends = True
     finds_normals = True
     values = VALUES

@@ -59,6 +59,7 @@ class CodeWords(Backend):
     title = "Code words"
     good_for = "For research: draws discs from compact tables"
     params_class = Params
+    draws_with = ("radii", "axes")
     limits = {
         "the near plane inside the scan": Limit(0.0, _HELD, _OF_PALETTE),
         "zoomed in to 1/1000 of the scan's width": Limit(0.0, _HELD, _OF_PALETTE),

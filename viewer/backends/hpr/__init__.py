@@ -148,6 +148,7 @@ class VisiblePoints(Backend):
     title = "Visible points"
     good_for = "Hides the points on the far side of the scan"
     params_class = Params
+    draws_with = ("colors",)
     blends = True
     fills = True
     finds_normals = True
