@@ -14,6 +14,7 @@ from typing import Any, TypeVar, cast
 
 from numba import njit
 from numba.core.caching import FunctionCache, NullCache
+from numba.core.runtime import rtsys
 
 from .task import announce, over
 
@@ -66,9 +67,12 @@ class _DiskCache(FunctionCache):
         self.stamp = (self._impl.locator.get_source_stamp(), numbers, used)
         self._cache_file._source_stamp = self.stamp
 
-    def load_overload(self, *args: Any) -> Any:
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            found = super().load_overload(*args)
+            # Numba's own method first loads all that it compiles with, for a second.
+            rtsys.initialize(target_context)
+            with self._guard_against_spurious_io_errors():
+                found = self._load_overload(sig, target_context)
         except Exception:  # whatever unpickling damaged bytes may raise
             with suppress(OSError):
                 self.flush()
