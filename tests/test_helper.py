@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import gc
 import os
 import threading
 import time
@@ -134,3 +135,12 @@ def test_closing_leaves_no_process(helper: Helper) -> None:
         os.kill(number, 0)
     assert threading.active_count() == threads
     helper.close()
+
+
+def test_a_helper_that_nobody_closes_leaves_no_process_either() -> None:
+    helper = Helper()
+    number = helper.call(Task("Asking"), process)
+    del helper
+    gc.collect()
+    with pytest.raises(ProcessLookupError):
+        os.kill(number, 0)

@@ -105,6 +105,10 @@ class Helper:
                 _end(self._process)
             self._process = None
 
+    def __del__(self) -> None:
+        if self._process is not None:
+            _end(self._process)  # where an error kept anybody from closing it
+
 
 @dataclass(frozen=True)
 class Job:

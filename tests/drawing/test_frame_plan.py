@@ -79,8 +79,15 @@ def test_a_document_resolves_a_pose_once() -> None:
     assert moves.calls["backends/__init__.py:params"] == 0
 
 
-def test_a_plan_says_what_is_missing_and_why(renderer: Renderer) -> None:
+@pytest.fixture
+def own(renderer: Renderer) -> Iterator[Renderer]:
+    """A renderer with workers and poses of its own."""
     own = Renderer(renderer.gpu)
+    yield own
+    own.release()
+
+
+def test_a_plan_says_what_is_missing_and_why(own: Renderer) -> None:
     bare = Request(Pose(0, 0.0, "x", PointCloud.from_arrays(CLOUD.positions)), CAMERA, "surfels")
     looked = make_plan(own, bare, SIZE, Effort.NONE)
     assert isinstance(looked, Waiting)
@@ -91,7 +98,6 @@ def test_a_plan_says_what_is_missing_and_why(renderer: Renderer) -> None:
         raise made.error  # that says which library is missing
     assert isinstance(made, Ready)
     assert made.pose.cloud.normals is not None
-    own.release()
 
 
 def test_a_plan_of_what_cannot_be_drawn_fails_with_the_reason(renderer: Renderer) -> None:
