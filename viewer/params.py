@@ -173,6 +173,12 @@ def param(default: Any, help: str = "", **declared: Unpack[Declared]) -> Any:
     return dataclasses.field(default=default, metadata=metadata)
 
 
+def radius_scale_param(**declared: Unpack[Declared]) -> Any:
+    """The parameter `radius_scale` of a backend that draws splats."""
+    usual: dict[str, Any] = {"low": 0.01, "high": 100, "sweep": (0.5, 1.0, 2.0), **declared}
+    return param(1.0, "Factor on the radius of splats", **usual)
+
+
 def _conditions(values: Mapping[str, tuple[Any, ...]] | None, negated: bool) -> list[Condition]:
     return [Condition(name, several, negated) for name, several in (values or {}).items()]
 

@@ -119,7 +119,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
     y, x = np.argwhere(surface.level == 2)[0].tolist()
     picked, pose = pick(surface, x, y), Pose(0, 0.0, "", cloud)
     assert picked is not None
-    with pytest.raises(InputError, match="renderer has filled a hole"):
+    with pytest.raises(InputError, match=r"renderer has filled a hole\. Pass filled=True"):
         SurfacePoint.of(picked, pose)
     made = SurfacePoint.of(picked, pose, filled=True)
     assert (made.id, made.level) == (None, 2)
@@ -133,7 +133,7 @@ def test_a_filled_place_is_refused_unless_allowed(draw: Draw) -> None:
 def test_a_place_where_another_surface_may_be_meant_is_refused_unless_allowed() -> None:
     pose = Pose(0, 0.0, "", plane(40, depth=4.0))
     picked = Picked(np.array([0.01, 0.01, -4.0]), level=0, doubt=0.12)
-    with pytest.raises(InputError, match=r"in front or behind \(12%\)\. Click here again"):
+    with pytest.raises(InputError, match=r"in front or behind \(12%\)\. Pass doubtful=True"):
         SurfacePoint.of(picked, pose)
     assert SurfacePoint.of(picked, pose, doubtful=True).at_outline
     assert not SurfacePoint.of(replace(picked, doubt=0.04), pose).at_outline

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,15 @@ _SLACK = 2.0, 1e-3  # spacings, and shares of the scan's size, that a surface is
 _SAME = 1e-14  # share of coordinates that rounding changes
 _FLAT = 0.1  # of how far points reach along a line, that they reach across it where they have a plane
 _TURNING = 4  # points that tell how a place turns and how well they do
+
+
+class UncertainPosition(InputError):
+    """A picked position that is not clearly on a measured surface. accepted_by: the argument of
+    `SurfacePoint.of` that accepts it."""
+
+    def __init__(self, what: str, accepted_by: Literal["filled", "doubtful"]) -> None:
+        super().__init__(what, hint=f"Pass {accepted_by}=True to accept the position")
+        self.accepted_by = accepted_by
 
 
 @dataclass(frozen=True)
@@ -66,18 +76,16 @@ class SurfacePoint:
         filled: whether a place may be taken that no point shows, also where it is not between points of one
         surface that lie a few spacings away. Where the points around do not tell of a
         surface, it is as uncertain as they are apart, or as the nearest is far. doubtful: whether a place
-        may be taken where another surface may be meant (`Picked.at_outline`). Raises InputError for a
-        filled or doubtful place where it may not be taken.
+        may be taken where another surface may be meant (`Picked.at_outline`). Raises UncertainPosition for
+        a filled or doubtful place where it may not be taken.
         """
         if not (picked.measured or picked.between or filled):
-            hint = "Zoom in, or tick 'Allow clicks on filled holes'"
-            raise InputError(
-                "there are no measured points here, because the renderer has filled a hole", hint=hint
+            raise UncertainPosition(
+                "there are no measured points here, because the renderer has filled a hole", "filled"
             )
         if picked.at_outline and not doubtful:
-            raise InputError(
-                f"this position may be on the surface in front or behind ({picked.doubt:.0%})",
-                hint="Click here again to use it anyway, or turn the view to see the surface from its front",
+            raise UncertainPosition(
+                f"this position may be on the surface in front or behind ({picked.doubt:.0%})", "doubtful"
             )
         spacing, neighbors = picked.spacing, picked.neighbors
         if picked.point is None:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.pick import Picked, before_gap, pick
-from ..analysis.surface_point import SurfacePoint
+from ..analysis.surface_point import SurfacePoint, UncertainPosition
 from ..errors import InputError
 from ..geometry import Vector
 from ..picture.surface import Surface
@@ -17,6 +17,10 @@ from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
 from .scene.viewport import Viewport
 
+_HINTS = {
+    "filled": "Zoom in, or tick 'Allow clicks on filled holes'",
+    "doubtful": "Click here again to use it anyway, or turn the view to see the surface from its front",
+}
 _SAME = 3.0  # pixels, within which two clicks are in one place
 
 
@@ -44,9 +48,12 @@ class Click:
         nothing is seen, and where it may not be taken."""
         if self.picked is None:
             raise InputError("No surface here: click on the scan.")
-        return SurfacePoint.of(
-            self.picked, self.pose, filled=filled, doubtful=self.is_again, place=self.motion
-        )
+        try:
+            return SurfacePoint.of(
+                self.picked, self.pose, filled=filled, doubtful=self.is_again, place=self.motion
+            )
+        except UncertainPosition as error:
+            raise InputError(error.what, hint=_HINTS[error.accepted_by]) from None
 
 
 class Clicks:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from ..gpu import gl
 from ..gpu.constants import LEAST_RADIUS, UNKNOWN
 from ..gpu.pose import GpuPose
-from ..params import param
+from ..params import param, radius_scale_param
 from ..picture.surface import Surface
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
@@ -90,15 +90,7 @@ class Params:
         choices=("auto", "own", "uniform"),
         group="Splats",
     )
-    radius_scale: float = param(
-        1.0,
-        "Factor on the radius of splats",
-        low=0.01,
-        high=100,
-        sweep=(0.5, 1.0, 2.0),
-        group="Splats",
-        basic=True,
-    )
+    radius_scale: float = radius_scale_param(group="Splats", basic=True)
     mask_falloff: float = param(
         4.0,
         "How fast the opacity of a splat fades: exp(-falloff d^2), where d is 1 at the radius",
@@ -147,7 +139,7 @@ class Surfels(Backend):
         "each point 1000 times in a row": Limit(0.5, _SEEN_THROUGH, _SORTED),
         "the list of points 1000 times": Limit(0.5, _SEEN_THROUGH, _SORTED),
         "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
-        "each point 1000 times, without radii": Limit(0.6, _SEEN_THROUGH, _SORTED),
+        "each point 1000 times, without radii": Limit(0.56, _SEEN_THROUGH, _SORTED),
         "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),

@@ -15,7 +15,7 @@ from ..codewords.stream import PLANE_BITS, WordStream
 from ..codewords.tables import Steps
 from ..geometry import up_vector
 from ..look import Look, color_table, light_direction, rgba, value_source
-from ..params import param
+from ..params import param, radius_scale_param
 from ..srgb import bytes_from_light, light_from_bytes
 from ..view import View
 from .layers import NO_LAYERS, Layers
@@ -87,15 +87,7 @@ class Params:
         choices=("own", "uniform"),
         group="Splats",
     )
-    radius_scale: float = param(
-        1.0,
-        "Factor on the radius of splats",
-        low=0.01,
-        high=100,
-        sweep=(0.5, 1.0, 2.0),
-        group="Splats",
-        basic=True,
-    )
+    radius_scale: float = radius_scale_param(group="Splats", basic=True)
     cull_back: bool = param(False, "Leave out discs that face away from the viewer", group="Splats")
     window: int = param(
         16,

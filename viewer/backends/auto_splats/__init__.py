@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 from ...gpu.pose import GpuPose
-from ...params import param
+from ...params import param, radius_scale_param
 from ...picture.surface import Surface
 from ...scan.noise import Noise, noise_of
 from ...scan.points import PointCloud
@@ -112,15 +112,7 @@ class Params:
         "off: round splats",
         group=_SPLATS,
     )
-    radius_scale: float = param(
-        1.0,
-        "Factor on the radius of splats",
-        low=0.01,
-        high=100,
-        sweep=(0.5, 1.0, 2.0),
-        group=_SPLATS,
-        basic=True,
-    )
+    radius_scale: float = radius_scale_param(group=_SPLATS, basic=True)
     refine: bool = param(
         True,
         "Shrink the splats of hidden points to the size of the splats in front, so that hidden splats do "

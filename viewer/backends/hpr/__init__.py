@@ -17,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...gpu.pose import GpuPose
-from ...params import param
+from ...params import param, radius_scale_param
 from ...picture.surface import Surface
 from ...scan.points import PointCloud
 from ...splatting.local import surface_param
@@ -63,14 +63,8 @@ class Params:
         group=_SHOWN,
         when={"output": ("faces",)},
     )
-    radius_scale: float = param(
-        1.0,
-        "Factor on the radius of splats",
-        low=0.01,
-        high=100,
-        sweep=(0.7, 1.0, 1.4),
-        group=_SHOWN,
-        when={"output": ("splats", "reconstruction")},
+    radius_scale: float = radius_scale_param(
+        group=_SHOWN, sweep=(0.7, 1.0, 1.4), when={"output": ("splats", "reconstruction")}
     )
     surface: str = surface_param("local", _SHOWN, when={"output": ("splats",)})
     mode: str = param(
