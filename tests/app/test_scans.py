@@ -53,3 +53,16 @@ def test_those_opened_lately_are_told_without_the_open_one_and_what_is_gone(name
     assert scans.recent == tuple(names)
     assert [title(scan) for scan in scans.lately] == ["b.ply"]
     assert (scans.listed, scans.are_together) == (names[:2], False), "what stands in the same folder"
+
+
+@pytest.mark.parametrize(
+    ("scan", "name"),
+    [
+        ("demo", "Demo scan"),
+        ("-", "Standard input"),
+        ("https://x.org/a/b.svo", "b.svo"),
+        ("/a/b.ply", "b.ply"),
+    ],
+)
+def test_scans_have_titles(scan: str, name: str) -> None:
+    assert title(scan) == name

@@ -13,7 +13,7 @@ from ...document.schema import ReadBy, ScanName, structured
 from ...errors import InputError
 from ...files import printable
 from ...scan.listing import is_there, named_scans, scans_beside
-from ...scan.open import DEMO
+from ...scan.open import DEMO, STANDARD_INPUT
 from ...scan.timeline import Timeline
 from ...task import Task, in_background
 from ..commands import Command, Item, Listing
@@ -150,6 +150,9 @@ class Scans(WindowPart):
     )
 
 
+_TITLES = {DEMO: "Demo scan", STANDARD_INPUT: "Standard input"}
+
+
 def title(scan: str) -> str:
     """A scan's name for lists."""
-    return "Demo scan" if scan == DEMO else printable(Path(known_as(scan)).name or scan)
+    return _TITLES.get(scan) or printable(Path(known_as(scan)).name or scan)
