@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
@@ -11,6 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 _SHARE = 100_000  # points that pay for the start of a thread
+
+
+_GIVE_WAY = 0.0005  # seconds that a thread works in Python while another waits
+
+
+def give_way() -> None:
+    """Let threads that work in Python give way to others sooner: the thread that draws waits for them at each
+    call of OpenGL. For programs that draw while others work, such as a window's."""
+    sys.setswitchinterval(_GIVE_WAY)
 
 
 def threads_for(points: int) -> int:

@@ -407,7 +407,8 @@ def test_releasing_ends_what_is_being_prepared(renderer: Renderer, deriving: Bac
         os.kill(int(task.progress), 0)
 
 
-def test_large_arrays_are_uploaded_in_slices(renderer: Renderer) -> None:
+def test_large_arrays_are_uploaded_in_slices(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(renderer.gpu.staging, "slice", 1 << 22)
     points = np.random.default_rng(0).random((1_000_000, 3), dtype=np.float32)
     pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", PointCloud.from_arrays(points, colors=points)))
     calls = 1
@@ -421,7 +422,10 @@ def test_large_arrays_are_uploaded_in_slices(renderer: Renderer) -> None:
     assert pose.uploaded_bytes == 16_000_000
 
 
-def test_an_upload_that_has_begun_is_finished_when_something_reads_it(renderer: Renderer) -> None:
+def test_an_upload_that_has_begun_is_finished_when_something_reads_it(
+    renderer: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(renderer.gpu.staging, "slice", 1 << 22)
     points = np.random.default_rng(0).random((1_000_000, 3), dtype=np.float32)
     pose = GpuPose(renderer.gpu, Pose(0, 0.0, "x", PointCloud.from_arrays(points)))
     assert not pose.upload(["positions"], budget_ms=0)

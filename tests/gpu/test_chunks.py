@@ -146,31 +146,26 @@ def test_orders_hold_each_point_once_and_boxes_hold_theirs() -> None:
 
 
 class _Held(np.ndarray):
-    """Positions that note how many numbers a call gets that holds the interpreter's lock."""
-
-    most = 0
+    """Positions that refuse calls that hold the interpreter's lock."""
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **kwargs: Any) -> Any:
         plain = [np.asarray(each) if isinstance(each, _Held) else each for each in inputs]
-        if method == "reduceat":
-            _Held.most = max(_Held.most, plain[0].size)
+        assert method != "reduceat"
         return getattr(ufunc, method)(*plain, **kwargs)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
-        assert function not in (np.repeat, np.unique), "holds the lock"
+        assert function not in (np.repeat, np.unique)
         return super().__array_function__(function, types, args, kwargs)
 
     def tobytes(self, order: Any = "C") -> bytes:
-        _Held.most = max(_Held.most, self.size)
-        return super().tobytes(order)
+        raise AssertionError("it holds the lock")
 
 
-def test_ordering_holds_the_lock_for_some_points_at_a_time() -> None:
+def test_ordering_lets_other_threads_go_on() -> None:
     """Else the window could not draw while many points are put in order."""
     positions = np.random.default_rng(1).random((1 << 20, 3), np.float32)
     ordered = best_order(PointCloud(positions.view(_Held), np.zeros(3)))
     assert ordered.rows is not None, "found in both orders"
-    assert 0 < _Held.most <= 3 << 18
     assert (positions[ordered.rows[: ordered.chunk]].min(axis=0) == ordered.low[0]).all()
 
 

@@ -38,6 +38,28 @@ def test_bytes_come_as_they_are(reading: Staging, renderer: Renderer) -> None:
     buffer.release()
 
 
+@pytest.mark.parametrize("by_copy", [True, False])
+def test_much_data_comes_as_it_is(by_copy: bool, renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By more slices than are on their way at once, and by several threads."""
+    gpu = renderer.gpu
+    if by_copy and not gl.has_mapped_buffers(gpu.ctx):
+        pytest.skip("this driver has no buffers that stay mapped")
+    monkeypatch.setattr(staging, "_SLOT", 1 << 18)
+    monkeypatch.setattr(staging, "_MUCH", 1 << 16)
+    monkeypatch.setattr(staging, "_LIKE_POINTS", 1)
+    made = Staging(gpu.ctx, gpu.software)
+    made.writes_by_copy = by_copy
+    numbers = np.random.default_rng(0).integers(0, 2**32, (400_000, 3), np.uint32)
+    buffer = gpu.buffer(reserve=numbers.nbytes + 8)
+    for first, data in ((8, numbers), (8, numbers[:30_000][::-1].copy()), (16, numbers[:3])):
+        made.write(buffer, data, first)
+        found = gpu.read(buffer, np.uint32, data.size, first)
+        assert (found.reshape(-1, 3) == data).all()
+    found = gpu.read(buffer, np.uint32, 3 * 370_000, 8 + 12 * 30_000)
+    assert (found.reshape(-1, 3) == numbers[30_000:]).all()
+    buffer.release()
+
+
 def test_what_was_read_stays_when_more_is_read(reading: Staging, renderer: Renderer) -> None:
     first, second = (renderer.gpu.buffer(np.full(4, value, np.uint32)) for value in (1, 2))
     found = reading.read(first, 16, 0)

@@ -131,8 +131,8 @@ def test_the_drawing_thread_neither_orders_points_nor_tests_chunks(
     monkeypatch.setattr(View, "may_show", lambda *_: pytest.fail("chunks are tested on the CPU"))
     slice_bytes, run = 1 << 14, 1 << 12
     for owner, name, value in (
-        (arrays, "_SLICE", slice_bytes), (culling, "_SLICES", 2), (culling, "UPLOAD_SECONDS", seconds),
-        (culling, "_RUN", run), (culling, "_RUNS", 2),
+        (renderer.gpu.staging, "slice", slice_bytes), (culling, "UPLOAD_SECONDS", seconds),
+        (culling, "_SLICES", 2), (culling, "_RUN", run), (culling, "_RUNS", 2),
     ):  # fmt: skip
         monkeypatch.setattr(owner, name, value)
     cloud = shells("chance")

@@ -54,7 +54,9 @@ def run(
     from ..imports import uncollected
     from ..scan.listing import named_scans
     from ..scan.open import DEMO, open_scan
+    from ..threads import give_way
 
+    give_way()
     if start.up is not None:
         up_vector(start.up)
     found, problems = named_scans(scans)

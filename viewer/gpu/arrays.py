@@ -16,8 +16,6 @@ from .context import Gpu
 if TYPE_CHECKING:
     from .pose import GpuPose
 
-_SLICE = 1 << 22  # bytes uploaded at a time: a few milliseconds
-
 
 class GpuArray:
     """An array as texels.
@@ -33,7 +31,8 @@ class GpuArray:
         data = values if values.size else np.zeros(4, np.float32)
         words = np.ascontiguousarray(data).reshape(-1).view(np.uint8)
         self.nbytes = len(words)
-        self._slices = deque((first, words[first : first + _SLICE]) for first in range(0, len(words), _SLICE))
+        size = gpu.staging.slice
+        self._slices = deque((first, words[first : first + size]) for first in range(0, len(words), size))
         self.texels = gl.BufferTexture(gpu.buffer(reserve=self.nbytes), texel_format)
         self.holders: weakref.WeakSet[GpuPose] = weakref.WeakSet()
 
@@ -42,7 +41,7 @@ class GpuArray:
         all is there. Drivers that copy later return at once: then only the number bounds the work."""
         while self._slices:
             first, words = self._slices.popleft()
-            self.texels.buffer.write(words, offset=first)
+            self._gpu.staging.write(self.texels.buffer, words, first)
             slices -= 1
             if slices <= 0 or time.perf_counter() > end:
                 break

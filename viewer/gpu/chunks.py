@@ -129,18 +129,25 @@ def _boxes(
     """Lower and upper corners of each so many points, (C, 3). chunk: a power of two. rows: the order of
     points; None: that of the file.
 
-    `reduceat` holds the interpreter's lock, so it gets some points at a time.
+    `reduceat` would hold the interpreter's lock; reductions of columns take as long, and release it.
     """
-    lows, highs = [], []
+    low, high = np.empty((2, -(-len(positions) // chunk), 3), np.float32)
     many = max(_PART, chunk)
     for start in range(0, len(positions), many):
         checkpoint()
         run = slice(start, start + many)
         part = positions[run if rows is None else rows[run]]
-        starts = np.arange(0, len(part), chunk)
-        lows.append(np.minimum.reduceat(part, starts, axis=0))
-        highs.append(np.maximum.reduceat(part, starts, axis=0))
-    return np.concatenate(lows), np.concatenate(highs)
+        first, end = start // chunk, len(part) // chunk * chunk
+        for chunks in (part[:end].reshape(-1, chunk, 3), part[None, end:]):
+            if not chunks.size:
+                continue
+            of = slice(first, first + len(chunks))
+            for axis in range(3):
+                low[of, axis], high[of, axis] = (
+                    reduce(chunks[..., axis], axis=1) for reduce in (np.min, np.max)
+                )
+            first += len(chunks)
+    return low, high
 
 
 def best_order(cloud: PointCloud) -> Ordered:

@@ -77,6 +77,7 @@ _MAX_UNIFORM_BLOCK_SIZE = 0x8A30
 _MAX_TEXTURE_SIZE = 0x0D33
 _MAX_RENDERBUFFER_SIZE = 0x84E8
 _READ_FRAMEBUFFER = 0x8CA8
+_WAIT = 1_000_000_000  # nanoseconds between two looks at a fence
 
 
 def integer(name: int) -> int:
@@ -220,17 +221,18 @@ def has_mapped_buffers(ctx: moderngl.Context) -> bool:
 
 
 class MappedBuffer:
-    """A buffer in the memory of the host that stays mapped, for the GPU to copy into.
+    """A buffer in the memory of the host that stays mapped, for the GPU to copy into, or from.
 
-    address: where the CPU reads it, once the GPU has finished.
+    address: where the CPU reads it, once the GPU has finished, or writes it. is_read: whether it reads.
     """
 
-    def __init__(self, nbytes: int) -> None:
+    def __init__(self, nbytes: int, is_read: bool = True) -> None:
         name, self.nbytes = ctypes.c_uint(0), nbytes
         GL_1_5.glGenBuffers(1, ctypes.byref(name))
         self._glo = name.value
         GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, self._glo)
-        access = GL_3_0.GL_MAP_READ_BIT | GL_4_4.GL_MAP_PERSISTENT_BIT | GL_4_4.GL_MAP_COHERENT_BIT
+        access = GL_3_0.GL_MAP_READ_BIT if is_read else GL_3_0.GL_MAP_WRITE_BIT
+        access |= GL_4_4.GL_MAP_PERSISTENT_BIT | GL_4_4.GL_MAP_COHERENT_BIT
         GL_4_4.glBufferStorage(_COPY_WRITE_BUFFER, nbytes, None, access | GL_4_4.GL_CLIENT_STORAGE_BIT)
         self.address: int = GL_3_0.glMapBufferRange(_COPY_WRITE_BUFFER, 0, nbytes, access)
         if not self.address:
@@ -243,9 +245,30 @@ class MappedBuffer:
         GL_3_1.glCopyBufferSubData(_COPY_READ_BUFFER, _COPY_WRITE_BUFFER, offset, at, nbytes)
         GL_4_2.glMemoryBarrier(GL_4_4.GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT)
 
+    def give(self, target: moderngl.Buffer, offset: int, nbytes: int, at: int) -> Fence:
+        """Have the GPU copy bytes into another buffer. at: where they lie. Returns what tells when it has."""
+        GL_1_5.glBindBuffer(_COPY_READ_BUFFER, self._glo)
+        GL_1_5.glBindBuffer(_COPY_WRITE_BUFFER, target.glo)
+        GL_3_1.glCopyBufferSubData(_COPY_READ_BUFFER, _COPY_WRITE_BUFFER, at, offset, nbytes)
+        return Fence()
+
     def release(self) -> None:
         """Delete it."""
         GL_1_5.glDeleteBuffers(1, ctypes.byref(ctypes.c_uint(self._glo)))
+
+
+class Fence:
+    """Place in what the GPU was told to do, which the CPU can wait for, once."""
+
+    def __init__(self) -> None:
+        self._sync = GL_3_2.glFenceSync(GL_3_2.GL_SYNC_GPU_COMMANDS_COMPLETE, 0)
+
+    def wait(self) -> None:
+        """Wait until the GPU has done all that it was told before, and delete this."""
+        flags = GL_3_2.GL_SYNC_FLUSH_COMMANDS_BIT
+        while GL_3_2.glClientWaitSync(self._sync, flags, _WAIT) == GL_3_2.GL_TIMEOUT_EXPIRED:
+            pass
+        GL_3_2.glDeleteSync(self._sync)
 
 
 class BufferTexture:

@@ -306,11 +306,12 @@ class RangeSamples:
     def _write(self, view: RangeView, most: float, top: int, bottom: int, first: int) -> None:
         """Upload rows of a view."""
         part = view.cropped(slice(top, bottom), slice(None))
-        self.depths.buffer.write(np.ascontiguousarray(part.depth), offset=4 * first)
-        self.looks.buffer.write(_looks(part, most), offset=4 * first)
+        write = self._gpu.staging.write
+        write(self.depths.buffer, np.ascontiguousarray(part.depth), 4 * first)
+        write(self.looks.buffer, _looks(part, most), 4 * first)
         if part.xy is not None:
             assert self.xy is not None
-            self.xy.buffer.write(np.ascontiguousarray(part.xy), offset=8 * first)
+            write(self.xy.buffer, np.ascontiguousarray(part.xy), 8 * first)
 
     # --- levels and tiles -------------------------------------------------------------
 

@@ -200,7 +200,7 @@ def test_an_octree_is_uploaded_in_slices_and_drawn_meanwhile(
 ) -> None:
     by_shaders(True)
     slice_bytes = 1 << 10
-    monkeypatch.setattr("viewer.backends.voxels.gpu_cut._SLICE", slice_bytes)
+    monkeypatch.setattr(renderer.gpu.staging, "slice", slice_bytes)
     cloud = CLOUDS["coloured"]
     camera = CAMERAS["whole"](cloud.bounds())
     octants, whole = Found(renderer, cloud, Params()), Found(renderer, cloud, Params())

@@ -18,13 +18,14 @@ each picture, which the CPU has prepared as during playback. "cold" is the time 
 process of its own, once without and once with what the process before stored. "cpu" is what the CPU does for
 a picture outside the driver, at any number of points, and how many programs the first picture compiles: the
 driver does nothing meanwhile, so that its threads disturb nothing. "frame" is the time of a frame on the GPU,
-with what is in no pass.
+with what is in no pass. "loading" draws as a window does while a pose comes: "uploading", "first" and "later"
+are its longest frames before, at and after the first picture.
 
 --rows chooses rows by how their names begin, --sizes the numbers of points; --huge adds 100 million. --limit
 ends each table after so many seconds. --json prints each row as it comes. To compare, --reading takes one of
-copy, get and map for buffers that the CPU reads, --clearing one of shader and driver, --atomics one of 32 and
-64. --order file draws all points without chunks. --hidden always or never looks for hidden chunks of
-points on graphics cards.
+copy, get and map for buffers that the CPU reads, --writing one of copy and driver, --clearing one of shader
+and driver, --atomics one of 32 and 64. --order file draws all points without chunks. --hidden always or never
+looks for hidden chunks of points on graphics cards.
 """
 
 from __future__ import annotations
@@ -56,7 +57,8 @@ from experiments.tables import Column, Row, Table, at, code
 from viewer.backends import backend as find_backend
 from viewer.backends.voxels import cuts
 from viewer.camera import Camera
-from viewer.drawing.frame import render_frame
+from viewer.drawing.frame import draw_plan, render_frame
+from viewer.drawing.plan import Effort, Ready, make_plan
 from viewer.drawing.request import Request
 from viewer.drawing.timing import pass_ms
 from viewer.errors import Scan4DError
@@ -66,6 +68,7 @@ from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.splatting import culling
+from viewer.threads import give_way
 from viewer.view import View
 
 LOOK = Look(light="flat", eye_dome=False, background="#000000")
@@ -79,6 +82,9 @@ _POSES = 6  # of a series
 _PIECE = 1 << 20  # points that are made at a time
 _SETTLED = 3  # frames without work in the background, after which nothing is prepared any more
 _SETTLING_SECONDS = 60.0
+_UPLOAD_MS = 20.0  # of a frame, as in windows
+_LONG_MS = 30.0  # frames that a window should not have
+_ENOUGH_TO_ORDER = 5_000_000  # points
 
 
 @cache
@@ -336,6 +342,43 @@ def _own_work(drawn: Drawn, requests: list[Request], rounds: int) -> dict[str, f
     return {"CPU, ms": 1e3 * float(np.median(least)), "calls": float(np.median(calls))}
 
 
+def loading(options: Namespace) -> Iterator[Row]:
+    """The longest frames of a window while a pose is uploaded, drawn for the first time and put in order."""
+    limit = Limit(options)
+    _threads_at_rest()
+    _choose(options)
+    for points in _sizes(options):
+        for name, case in CASES.items():
+            if points <= case.most and limit.wants(name):
+                _longest_frames(case, min(points, _ENOUGH_TO_ORDER), options, limit)  # compiles
+                yield from _guarded(name, points, partial(_longest_frames, case, points, options, limit))
+        shape.cache_clear()
+
+
+def _longest_frames(case: Case, points: int, options: Namespace, limit: Limit) -> Row:
+    """Milliseconds of the longest frame of each kind, drawn as a window does."""
+    drawn = Drawn(case, Pose(0, 0.0, "loading", replace(case.cloud(points))), options.size)
+    renderer().work.prepare(drawn.request(0))
+    end = time.perf_counter() + min(_SETTLING_SECONDS, max(limit.left, 0))
+    longest, over, quiet = dict.fromkeys(("uploading, ms", "first, ms", "later, ms"), 0.0), 0, 0
+    kind = "uploading, ms"
+    for step in counter():
+        start = time.perf_counter()
+        planned = make_plan(renderer(), drawn.request(step), options.size, Effort.BEGIN, _UPLOAD_MS)
+        if isinstance(planned, Ready):
+            kind = "first, ms" if kind == "uploading, ms" else "later, ms"
+            draw_plan(planned, drawn.surface)
+        drawn.finish()
+        now = time.perf_counter()
+        longest[kind] = max(longest[kind], 1e3 * (now - start))
+        over += 1e3 * (now - start) > _LONG_MS
+        quiet = 0 if threading.active_count() > _threads_at_rest() else quiet + 1
+        if (kind == "later, ms" and quiet > _SETTLED) or now > end:
+            break
+    drawn.release()
+    return {**longest, "frames over 30 ms": over, "frames": step}
+
+
 def new_pose(options: Namespace) -> Iterator[Row]:
     """Each backend with other points in each picture."""
     limit, points = Limit(options), _one_size(options)
@@ -368,10 +411,13 @@ def cold(options: Namespace) -> Iterator[Row]:
 
 
 def _choose(options: Namespace) -> None:
-    """Take the ways of reading and clearing that are to be measured."""
+    """Take the ways of reading and clearing that are to be measured; threads give way as a window's do."""
+    give_way()
     gpu = renderer().gpu
     if options.reading:
         gpu.staging.reading = options.reading
+    if options.writing:
+        gpu.staging.writes_by_copy = options.writing == "copy"
     if options.clearing:
         gpu.clears_by_shader = options.clearing == "shader"
     if options.atomics:
@@ -653,7 +699,7 @@ TABLES = [
     Table("hardware_cold", _columns("nothing stored, ms", "stored, ms", "context, ms"), "cold", empty=_EMPTY),
 ]
 EXPERIMENT = Script(
-    [orbit, new_pose, cold, cpu],
+    [orbit, loading, new_pose, cold, cpu],
     {
         "sizes": [100_000, 1_000_000, 10_000_000],
         "huge": False,
@@ -662,6 +708,7 @@ EXPERIMENT = Script(
         "rows": [],
         "limit": 0.0,
         "reading": "",
+        "writing": "",
         "clearing": "",
         "atomics": "",
         "order": "",

@@ -21,7 +21,6 @@ from ...scan.octree.traverse import CubeSight, Sight
 from .cut_pose import ArrayPool, CutArrays, CutPose
 from .shown import CutCounts, ShownOctants, StrayPoints
 
-_SLICE = 1 << 22  # bytes uploaded at a time
 _LEVELS = DEEPEST + 1
 _HALF_DIAGONAL = f"{math.sqrt(3) / 2!r}LF"  # of a cube of edge 1
 _CELL_BYTES, _LISTED_BYTES = 8, 8
@@ -122,7 +121,7 @@ class GpuOctree:
     def _list_slices(self) -> list[_Slice]:
         """Slices to upload, in order: (level, buffer, first byte there, bytes). The buffer is None at the end
         of each level."""
-        octree = self._octree
+        octree, size = self._octree, self._gpu.staging.slice
         slices: list[_Slice] = []
         for level in range(octree.depth + 1):
             for name, texels in self._texels.items():
@@ -133,8 +132,7 @@ class GpuOctree:
                 words = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
                 first = _ARRAYS[name][1] * self._starts[level]
                 slices += [
-                    (level, texels, first + at, words[at : at + _SLICE])
-                    for at in range(0, len(words), _SLICE)
+                    (level, texels, first + at, words[at : at + size]) for at in range(0, len(words), size)
                 ]
             slices.append((level, None, 0, np.empty(0, np.uint8)))
         return slices
@@ -158,7 +156,7 @@ class GpuOctree:
         while self._slices:
             level, texels, first, words = self._slices.popleft()
             if texels is not None:
-                texels.buffer.write(words, offset=first)
+                self._gpu.staging.write(texels.buffer, words, first)
                 uploaded += len(words)
             else:
                 self._finish(level)
