@@ -82,6 +82,14 @@ def test_what_was_compiled_is_found_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_what_was_compiled_loads_without_what_numba_compiles_with(tmp_path: Path) -> None:
+    folder, cache = written(tmp_path)
+    script = "import sys, kernel; print(kernel.twice(21), 'numba.np.arraymath' in sys.modules)"
+    assert output(script, folder, cache).split() == ["42", "True"]
+    assert output(script, folder, cache).split() == ["42", "False"]
+
+
+@pytest.mark.slow
 def test_what_another_file_has_is_compiled_anew_where_that_changes(tmp_path: Path) -> None:
     folder, cache = written(tmp_path)
     own = KERNEL.replace("2 * number", "doubled(number) + ZERO")
