@@ -92,7 +92,7 @@ def test_arrays_are_uploaded_in_slices_and_counted(both: tuple[Renderer, Rendere
     request = Request(pose, Camera.orbit(CLOUD.bounds()), "points")
     plan = make_plan(both[1], request, SIZE, Effort.BEGIN, upload_ms=1000)
     assert isinstance(plan, Ready)
-    assert both[1].bytes_of(pose) == 12 * COUNT
+    assert both[1].bytes_of(pose) == 28 * COUNT
     surface = Surface(both[1].gpu, SIZE)
     draw_plan(plan, surface)
     assert surface.stats.uploaded_bytes == 28 * COUNT
