@@ -3,6 +3,7 @@
 // A file says what the words are (`word_of(i)`, twice the same) and takes their sums (`take_sum(i, sum)`), from
 // binding points 0 to 5.
 #include "common/item.glsl"
+#include "common/meet.glsl"
 
 uniform uint word_count;
 uniform uint run;  // words of an invocation
@@ -17,11 +18,6 @@ shared uint total;
 #else
 shared uint sums[GROUP];
 #endif
-
-void meet() {
-    memoryBarrierShared();
-    barrier();
-}
 
 void main() {
     uint me = gl_LocalInvocationID.x, block = item() / uint(GROUP);

@@ -117,6 +117,8 @@ class Texture(IntEnum):
     NODE_CELLS = VISIBLE
     NODE_OFFSETS = COPIES  # of the surface in their cells
     NODE_COLORS = LIMITS
+    # What fillings of lists counted, beside points; no program reads this and hidden points.
+    FILLED = HOMES
     # Cells of points, to which splats are fitted, beside a pose; no program reads these and targets.
     CELLS = SPOTS
 
@@ -179,6 +181,7 @@ class Storage(IntEnum):
     STARTS = 0
     WORK = 1
     CENTERS = 2
+    FILLED = 2
     FORMS = 3
     NOTED = 3
     REACH = 4

@@ -63,10 +63,14 @@ class Bins:
         """How many entries all lists have, once they are counted; waits for the GPU."""
         return int(self._gpu.read(self.starts.buffer, "u4", 1, 4 * self.cells)[0])
 
+    @property
+    def room(self) -> int:
+        """Entries that there is room for."""
+        return self.items.buffer.size // 4
+
     def reserve(self, entries: int) -> None:
         """Make room for so many entries, and give up much more room than that."""
-        room = self.items.buffer.size // 4
-        if not entries <= room <= _SPARE * max(entries, 1):
+        if not entries <= self.room <= _SPARE * max(entries, 1):
             self._gpu.discard(self.items)
             self.items = self._texture(entries)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -32,7 +33,6 @@ _ROOM = 4  # entries of the list for each point, to begin with
 # over its list twice, with 73 turns for 64 entries; on hardware a pixel alone with so many would be slow.
 _LONGEST = 28_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
-_LARGE_HEAD = 24  # bytes before the rows of large discs
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
 
@@ -50,24 +50,46 @@ class ListPurpose(NamedTuple):
     numbered: bool = False  # the disc of each point is stored
 
 
+class _Filling(NamedTuple):
+    """The counts of a filling, as surfels/tiles/filled.glsl has them. length: entries of the lists of all
+    tiles. longest: entries of the longest. discs: those listed. away: those left to a second filling."""
+
+    large: int = 0
+    length: int = 0
+    longest: int = 0
+    sent: int = 0
+    discs: int = 0
+    away: int = 0
+
+    @property
+    def entries(self) -> int:
+        """All entries: those of the lists of tiles, and those of homes."""
+        return self.length + self.discs
+
+
 class TileLists:
     """The discs that reach each tile of a picture, made anew for each frame (shaders/surfels/tiles/).
 
     Discs are numbered by tiles, so that those of one lie together in memory whatever the order of the points.
     length: entries of all lists. discs: how many are in lists. large: how many are left to the rasteriser.
     away: how many that face away from the eye were left to a second filling. sent: how many were sent to
-    pixels in place of lists.
+    pixels in place of lists. waits: whether the CPU waits for these numbers, which each filling counts; else
+    it goes by those of the last picture, in as many lists as there is room for, until `held` looks at them.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
         self._gpu = gpu
         self.grid = grid = _grid(gpu)
         self.tiles = (-(-size[0] // grid.tile[0]), -(-size[1] // grid.tile[1]))
-        self.length = self.discs = self.large = self.away = self.sent = self._longest = 0
+        self.length = self.discs = self.large = self.away = self.sent = 0
         self._room = 0  # points
         words = self.tiles[0] * self.tiles[1]
         self._bins, self._away_bins = Bins(gpu, 2 * words), Bins(gpu, 2 * words)
+        self.waits = True
+        self._fits = self._has_second = self._both = False
+        self._fillings = (_Filling(),) * 2
         self._textures = {"farthest": self._texture(4 * words, gl.R32UI)}
+        self._textures["filled"] = self._texture(4 * len(_Filling._fields) * 2, gl.R32UI)
         for name in ("work", "rest", "again"):
             self._textures[name] = self._texture(_WORK_HEAD + 4 * words, gl.R32UI)
         self._large_rows: gl.BufferTexture | None = None
@@ -100,39 +122,65 @@ class TileLists:
         if not second:
             self._reserve(max(points.count, 1))
             self._rows = points.rows
-        self._buffer("large").write(struct.pack("6I", self.large if both else 0, *[0] * 5))
-        first_disc = self.discs if second else 0
+            self._gpu.clear(self._buffer("filled"), 0)
+        self._has_second, self._both = second, both
 
         def bind(program: Program) -> None:
             points.bind(program)
             for name in ("farthest", "reach", "away"):
                 self._textures[name].bind(Texture[name.upper()])
-            self._bind_storage("reach", "large", "away", "noted")
+            self._bind_storage("filled", "reach", "large", "away", "noted")
             if sends:
                 surface.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
 
         given = {
             **{"PERSPECTIVE": int(surface.view.perspective), **self.grid.defines, **points.defines},
-            **{"SIDE": side, "FEW": _FEW if sends else 0, "SENT": _SENT},
+            **{"SIDE": side, "SECOND": int(second), "FEW": _FEW if sends else 0, "SENT": _SENT},
         }
-        count = self.away if second else points.count
-        visits = Visits("surfels/tiles/cells.glsl", count, bind, given, splats)
+        count = self.away if second and self.waits else points.count
+        counted = {**given, "TOGETHER": int(not self.grid.masked and not second)}
+        visits = Visits("surfels/tiles/cells.glsl", count, bind, counted, splats)
         bins.count(visits)
         with gpu.timers.measure("work"):
-            self._find_work(bins, "work", second)
+            self._find_work(bins, "work", second, both)
             if both:
-                self._find_work(bins, "rest", second)
-            words = gpu.read(self._buffer("large"), np.uint32, 6).tolist()
-            large, self.length, longest, sent, discs, away = words
-            if not second:
-                self.large, self.away, self.sent, self.discs = large, away, sent, discs
-                self._longest = longest
-        entries = self.length + discs
-        if entries > gpu.max_storage_bytes // 4 or longest + both * self._longest > _LONGEST:
-            return False
-
-        self._write(points, bins, given, splats, (discs, first_disc, entries), purpose)
+                self._find_work(bins, "rest", second, both)
+            if self.waits and not self._take_filled():
+                return False
+        filling = self._fillings[second]
+        sizes = (filling.discs, filling.entries) if self.waits else (count, bins.room)
+        self._write(points, bins, given, splats, sizes, purpose)
         return True
+
+    def _take_filled(self) -> bool:
+        """Read the counts since the first filling; whether lists may be so long. Waits for the GPU."""
+        words = self._gpu.read(self._buffer("filled"), np.uint32).reshape(2, -1).tolist()
+        first, second = self._fillings = _Filling(*words[0]), _Filling(*words[1])
+        self.large, self.sent, self.away, self.discs = first.large, first.sent, first.away, first.discs
+        self.length = (second if self._has_second else first).length
+        longest = (max, operator.add)[self._both](first.longest, second.longest)
+        most = self._gpu.max_storage_bytes // 4
+        self._fits = longest <= _LONGEST and all(each.entries <= most for each in self._fillings)
+        return self._fits
+
+    def foresees(self, points: Points) -> bool:
+        """Whether lists of these points may be filled without a wait, going by those of the last picture."""
+        return not self._gpu.software and self._are_usual and self._has_room(points.count)
+
+    def held(self) -> bool:
+        """Whether lists that were filled without a wait are right; else the picture is to be drawn anew, with
+        waits. Waits for the GPU."""
+        self._take_filled()
+        return self._are_usual
+
+    @property
+    def _are_usual(self) -> bool:
+        """Whether lists are right that are filled without a wait: they had room, no disc is large, and there
+        are second lists where any disc was left to these."""
+        first, second = self._fillings
+        has_room = first.entries <= self._bins.room and second.entries <= self._away_bins.room
+        is_alone = not first.large + first.sent and (self._has_second or not first.away)
+        return self._fits and has_room and is_alone
 
     def _write(
         self,
@@ -140,22 +188,21 @@ class TileLists:
         bins: Bins,
         given: Mapping[str, object],
         splats: Splats,
-        sizes: tuple[int, int, int],
+        sizes: tuple[int, int],
         purpose: ListPurpose,
     ) -> None:
-        """Write the lists. given: macros. sizes: how many discs there are, the first of them, all entries."""
-        gpu, (discs, first_disc, entries) = self._gpu, sizes
+        """Write the lists. given: macros. sizes: how many discs there are at most, all entries."""
+        discs, entries = sizes
 
-        def bind_homes(program: Program) -> None:
-            gpu.set(program, first_disc=first_disc, first_home=self.length)
-            for name in ("reach", "noted"):
+        def bind_homes(_: Program) -> None:
+            for name in ("filled", "reach", "noted"):
                 self._textures[name].bind(Texture[name.upper()])
             self._bind_storage("numbers")
 
         def bind_discs(program: Program) -> None:
             points.bind(program)
-            gpu.set(program, first_disc=first_disc, first_home=self.length)
-            self._textures["reach"].bind(Texture.REACH)
+            for name in ("filled", "reach"):
+                self._textures[name].bind(Texture[name.upper()])
             bins.items.bind(Texture.LISTED)
             if purpose.looks:
                 looks_of(points).bind(Texture.LOOKS)
@@ -179,22 +226,25 @@ class TileLists:
         visits = Visits("surfels/scatter.glsl", points.count, bind, defines, splats)
         take_items(self._gpu, visits, surface.depths, surface.rows)
 
-    def _find_work(self, bins: Bins, work: str, second: bool) -> None:
+    def _find_work(self, bins: Bins, work: str, second: bool, both: bool) -> None:
         """List the tiles that discs reach: "work", those of these lists; "rest", those of the first alone
         where a pixel shows nothing."""
 
         def bind(_: Program) -> None:
             bins.starts.buffer.bind_to_storage_buffer(Storage.STARTS)
             self._bins.starts.bind(Texture.STARTS)
-            self._bind_storage("large", "farthest")
+            self._bind_storage("filled", "farthest")
             self._buffer(work).bind_to_storage_buffer(Storage.WORK)
 
-        defines = {"TILES": f"{self.grid.tiles}u", "SECOND": int(second), "REST": int(work == "rest")}
+        defines = {
+            **{"TILES": f"{self.grid.tiles}u", "SECOND": int(second), "REST": int(work == "rest")},
+            "ALL": int(both or not second),
+        }
         scan_words(self._gpu, "surfels/tiles/work.glsl", self.tiles[0] * self.tiles[1], bind, defines)
 
     def large_points(self, points: Points) -> Points:
         """The points that are left to the rasteriser."""
-        rows = self._gpu.read(self._buffer("large"), np.uint32, self.large, _LARGE_HEAD)
+        rows = self._gpu.read(self._buffer("large"), np.uint32, self.large)
         self._gpu.discard(self._large_rows)
         # Ascending, so that ties fall to the lowest row.
         self._large_rows = gl.BufferTexture(self._gpu.buffer(np.sort(rows)), gl.R32UI)
@@ -206,7 +256,7 @@ class TileLists:
         work: on which tiles: "work", those that discs of the last filling reach; "rest", those that discs of
         the first alone do, where a pixel shows nothing; "again", those that are to be shown again.
         """
-        for name in ("centers", "forms", "disc_looks"):
+        for name in ("centers", "forms", "disc_looks", "reach"):
             self._textures[name].bind(Texture[name.upper()])
         self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
@@ -252,7 +302,7 @@ class TileLists:
 
     def _reserve(self, count: int) -> None:
         """Make room for so many points, and give up what a much larger pose has left."""
-        if count <= self._room <= _SPARE * count:
+        if self._has_room(count):
             return
         self._room = count
         self._replace("centers", DISC_BYTES * count, gl.RGBA32F)
@@ -262,8 +312,12 @@ class TileLists:
         self._replace("reach", 8 * count, gl.RG32UI)
         self._replace("noted", 4 * count, gl.R32UI)
         self._replace("away", 8 * count, gl.RG32UI)
-        self._replace("large", 4 * count + _LARGE_HEAD, gl.R32UI)
+        self._replace("large", 4 * count, gl.R32UI)
         self._bins.reserve(_ROOM * count)
+
+    def _has_room(self, count: int) -> bool:
+        """Whether there is room for so many points, and not much more."""
+        return count <= self._room <= _SPARE * max(count, 1)
 
     def _replace(self, name: str, nbytes: int, texel_format: int) -> None:
         self._gpu.discard(self._textures.pop(name, None))
@@ -285,8 +339,9 @@ class TileGrid:
     """How pixels are shared out.
 
     part: those of an invocation, width and height. parts: of a tile, which has a list, along both. tiles: of
-    a work group. masked: whether entries of lists say which parts their disc reaches. span: pixels along an
-    edge of the largest discs that are listed.
+    a work group. masked: whether entries of lists say which parts their disc reaches; else a part is a pixel,
+    a tile is a work group, and its invocations share what they read of discs, and count discs together. span:
+    pixels along an edge of the largest discs that are listed.
     """
 
     part: tuple[int, int]
@@ -311,17 +366,23 @@ class TileGrid:
             "LINES": lines,
             "ALL_PARTS": columns * lines,
         }
-        return {**sizes, "MASKED": int(self.masked), "SPAN": self.span, "DISC_BITS": DISC_BITS}
+        return {
+            **sizes,
+            "MASKED": int(self.masked),
+            "SPAN": self.span,
+            "LONGEST": _LONGEST,
+            "DISC_BITS": DISC_BITS,
+        }
 
 
 # An invocation goes over the tiles of a disc up to twice, and llvmpipe ends its loops after 65 535 turns.
 SOFTWARE_GRID = TileGrid((4, 4), (4, 2), 16, masked=True, span=1920)
-HARDWARE_GRID = TileGrid((1, 1), (8, 8), 2, masked=False, span=248)
+HARDWARE_GRID = TileGrid((1, 1), (8, 8), 1, masked=False, span=248)
 
 
 def _grid(gpu: Gpu) -> TileGrid:
     """The grid that suits the device: a processor's eight lanes are the parts of a tile, and each takes
-    its discs from the list; on hardware each pixel has its invocation, and two tiles fill a work group.
+    its discs from the list; on hardware each pixel has its invocation, and a tile fills a work group.
     Software rasterisers take many times as long as lists for large discs; on hardware an invocation would go
     over all tiles of one by itself."""
     return SOFTWARE_GRID if gpu.software else HARDWARE_GRID

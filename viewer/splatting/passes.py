@@ -27,7 +27,7 @@ from .lists import ALL, NOT_HIDDEN, TOWARDS, TileLists
 from .local import begin_local, bind_local, settle_depths
 from .looks import looks_of
 from .splats import FRAGMENT, SURFEL, Splats, bind_visible
-from .tiles import FALLBACK, LIMIT, fill_away, run, show, show_all, splat_first, tile_lists
+from .tiles import FALLBACK, LIMIT, fill_away, run, show, show_all, splat_first, tile_lists, without_wait
 
 FIRST, SECOND = 1, 2  # of which lists the nearest are found as they are blended: TAKE of blend.comp
 
@@ -143,8 +143,12 @@ def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
 def tiled_two_passes(points: Points, surface: Surface, splats: Splats) -> None:
     """Draw the picture of `two_passes` by tiles; splats that are too large for these are rasterised."""
     by_tiles = _two_by_tiles if splats.enlarge == 1 else _enlarged_by_tiles
-    begin_local(surface, splats)
-    if by_tiles(points, surface, splats):
+
+    def draw() -> bool:
+        begin_local(surface, splats)
+        return by_tiles(points, surface, splats)
+
+    if without_wait(points, surface, draw) if splats.enlarge == 1 else draw():
         settle_depths(surface, splats)
     else:
         two_passes(points, surface, FALLBACK, splats)

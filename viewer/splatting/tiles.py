@@ -9,13 +9,15 @@ discs of a few pixels are sent to these, by atomics, and the others listed.
 
 What faces away comes second: first the discs that face the eye are listed and shown, then those of the
 others that some tile they reach lets through, going by the farthest depth it shows. Of a closed surface
-that leaves the outline alone. A second pass goes over both lists. The CPU waits once for each, for the length
-of the lists: it sizes them, and tells whether any splat is large.
+that leaves the outline alone. A second pass goes over both lists.
+
+The CPU reads how long the lists are, to size them, and whether any splat is large. It waits for that after
+each counting. On graphics cards, once a picture was as usual, it reads all numbers when the next is drawn.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from ..gpu.context import Gpu
 from ..picture.surface import Surface
@@ -30,9 +32,29 @@ _SHOWN = {"FOUND": 0, "FARTHEST": 0, "FILL": 0, "LARGE": 0, "AWAY": 0}
 FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 
 
+def without_wait(points: Points, surface: Surface, draw: Callable[[], bool]) -> bool:
+    """Return what `draw` does, which fills the surface's lists once, and once more with what faces away.
+
+    Where the lists of the last picture allow it, the CPU does not wait for the new ones. It reads what they
+    counted when all is drawn, and draws anew, with waits, where that was not as expected.
+    """
+    lists, skipped = surface.cached(TileLists), dict(surface.stats.skipped)
+    lists.waits = bool(_unfit(points, surface)) or not lists.foresees(points)
+    try:
+        drawn = draw()
+        if lists.waits or lists.held():
+            return drawn
+        lists.waits = True
+        surface.restart()
+        surface.stats.skipped.update(skipped)
+        return draw()
+    finally:
+        lists.waits = True
+
+
 def splat(points: Points, surface: Surface, splats: Splats) -> None:
     """The nearest disc at each pixel: what `amplify` draws, up to rounding."""
-    if not splat_first(points, surface, splats, DEPTH):
+    if not without_wait(points, surface, lambda: splat_first(points, surface, splats, DEPTH)):
         amplify(points, surface, FALLBACK, SURFEL, FRAGMENT, splats)
 
 

@@ -75,7 +75,7 @@ float visible_look(int k, out vec3 rgb, out vec3 n) {
 #endif
 }
 
-void blend_block(usamplerBuffer list, int first, int last) {
+void blend_block(usamplerBuffer list, int first, int last, int points_at) {
     float weight_sum[PIXELS];
     vec3 light_sum[PIXELS], normal_sum[PIXELS];
     for (int k = 0; k < PIXELS; ++k) {
@@ -83,11 +83,10 @@ void blend_block(usamplerBuffer list, int first, int last) {
         light_sum[k] = normal_sum[k] = vec3(0.0);
     }
     do {
-        uvec4 found = reaching(list, first, last);
+        uvec4 found = reaching(list, first, last, points_at);
         do {
             bool is_there = found != uvec4(0u);
-            uint number = take_disc(list, first, found);
-            begin_columns(number);
+            uint number = begin_next(list, first, found);
             vec3 rgb, n;
             unpack_look(texelFetch(disc_looks, int(number)).xyz, rgb, n);
             for (int k = 0; k < PIXELS; ++k) {
@@ -113,10 +112,10 @@ void blend_block(usamplerBuffer list, int first, int last) {
     }
 }
 
-void blend(usamplerBuffer list, ivec2 part) {
+void blend(usamplerBuffer list, ivec2 part, int points_at) {
     int first = part.x;
     do {
-        blend_block(list, first, min(first + BLOCK, part.y));
+        blend_block(list, first, min(first + BLOCK, part.y), points_at);
         first += BLOCK;
     } while (first < part.y);
 }
@@ -186,11 +185,11 @@ void main() {
     }
 #if PARTLY
     if (tile >= 0) atomicMax(farthest[tile], most);
-    if (!is_closed) part = ivec2(0);
+    if (!is_closed) pass_over(part);
 #endif
-    blend(listed, part);
+    blend(listed, part, points_in_list());
 #if AWAY
-    blend(away_listed, away_part);
+    blend(away_listed, away_part, points_in_away_list());
 #endif
 #if PARTLY
     if (!is_closed) return;

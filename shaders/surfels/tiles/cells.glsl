@@ -11,11 +11,12 @@
 #include "amplify/texels.glsl"
 #include "surfels/pixels.glsl"
 #endif
-#include "surfels/tiles/large.glsl"
+#include "surfels/tiles/filled.glsl"
 
 layout(std430, binding = STORAGE_NOTED) writeonly buffer Noted { uint noted[]; };
 #if SIDE != 2
 layout(std430, binding = STORAGE_REACH) writeonly buffer Reach { uvec2 reach[]; };
+layout(std430, binding = STORAGE_LARGE) writeonly buffer Large { uint large[]; };
 #if FEW
 layout(std430, binding = STORAGE_NEAREST) buffer Nearest { uint nearest_depths[]; };  // of each pixel, float bits
 #endif
@@ -88,7 +89,7 @@ uvec2 parts_reached(Point point, out uint away_depth) {
     ivec4 pixels = has_box ? pixels_in(disc_box()) : ivec4(0, 0, view_size), parts = parts_of(pixels), t = tiles_of(parts);
     if (t.x >= t.z) return uvec2(0u);
     if (crosses || any(greaterThan(pixels.zw - pixels.xy, ivec2(SPAN)))) {
-        large[atomicAdd(large_count, 1u)] = point.row;
+        large[atomicAdd(fillings[0].large_count, 1u)] = point.row;
         return uvec2(0u);
     }
 #if SIDE == 1
@@ -99,7 +100,7 @@ uvec2 parts_reached(Point point, out uint away_depth) {
 #if FEW
     if (!is_away && (pixels.z - pixels.x) * (pixels.w - pixels.y) <= FEW) {
         take_pixels(pixels, point.row);
-        atomicAdd(sent, 1u);
+        atomicAdd(fillings[0].sent, 1u);
         return uvec2(SENT, 0u);
     }
 #endif
@@ -112,15 +113,8 @@ uvec2 parts_reached(Point point, out uint away_depth) {
     return packed_parts(parts);
 }
 
-void scatter(uint i) {
-    uint away_depth;
-    uvec2 words = parts_reached(texel_point(drawn_row(int(i))), away_depth);
-    reach[i] = words;
-    if (words.y == 0u) return;
-    bool is_away = away_depth != 0u;
-    // One for both, as Mesa runs through both sides of a branch. By a variable: NVIDIA's compiler fails where a constructor
-    // is in the index of what an atomic changes.
-    uint side = is_away ? 1u : 0u, at = atomicAdd(discs[side], 1u);
+// at: the place of the disc among those of its side.
+void note(uint i, uvec2 words, bool is_away, uint away_depth, uint at) {
 #if SIDE == 1
     if (is_away) {
         away_points[at] = uvec2(i, away_depth);
@@ -130,12 +124,50 @@ void scatter(uint i) {
     noted[at] = i;
     count_visits(tiles_of(unpacked_parts(words)));
 }
+
+#if TOGETHER
+#include "common/meet.glsl"
+
+shared uint group_discs[2], group_slots[2];
+
+// One invocation of a work group takes the places of all: millions of atomics on one word would wait for each other.
+void scatter(uint i, bool exists) {
+    uint me = gl_LocalInvocationID.x, away_depth = 0u, at = 0u;
+    uvec2 words = uvec2(0u);
+    if (me < 2u) group_discs[me] = 0u;
+    meet();
+    if (exists) {
+        words = parts_reached(texel_point(drawn_row(int(i))), away_depth);
+        reach[i] = words;
+    }
+    bool is_listed = words.y != 0u, is_away = away_depth != 0u;
+    uint side = is_away ? 1u : 0u;
+    if (is_listed) at = atomicAdd(group_discs[side], 1u);
+    meet();
+    if (me < 2u) group_slots[me] = atomicAdd(fillings[0].discs[me], group_discs[me]);
+    meet();
+    if (is_listed) note(i, words, is_away, away_depth, group_slots[side] + at);
+}
+#else
+void scatter(uint i) {
+    uint away_depth;
+    uvec2 words = parts_reached(texel_point(drawn_row(int(i))), away_depth);
+    reach[i] = words;
+    if (words.y == 0u) return;
+    bool is_away = away_depth != 0u;
+    // One for both, as Mesa runs through both sides of a branch. By a variable: NVIDIA's compiler fails where a constructor
+    // is in the index of what an atomic changes.
+    uint side = is_away ? 1u : 0u, at = atomicAdd(fillings[0].discs[side], 1u);
+    note(i, words, is_away, away_depth, at);
+}
+#endif
 #else
 void scatter(uint at) {
+    if (at >= fillings[0].discs[1]) return;
     uvec2 point = texelFetch(away_points, int(at)).xy;
     ivec4 t = tiles_of(unpacked_parts(texelFetch(reach, int(point.x)).xy));
     if (is_hidden(t, uintBitsToFloat(point.y))) return;
-    noted[atomicAdd(discs[0], 1u)] = point.x;
+    noted[atomicAdd(fillings[1].discs[0], 1u)] = point.x;
     count_visits(t);
 }
 #endif

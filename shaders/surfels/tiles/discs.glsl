@@ -1,6 +1,7 @@
 // The tiles that discs reach, in the order of homes; what they are is written down. MASKED: entries of tiles say which parts
 // the disc reaches.
 #include "surfels/tiles/reach.glsl"
+#include "surfels/tiles/counted.glsl"
 #include "amplify/texels.glsl"
 #include "surfels/disc.glsl"
 
@@ -12,8 +13,6 @@ layout(std430, binding = STORAGE_FORMS) writeonly buffer Forms { vec4 forms[]; }
 #include "surfels/passes/look.glsl"
 layout(std430, binding = STORAGE_DISC_LOOKS) writeonly buffer DiscLooks { uvec4 disc_looks[]; };  // and radius, as stored
 #endif
-
-uniform uint first_disc, first_home;  // the number of the first disc, and where the lists of homes begin
 
 #if MASKED
 float margin;  // what is inside of a part at most changes by from its middle, of the key and of the form's root
@@ -41,6 +40,7 @@ uint bits_of(ivec4 parts, ivec2 tile, vec2 center, vec3 key, vec3 form) {
 #endif
 
 void scatter(uint at) {
+    if (at >= disc_count) return;
     uint disc = first_disc + at, i = texelFetch(listed, int(first_home + at)).r;
     Point point = texel_point(drawn_row(int(i)));
     begin_disc(point);

@@ -7,6 +7,16 @@
 #include "surfels/passes/limit.glsl"
 #endif
 
+#if FILL && LARGE
+layout(binding = TEXTURE_LARGE_ROWS) uniform usampler2D large_rows;
+layout(binding = TEXTURE_LARGE_DEPTHS) uniform sampler2D large_depths;  // negative, as surfels/passes/fill.frag has it
+
+uint filled_row(ivec2 at, out float depth) {
+    depth = -texelFetch(large_depths, at, 0).r;
+    return texelFetch(large_rows, at, 0).r;
+}
+#endif
+
 #if FARTHEST
 layout(std430, binding = STORAGE_FARTHEST) buffer Farthest { uint farthest[]; };
 #elif FILL
@@ -24,7 +34,7 @@ void main() {
 #if FILL
     bool all_closed = true;
     for (int k = 0; k < PIXELS; ++k) all_closed = all_closed && best[k] == CLOSED;
-    if (all_closed) part = ivec2(0);
+    if (all_closed) pass_over(part);
 #endif
 #if AWAY
     take_nearest(away_listed, part, points_in_away_list());

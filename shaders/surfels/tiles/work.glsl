@@ -1,7 +1,7 @@
-// Lists the tiles that discs reach, with a dispatch of TILES in a work group: all tiles where some discs, which reach
+// Lists the tiles that discs reach, with a dispatch of TILES in a work group. ALL: all tiles where some discs, which reach
 // anywhere, are rasterised or were sent to their pixels. SECOND: of a second filling. REST: those that discs of the first
 // one alone reach, once the others are listed, and where a pixel shows nothing.
-#include "surfels/tiles/large.glsl"
+#include "surfels/tiles/filled.glsl"
 
 layout(std430, binding = STORAGE_STARTS) readonly buffer Starts { uint starts[]; };
 layout(std430, binding = STORAGE_WORK) writeonly buffer Work { uint groups_x, groups_y, groups_z, work_count, work[]; };
@@ -18,7 +18,10 @@ bool has_first(uint tile) {
 uint entries_of(uint tile) { return starts[tile + 1u] - starts[tile]; }
 
 uint word_of(uint tile) {
-    bool is_reached = entries_of(tile) > 0u || large_count > 0u || sent > 0u;
+    bool is_reached = entries_of(tile) > 0u;
+#if ALL
+    is_reached = is_reached || fillings[0].large_count + fillings[0].sent > 0u;
+#endif
 #if REST
     is_reached = !is_reached && has_first(tile) && farthest[tile] == NO_DEPTH;
 #endif
@@ -35,10 +38,10 @@ void take_sum(uint tile, uint sum) {
 #else
     farthest[tile] = is_worked > 0u ? 0u : NO_DEPTH;  // through such a tile everything is seen
 #endif
-    if (entries > longest) atomicMax(longest, entries);
+    if (entries > fillings[SECOND].longest) atomicMax(fillings[SECOND].longest, entries);
 #endif
     if (tile + 1u < word_count) return;
-    list_length = starts[word_count];
+    fillings[SECOND].list_length = starts[word_count];
     uint listed = sum + is_worked, groups = (listed + TILES - 1u) / TILES;
     work_count = listed;
     groups_x = min(groups, 1024u);
