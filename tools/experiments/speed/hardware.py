@@ -345,7 +345,6 @@ def _own_work(drawn: Drawn, requests: list[Request], rounds: int) -> dict[str, f
 def loading(options: Namespace) -> Iterator[Row]:
     """The longest frames of a window while a pose is uploaded, drawn for the first time and put in order."""
     limit = Limit(options)
-    _threads_at_rest()
     _choose(options)
     for points in _sizes(options):
         for name, case in CASES.items():
@@ -359,6 +358,7 @@ def _longest_frames(case: Case, points: int, options: Namespace, limit: Limit) -
     """Milliseconds of the longest frame of each kind, drawn as a window does."""
     drawn = Drawn(case, Pose(0, 0.0, "loading", replace(case.cloud(points))), options.size)
     renderer().work.prepare(drawn.request(0))
+    at_rest = threading.active_count()
     end = time.perf_counter() + min(_SETTLING_SECONDS, max(limit.left, 0))
     longest, over, quiet = dict.fromkeys(("uploading, ms", "first, ms", "later, ms"), 0.0), 0, 0
     kind = "uploading, ms"
@@ -372,7 +372,7 @@ def _longest_frames(case: Case, points: int, options: Namespace, limit: Limit) -
         now = time.perf_counter()
         longest[kind] = max(longest[kind], 1e3 * (now - start))
         over += 1e3 * (now - start) > _LONG_MS
-        quiet = 0 if threading.active_count() > _threads_at_rest() else quiet + 1
+        quiet = 0 if threading.active_count() > at_rest else quiet + 1
         if (kind == "later, ms" and quiet > _SETTLED) or now > end:
             break
     drawn.release()
