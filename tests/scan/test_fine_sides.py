@@ -133,6 +133,21 @@ def test_two_sheets_are_told_from_one() -> None:
             assert np.mean(sides[clear] == side[near[clear]]) > 0.97
 
 
+def test_planes_on_something_thin_go_through_the_points_of_one_side() -> None:
+    """Two sheets 0.3 spacings apart, whose normals lean as planes through both sides do."""
+    rng = np.random.default_rng(7)
+    x, y = rng.uniform(-1, 1, (2, 800))
+    side = np.where(rng.random(800) < 0.5, 1.0, -1.0)
+    points = np.stack([x, y, 0.01 * side], axis=1)
+    leaning = np.tile(np.array([np.sin(0.7), 0, np.cos(0.7)]), (800, 1)) * side[:, None]
+    near = np.argsort(np.linalg.norm(points[:, None] - points, axis=2), axis=1)[:, :20].astype(np.int32)
+    fitted = fine_sides.one_sided_normals(points, leaning.astype(np.float32), near)
+    assert np.mean(fitted[:, 2] * side > 0.999) > 0.95
+    one_sheet = points * [1, 1, 0]
+    same = np.tile(np.float32([0.6, 0, 0.8]), (800, 1))
+    assert np.array_equal(fine_sides.one_sided_normals(one_sheet, same, near), same)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("folder", "least"), [("horse_gallop_48", 0.002), ("crane_175", 0.0)])
 def test_fine_sides_of_moving_bodies_are_never_worse(data_dir: Path, folder: str, least: float) -> None:

@@ -85,6 +85,24 @@ def better_sides(
     return _accepted(field, bonds, signs)
 
 
+def one_sided_normals(
+    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32]
+) -> NDArray[np.float32]:
+    """The normals, (N, 3), where neighbours lie on both sides of something thin those of planes through one
+    side. points, normals: (N, 3). near: (N, K), each point and its nearest others."""
+    from . import sheet_kernels
+
+    fitted = normals.copy()
+
+    def fit(start: int) -> None:
+        checkpoint()
+        rows = (start, min(start + _ROWS, len(points)))
+        sheet_kernels.fit_one_side(points, normals, near, rows, fitted)
+
+    together(len(points), [partial(fit, start) for start in range(0, len(points), _ROWS)])
+    return fitted
+
+
 def _told_apart(
     points: Vectors, normals: Vectors, near: NDArray[np.int32], bonds: Bonds
 ) -> NDArray[np.floating]:

@@ -6,11 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compiled import compiled
+from .plane_kernels import fit_plane
 
 _TERMS = 7  # of a quadric, and the distance between two sheets
 _LEAST = 4  # points of a sheet
 _ROUNDS = 4  # in which points move from sheet to sheet
 _RIDGE = 1e-9
+_FEWEST, _PLANE_OF = 6, 12  # points on one side that a plane goes through
+_BETTER = 0.1  # of the variance about the former plane, what a plane through one side leaves at most
+_LINE = 0.02  # of the squared widths of points, the ratio below which they lie in a line
 
 
 @compiled
@@ -131,3 +135,50 @@ def count_votes(
                 total += trust[fit] * sides[fit, at_one] * sides[fit, at_other]
         votes[n] = total / weight if weight > 0.0 else 0.0
         trusted[n] = weight / both if both else 0.0
+
+
+@compiled
+def fit_one_side(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float32],
+    near: NDArray[np.int32],
+    rows: tuple[int, int],
+    fitted: NDArray[np.float32],
+) -> None:
+    """Fit planes anew where neighbours lie on both sides of something thin: through those of the same side.
+
+    points, normals: (N, 3), normals that agree as far as possible. near: (N, K), each point and its nearest
+    others. rows: first and last + 1 of the points. Gets fitted, (N, 3), the normals of planes that lie much
+    nearer to these points.
+    """
+    sums, a, v = np.empty(9), np.empty((3, 3)), np.empty((3, 3))
+    normal, widths = np.empty(3, np.float32), np.empty(3)
+    for i in range(rows[0], rows[1]):
+        sums[:] = 0.0
+        total, height, squared, is_mixed = 0, 0.0, 0.0, False
+        for k in range(near.shape[1]):
+            other, cosine, off = near[i, k], 0.0, 0.0
+            for axis in range(3):
+                cosine += normals[i, axis] * normals[other, axis]
+                off += normals[i, axis] * (points[other, axis] - points[i, axis])
+            is_mixed |= cosine < 0.0
+            if cosine < 0.0 or total == _PLANE_OF:
+                continue
+            total += 1
+            height += off
+            squared += off * off
+            for axis in range(3):
+                step = points[other, axis] - points[i, axis]
+                sums[axis] += step
+                sums[3 + axis] += step * step
+                sums[6 + axis] += step * (points[other, (axis + 1) % 3] - points[i, (axis + 1) % 3])
+        if not is_mixed or total < _FEWEST:
+            continue
+        fit_plane(sums, total, a, v, normal, widths)
+        before = squared / total - (height / total) ** 2
+        if widths[0] < _BETTER * before and widths[1] > _LINE * widths[2]:
+            away = 0.0
+            for axis in range(3):
+                away += normal[axis] * normals[i, axis]
+            for axis in range(3):
+                fitted[i, axis] = -normal[axis] if away < 0.0 else normal[axis]

@@ -11,13 +11,16 @@ makes the sum higher.
 from __future__ import annotations
 
 import heapq
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..task import checkpoint
 from .patches import joined_things, summed
+
+if TYPE_CHECKING:
+    from .fine_sides import Bonds
 
 Vectors = NDArray[np.float64]  # (N, 3)
 Method = Literal["quick", "fine"]
@@ -55,28 +58,43 @@ def facing_out(
     first. method: "quick" uses links and the view from outside; "fine" also uses the winding number, see
     `fine_sides`; None: "fine" if many links contradict each other.
     """
-    from . import fine_sides, side_kernels
+    from . import fine_sides
 
     linked = np.ascontiguousarray(near[:, :LINKED])
     reach = float(np.median(np.linalg.norm(points[linked[:, -1]] - points, axis=1)))
+    seen_from = _seen_from(points, reach)
+    oriented, bonds = _linked_sides(points, normals, linked, seen_from)
+    method = method or ("fine" if fine_sides.is_unsure(bonds.weights) else "quick")
+    held = bonds.weights
+    if method == "fine":
+        refitted = fine_sides.one_sided_normals(points, oriented, near)
+        oriented, bonds = _linked_sides(points, refitted, linked, seen_from)
+        turned = fine_sides.better_sides(points, oriented, near, bonds)
+        oriented *= turned[:, None]
+        held = bonds.weights * turned[bonds.links].prod(axis=1)
+    is_doubtful = np.zeros(len(points), bool)
+    is_doubtful[bonds.links[held < -_DOUBTFUL]] = True
+    return oriented, FoundSides(method, float(is_doubtful.mean()))
+
+
+def _linked_sides(
+    points: Vectors, normals: NDArray[np.float32], linked: NDArray[np.int32], seen_from: NDArray[np.float32]
+) -> tuple[NDArray[np.float32], Bonds]:
+    """The normals, (N, 3), on the sides that links and the view from outside tell, and their bonds.
+
+    linked: (N, K), each point and its neighbours. seen_from: (N, 3), of `_seen_from`.
+    """
+    from . import fine_sides, side_kernels
+
     normals = facing(normals, np.array([[1e-6, 1e-3, 1.0]]))  # whichever sign they came with
-    seen = _SEEN * np.einsum("ij,ij->i", normals, _seen_from(points, reach))
+    seen = _SEEN * np.einsum("ij,ij->i", normals, seen_from)
     most = len(linked) * (linked.shape[1] - 1)
     links, weights = np.empty((most, 2), np.int32), np.empty(most, np.float32)
     found = side_kernels.link(points, normals, linked, links, weights)
     links, weights = links[:found], weights[:found]
     signs = _agreeing(links, weights, seen)
-    oriented = normals * signs[:, None]
     held = weights * signs[links].prod(axis=1)
-    method = method or ("fine" if fine_sides.is_unsure(held) else "quick")
-    if method == "fine":
-        bonds = fine_sides.Bonds(links, held, seen * signs)
-        turned = fine_sides.better_sides(points, oriented, near, bonds)
-        oriented *= turned[:, None]
-        held = held * turned[links].prod(axis=1)
-    is_doubtful = np.zeros(len(points), bool)
-    is_doubtful[links[held < -_DOUBTFUL]] = True
-    return oriented, FoundSides(method, float(is_doubtful.mean()))
+    return normals * signs[:, None], fine_sides.Bonds(links, held, seen * signs)
 
 
 def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> NDArray[np.float32]:
