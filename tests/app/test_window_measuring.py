@@ -241,7 +241,7 @@ def test_where_another_surface_may_be_meant_the_second_click_counts(screen: Scre
         app.see(clicking="measuring")
         place = pixel_of(app, points, -1)
         click(app, place)
-        app.told(r"may be on the surface in front or behind \(\d+%\)\. Click here again")
+        app.told(r"This position may be on the surface in front or behind \(\d+%\)\. Click here again")
         assert not app.settle().is_under_way
         inside = int(np.flatnonzero((points == (-16.0, 8.0, 0.0)).all(axis=1))[0])
         click(app, pixel_of(app, points, inside))

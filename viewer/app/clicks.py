@@ -18,8 +18,8 @@ from ..scan.pose import Pose
 from .scene.viewport import Viewport
 
 _HINTS = {
-    "filled": "Zoom in, or tick 'Allow clicks on filled holes'",
-    "doubtful": "Click here again to use it anyway, or turn the view to see the surface from its front",
+    "filled": "Zoom in, or tick 'Allow clicks on filled holes'.",
+    "doubtful": "Click here again to use it anyway, or turn the view to see the surface from its front.",
 }
 _SAME = 3.0  # pixels, within which two clicks are in one place
 
@@ -53,7 +53,8 @@ class Click:
                 self.picked, self.pose, filled=filled, doubtful=self.is_again, place=self.motion
             )
         except UncertainPosition as error:
-            raise InputError(error.what, hint=_HINTS[error.accepted_by]) from None
+            what = f"{error.what[:1].upper()}{error.what[1:]}"
+            raise InputError(what, hint=_HINTS[error.accepted_by]) from None
 
 
 class Clicks:
