@@ -15,7 +15,6 @@ from typing import Any
 
 import filling
 import finding
-import moderngl
 import numpy as np
 import packed
 import pytest
@@ -322,8 +321,7 @@ def programs(request: pytest.FixtureRequest) -> list[list[Source]]:
     draw_nodes(renderer)
     use_primitives(renderer.gpu)
     renderer.release()
-    built = moderngl.Program | moderngl.ComputeShader
-    return [kept.extra.sources for kept in renderer.gpu._cached.values() if isinstance(kept, built)]
+    return [program.extra.sources for program in renderer.gpu._programs.values()]
 
 
 def test_every_shader_file_is_built(programs: list[list[Source]]) -> None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..backends import Backend, Derives, FrameView
 from ..gpu import gl
-from ..gpu.bindings import Texture
+from ..gpu.bindings import Texture, texture
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..mesh.triangles import Mesh
@@ -89,7 +89,7 @@ class _Triangles(Backend):
             surface.rows.bind(Texture.ROWS)
             faces.bind(Texture.CORNERS)
             for name in ("positions", "normals", *(("colors",) if colored else ())):
-                pose.array(name).bind(Texture[name.upper()])
+                pose.array(name).bind(texture(name))
             surface.bind_own("normal", *(("color",) if colored else ()))
             covered.run(resolve)
         return False

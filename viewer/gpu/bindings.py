@@ -6,6 +6,7 @@ Every shader has them as TEXTURE_, STORAGE_ and BLOCK_ with the names below.
 from __future__ import annotations
 
 from enum import IntEnum, auto, unique
+from functools import cache
 
 
 class Texture(IntEnum):
@@ -272,6 +273,18 @@ class UniformBlock(IntEnum):
     VIEW = 0  # the camera
     POINTS = auto()  # a range of points, for one way of instancing
     PARAMS = auto()  # the values that a primitive or a backend gives its shaders
+
+
+@cache
+def texture(name: str) -> Texture:
+    """The texture unit of an array by its name in lower case. Raises KeyError where there is none."""
+    return Texture[name.upper()]
+
+
+@cache
+def storage(name: str) -> Storage:
+    """The storage block of an array by its name in lower case. Raises KeyError where there is none."""
+    return Storage[name.upper()]
 
 
 def bindings_glsl() -> str:

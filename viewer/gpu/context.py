@@ -168,6 +168,7 @@ class Gpu:
         self.max_pixels = self.max_storage_bytes // 4  # a word a pixel
         self.max_points = gl.max_texture_buffer_texels()
         self._cached: dict[object, Any] = {}
+        self._programs: dict[tuple[object, ...], Any] = {}
         self._discarded: deque[Resource] = deque()
         self._discarded_bytes = 0
         gl.reverse_depth()
@@ -204,9 +205,12 @@ class Gpu:
         parts: Mapping[str, str] | None,
         params: Values | None,
     ) -> Any:
-        declared = None if params is None else type(params)
-        given = tuple(defines.items()) if defines else (), tuple(parts.items()) if parts else ()
-        program = self.cached(Gpu._compile, names, *given, declared)
+        declared, defines, parts = None if params is None else type(params), defines or {}, parts or {}
+        # Flat, since a picture looks for dozens: tuples in tuples take several times as long to compare.
+        key = (names, declared, *defines, *defines.values(), None, *parts, *parts.values())
+        program = self._programs.get(key)
+        if program is None:
+            program = self._programs[key] = self._compile(names, defines, parts, declared)
         if params is not None:
             program.extra.values.write(params)
         return program
@@ -214,8 +218,8 @@ class Gpu:
     def _compile(
         self,
         names: tuple[str, ...],
-        defines: tuple[tuple[str, object], ...],
-        parts: tuple[tuple[str, str], ...],
+        defines: Mapping[str, object],
+        parts: Mapping[str, str],
         declared: type[Values] | None,
     ) -> Any:
         sources = [Source(name, dict(defines), dict(parts), declared) for name in names]
@@ -240,7 +244,7 @@ class Gpu:
     @property
     def programs(self) -> int:
         """How many programs were compiled so far."""
-        return sum(isinstance(key, tuple) and key[0] is Gpu._compile for key in self._cached)
+        return len(self._programs)
 
     def cached(self, make: Callable[..., T], *args: Hashable) -> T:
         """Make, once for these arguments, `make(gpu, *args)`: small things that live as long as this."""
@@ -344,9 +348,11 @@ class Gpu:
         but for the last group's."""
         groups = -(-count // GROUP)
         if groups:
-            program.extra.uniforms.set({"item_count": count})
+            built: Built = program.extra
+            built.uniforms.set({"item_count": count})
+            if built.values is not None:
+                built.values.bind()
             rows = -(-groups // GROUP_LIMIT)
-            _bind_values(program)
             program.run(-(-groups // rows), rows)
             self.ctx.memory_barrier()
 

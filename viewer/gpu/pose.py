@@ -227,7 +227,8 @@ class GpuPose:
     def array(self, name: str) -> gl.BufferTexture:
         """positions, normals, colors, radii, axes or ids, with a texel for each row. The first call uploads
         it. Raises InputError if the scan has none and none was estimated."""
-        self.upload([name])
+        if name not in self._arrays:
+            self.upload([name])
         return self._arrays[name].texels
 
     def find(self, name: str) -> gl.BufferTexture | None:

@@ -106,9 +106,10 @@ class Coloring:
     @property
     def height_axis(self) -> tuple[float, float, float]:
         """The look's up along the pose's axes."""
-        up = np.array(up_vector(self.look.up), np.float64)
-        x, y, z = (float(v) for v in self.layers.world_from_pose.inverse.directions(up))
-        return x, y, z
+        (x, y, z), motion = up_vector(self.look.up), self.layers.world_from_pose
+        if not motion.is_identity:
+            x, y, z = motion.inverse.directions(np.array([x, y, z], np.float64)).tolist()
+        return float(x), float(y), float(z)
 
     @property
     def row_values(self) -> gl.BufferTexture | None:

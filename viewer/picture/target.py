@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..gpu import gl
-from ..gpu.bindings import Storage, Texture
+from ..gpu.bindings import Texture, storage
 from ..gpu.context import Gpu
 from ..gpu.pose import GpuPose
 from ..gpu.view import ViewBlock
@@ -153,7 +153,7 @@ class RenderTarget(PictureBuffers, Coloring):
     def bind_own(self, *names: str) -> None:
         """Bind channels that the backend writes itself for compute shaders to change."""
         for name in names:
-            self.own(name).buffer.bind_to_storage_buffer(Storage[name.upper()])
+            self.own(name).buffer.bind_to_storage_buffer(storage(name))
 
     def is_own(self, name: str) -> bool:
         """Whether the backend wrote this channel for each pixel. Values are those of one source: they are not
@@ -209,7 +209,7 @@ class RenderTarget(PictureBuffers, Coloring):
                 kind.bind(self.view)
             if texels is not None:
                 texels.bind(Texture.VALUES)
-            target.buffer.bind_to_storage_buffer(Storage[name.upper()])
+            target.buffer.bind_to_storage_buffer(storage(name))
             self.gpu.set(program, plain=tuple(c / 255 for c in rgba(self.look.plain)[:3]))
             if stride is not None:
                 self.gpu.set(program, stride=stride)

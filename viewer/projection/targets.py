@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..gpu import gl
-from ..gpu.bindings import Storage, Texture
+from ..gpu.bindings import Storage, Texture, texture
 from ..gpu.blocks import Values
 from ..gpu.compact import IndexList
 from ..gpu.context import Gpu
@@ -69,7 +69,7 @@ class Targets:
                     surface.depths.bind(Texture.KEYS)
                     surface.rows.bind(Texture.BEST)
                     for name in channels:
-                        surface.own(name).bind(Texture[f"OWN_{name.upper()}S"])
+                        surface.own(name).bind(texture(f"own_{name}s"))
                 else:
                     self.bind()
                 gpu.set(program, level=level)

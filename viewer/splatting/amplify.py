@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from ..gpu import gl
-from ..gpu.bindings import Texture, UniformBlock
+from ..gpu.bindings import Texture, UniformBlock, texture
 from ..gpu.blocks import Values
 from ..gpu.context import Program
 from ..gpu.pose import GpuPose
@@ -114,19 +115,19 @@ class Points:
             return replace(self, rows=rows.ascending())
         return self
 
-    @property
+    @cached_property
     def _listed(self) -> ListedRows | None:
         """The rows where points are read in an order of their own."""
         return (
             self.rows if isinstance(self.rows, ListedRows) and self.rows.order_indices is not None else None
         )
 
-    @property
+    @cached_property
     def packed(self) -> bool:
         """Whether normals, radii and half-axes are those of "splats"."""
         return "splats" in self.buffers
 
-    @property
+    @cached_property
     def use_axes(self) -> bool:
         """Whether there are ellipses among them."""
         if self.packed:
@@ -134,7 +135,7 @@ class Points:
         given = "axes" in self.buffers if "radii" in self.buffers else self.pose.has("axes")
         return self.use_radii and given
 
-    @property
+    @cached_property
     def use_cells(self) -> bool:
         """Whether splats are fitted to the cells of points."""
         return self.use_axes and "cells" in self.buffers
@@ -143,7 +144,7 @@ class Points:
         """positions, normals, radii, axes, cells or splats, indexed by row."""
         return self.buffers.get(name) or self.pose.array(name)
 
-    @property
+    @cached_property
     def attributes(self) -> Attributes:
         """Attributes that are read of each: (name of the pose's array, of the vertex attribute, numbers)."""
         read = _ATTRIBUTES[: 2 + self.use_radii + self.use_axes + self.use_cells]
@@ -154,7 +155,7 @@ class Points:
         """Numbers of a point."""
         return sum(floats for _, _, floats in self.attributes)
 
-    @property
+    @cached_property
     def defines(self) -> dict[str, object]:
         """Macros for shaders that include amplify/attributes.glsl or amplify/texels.glsl."""
         return {
@@ -194,7 +195,7 @@ class Points:
 
     def _bind(self, *names: str) -> None:
         for name in names:
-            self.array(name).bind(Texture[name.upper()])
+            self.array(name).bind(texture(name))
 
 
 def amplify(

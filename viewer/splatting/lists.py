@@ -12,7 +12,7 @@ import moderngl
 import numpy as np
 
 from ..gpu import gl
-from ..gpu.bindings import Storage, Texture
+from ..gpu.bindings import Storage, Texture, storage, texture
 from ..gpu.bins import Bins
 from ..gpu.compact import scan_words
 from ..gpu.constants import NOTHING
@@ -128,7 +128,7 @@ class TileLists:
         def bind(program: Program) -> None:
             points.bind(program)
             for name in ("farthest", "reach", "away"):
-                self._textures[name].bind(Texture[name.upper()])
+                self._textures[name].bind(texture(name))
             self._bind_storage("filled", "reach", "large", "away", "noted")
             if sends:
                 surface.depths.buffer.bind_to_storage_buffer(Storage.NEAREST)
@@ -196,13 +196,13 @@ class TileLists:
 
         def bind_homes(_: Program) -> None:
             for name in ("filled", "reach", "noted"):
-                self._textures[name].bind(Texture[name.upper()])
+                self._textures[name].bind(texture(name))
             self._bind_storage("numbers")
 
         def bind_discs(program: Program) -> None:
             points.bind(program)
             for name in ("filled", "reach"):
-                self._textures[name].bind(Texture[name.upper()])
+                self._textures[name].bind(texture(name))
             bins.items.bind(Texture.LISTED)
             if purpose.looks:
                 looks_of(points).bind(Texture.LOOKS)
@@ -257,7 +257,7 @@ class TileLists:
         the first alone do, where a pixel shows nothing; "again", those that are to be shown again.
         """
         for name in ("centers", "forms", "disc_looks", "reach"):
-            self._textures[name].bind(Texture[name.upper()])
+            self._textures[name].bind(texture(name))
         self._textures[work].bind(Texture.WORK)
         self._bins.starts.bind(Texture.STARTS)
         self._bins.items.bind(Texture.LISTED)
@@ -331,7 +331,7 @@ class TileLists:
 
     def _bind_storage(self, *names: str) -> None:
         for name in names:
-            self._buffer(name).bind_to_storage_buffer(Storage[name.upper()])
+            self._buffer(name).bind_to_storage_buffer(storage(name))
 
 
 @dataclass(frozen=True)

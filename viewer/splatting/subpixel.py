@@ -36,8 +36,7 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
     """
     pose, view = points.pose, surface.view
     nearest = float(view.depths(pose.whole_bounds.corners() - pose.origin).min())
-    usually_nearest = float(view.depths(pose.bounds.corners() - pose.origin).min())
-    if view.perspective and min(nearest, usually_nearest) <= view.near:
+    if view.perspective and nearest <= view.near:
         return 0.0
     usual = largest = splats.uniform_radius
     if points.use_radii:
@@ -48,10 +47,10 @@ def subpixel_share(points: Points, surface: Surface, splats: Splats) -> float:
             own = pose.reaches
         usual, largest = max(usual, own[0]), max(largest, own[1])
     pixels = splats.radius_scale * math.sqrt(splats.mask_limit) * points.enlarged * view.scale
-    if view.perspective:
-        usual, largest = usual / usually_nearest, largest / nearest
-    if largest * pixels > _LARGEST_RADIUS:
+    if (largest / nearest if view.perspective else largest) * pixels > _LARGEST_RADIUS:
         return 0.0
+    if view.perspective:  # the box of most points lies within that of all
+        usual /= float(view.depths(pose.bounds.corners() - pose.origin).min())
     return min(max(2 - usual * pixels / LEAST_RADIUS, 0.0), 1.0)
 
 

@@ -130,7 +130,9 @@ def calibrate(
     paper. radius: R, scan units; None: from `depth`. drawn: share of the points that are looked at.
     """
     coarse = sectors.divided(_COARSE)
-    sector_positions = coarse.sector_positions(strided(cloud.positions) + (cloud.origin - origin))
+    sample = strided(cloud.positions).T.astype(np.float64, order="C")
+    sample += (cloud.origin - origin)[:, None]
+    sector_positions = coarse.sector_positions(sample.T)
     has_point = np.zeros(coarse.count + 1, bool)
     has_point[np.minimum(coarse.sector_of(sector_positions), coarse.count)] = True  # the last one: in none
     share = max(int(np.count_nonzero(has_point[:-1])), 1) / coarse.count

@@ -142,30 +142,55 @@ class Sectors:
         return self.distance + self.unit * sector_positions[:, 2]
 
     def sector_positions(self, positions: NDArray[np.floating]) -> NDArray[np.float64]:
-        """Spots of positions on the GPU, (N, 3); NaN where there is none, behind the eye or at it."""
+        """Spots of positions on the GPU, (N, 3); NaN where there is none, behind the eye or at it.
+
+        Each picture of a turn asks for those of thousands of points: column by column, and in place, takes a
+        third of the time.
+        """
         columns = np.array(self.to_sectors)
-        offsets = positions.astype(np.float64) @ columns[:3, :3] + columns[3, :3]
+        offsets = columns[:3, :3].T @ positions.T.astype(np.float64, copy=False)
+        offsets += columns[3, :3, None]
+        if self.mapping == "cube":
+            return np.where((offsets != 0).any(axis=0), offsets, np.nan).T
+        forward, right, down = offsets
+        ahead = self.closeness * forward
+        ahead += 1
+        right_squared, down_squared = right * right, down * down
+        away = forward * forward
+        away += right_squared
+        away += down_squared
+        far = right_squared
+        far += down_squared
+        far *= self.closeness**2
+        far += ahead * ahead
+        np.sqrt(far, out=far)
+        # (closeness away + 2 forward) / (far + 1)
+        away *= self.closeness
+        forward *= 2
+        away += forward
+        far += 1
+        spots = np.empty_like(offsets)
         with np.errstate(invalid="ignore", divide="ignore"):
-            if self.mapping == "cube":
-                return np.where((offsets != 0).any(axis=1)[:, None], offsets, np.nan)
-            forward, right, down = np.ascontiguousarray(offsets.T)
-            ahead = 1 + self.closeness * forward
-            far = np.sqrt(ahead**2 + self.closeness**2 * (right**2 + down**2))
-            away = forward**2 + right**2 + down**2
-            sector_positions = np.empty((len(offsets), 3))
-            sector_positions[:, 0] = self.lateral * right / ahead
-            sector_positions[:, 1] = self.lateral * down / ahead
-            sector_positions[:, 2] = (self.closeness * away + 2 * forward) / (far + 1)
-            if not (ahead > 0).all():
-                sector_positions[~(ahead > 0)] = np.nan
-            return sector_positions
+            for spot, aside in zip(spots[:2], (right, down), strict=True):
+                np.multiply(self.lateral, aside, out=spot)
+                spot /= ahead
+            np.divide(away, far, out=spots[2])
+        if not (ahead > 0).all():
+            spots[:, ~(ahead > 0)] = np.nan
+        return spots.T
 
     def sector_of(self, sector_positions: NDArray[np.float64]) -> NDArray[np.uint32]:
         """The sectors that sector_positions are in, (N,); NOTHING where in none."""
         face, tangents = self._on_face(sector_positions)
         with np.errstate(invalid="ignore"):
-            angles = np.arctan(self.tangent * tangents) / self.tangent if self.tangent else tangents
-            at = np.floor((angles / self.half_angle + 1) * (self.edge / 2)).T
+            at = (self.tangent or 1.0) * tangents.T
+            if self.tangent:
+                np.arctan(at, out=at)
+                at /= self.tangent
+            at /= self.half_angle
+            at += 1
+            at *= self.edge / 2
+            np.floor(at, out=at)
             if self.mapping == "cube":
                 at = np.clip(at, 0, self.edge - 1)
             inside = (at >= 0) & (at < self.edge)
@@ -265,8 +290,9 @@ def _axes(forward: NDArray[np.float64]) -> NDArray[np.float64]:
     """Forward, right and down, (3, 3) rows: of the scan's axes the one most aside is down."""
     down = np.eye(3)[np.argmin(np.abs(forward))]
     down = down - (down @ forward) * forward
-    down /= np.linalg.norm(down)
-    return np.stack([forward, np.cross(down, forward), down])
+    down /= math.sqrt(down @ down)
+    (dx, dy, dz), (fx, fy, fz) = down.tolist(), forward.tolist()
+    return np.array([forward, (dy * fz - dz * fy, dz * fx - dx * fz, dx * fy - dy * fx), down])
 
 
 def _turned(face: NDArray[np.int64], ahead: NDArray[Any]) -> NDArray[Any]:

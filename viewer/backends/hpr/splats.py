@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
+from ...gpu.bindings import Texture, storage
 from ...gpu.constants import NO_DEPTH
 from ...gpu.context import Gpu, Program
 from ...gpu.pose import GpuPose
@@ -121,7 +121,7 @@ class SectorSplats:
             pose.cached(Spacings).texels.bind(Texture.SPACINGS)
             self["keys"].bind(Texture.KEYS)
             for name in ("splats", "looks", "spacings"):
-                self[name].buffer.bind_to_storage_buffer(Storage[name.upper()])
+                self[name].buffer.bind_to_storage_buffer(storage(name))
             gpu.dispatch(program, len(pose.cloud))
 
     def _reserve(self, count: int) -> tuple[CellSums, gl.BufferTexture]:

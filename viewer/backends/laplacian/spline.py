@@ -17,7 +17,7 @@ from moderngl import ComputeShader
 
 from ...errors import InputError
 from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
+from ...gpu.bindings import Storage, Texture, texture
 from ...gpu.context import Gpu, Program
 from ...gpu.pyramid import BINOMIAL, GAUSSIAN, Filter, sizes
 from ...gpu.scatter import FixedPoint
@@ -153,7 +153,7 @@ class _Spline:
                 self._source.bind()
                 surface.bind_textures()
                 for name in self._channels:
-                    surface.own(name).bind(Texture[f"OWN_{name.upper()}S"])
+                    surface.own(name).bind(texture(f"own_{name}s"))
                 pictures.views[turn].buffer.bind_to_storage_buffer(Storage.VIEW_PICTURE)
                 pictures.merged.buffer.bind_to_storage_buffer(Storage.MERGED)
                 pictures.winners.buffer.bind_to_storage_buffer(Storage.WINNERS)

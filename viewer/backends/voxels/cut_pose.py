@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ...bounds import Bounds
 from ...gpu import gl
-from ...gpu.bindings import Storage, Texture
+from ...gpu.bindings import Storage, Texture, storage
 from ...gpu.context import Gpu
 from ...gpu.pose import FORMATS, GpuPose
 from ...scan.octree import Octree
@@ -41,7 +41,7 @@ class CutArrays:
     def bind(self) -> None:
         """Bind for voxels/tree/gather.comp to write."""
         for name, texels in self.texels.items():
-            texels.buffer.bind_to_storage_buffer(Storage[f"CUT_{name.upper()}"])
+            texels.buffer.bind_to_storage_buffer(storage(f"cut_{name}"))
 
     def release(self) -> None:
         """Delete everything."""
