@@ -171,6 +171,7 @@ class Gpu:
         self._programs: dict[tuple[object, ...], Any] = {}
         self._discarded: deque[Resource] = deque()
         self._discarded_bytes = 0
+        gl.BufferTexture.binds_at_once &= ctx.version_code >= 450
         gl.reverse_depth()
 
     def compute(

@@ -39,7 +39,7 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
     GL_4_3,
     GL_4_4,
 )
-from OpenGL.raw.GL.VERSION import GL_4_5 as _clip  # noqa: E402
+from OpenGL.raw.GL.VERSION import GL_4_5 as _later  # noqa: E402
 
 from .bindings import Texture  # noqa: E402
 from .constants import NOTHING  # noqa: E402
@@ -119,12 +119,12 @@ def max_raster_edge() -> int:
 
 def reverse_depth() -> None:
     """Clip space as the project uses it: depth 0..1, row 0 of a picture at its top."""
-    _clip.glClipControl(_clip.GL_UPPER_LEFT, _clip.GL_ZERO_TO_ONE)
+    _later.glClipControl(_later.GL_UPPER_LEFT, _later.GL_ZERO_TO_ONE)
 
 
 def default_clip_space() -> None:
     """OpenGL's own clip space, which other libraries expect."""
-    _clip.glClipControl(_clip.GL_LOWER_LEFT, _clip.GL_NEGATIVE_ONE_TO_ONE)
+    _later.glClipControl(_later.GL_LOWER_LEFT, _later.GL_NEGATIVE_ONE_TO_ONE)
 
 
 @contextmanager
@@ -272,18 +272,30 @@ class Fence:
 
 
 class BufferTexture:
-    """A buffer seen as texels, for `texelFetch`: on software drivers twice as fast as an SSBO."""
+    """A buffer seen as texels, for `texelFetch`: on software drivers twice as fast as an SSBO.
+
+    binds_at_once: whether all contexts so far take a texture and its unit in one call, as OpenGL 4.5 does.
+    """
+
+    binds_at_once = True
 
     def __init__(self, buffer: moderngl.Buffer, texel_format: int) -> None:
         name = ctypes.c_uint(0)
         GL_1_1.glGenTextures(1, ctypes.byref(name))
         self.glo = name.value
         self.buffer = buffer
-        self.bind(Texture.SCRATCH)  # not over what a shader is about to read
+        self._bind_active(Texture.SCRATCH)  # not over what a shader is about to read
         GL_3_1.glTexBuffer(_TEXTURE_BUFFER, texel_format, buffer.glo)
 
     def bind(self, unit: int) -> None:
         """Bind to a texture unit."""
+        if BufferTexture.binds_at_once:
+            _later.glBindTextureUnit(unit, self.glo)
+        else:
+            self._bind_active(unit)
+
+    def _bind_active(self, unit: int) -> None:
+        """Bind to a texture unit, which is the active one then."""
         GL_1_3.glActiveTexture(GL_1_3.GL_TEXTURE0 + unit)
         GL_1_1.glBindTexture(_TEXTURE_BUFFER, self.glo)
 
