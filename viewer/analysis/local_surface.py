@@ -282,7 +282,7 @@ def _least(values: Float, count: int) -> NDArray[np.intp]:
 def _paraboloid_over(apart: Float, near: NDArray[np.intp], away: Float, normal: Float) -> _Patch:
     """The paraboloid of the points that are near, over the plane through the origin; of those on the lower
     side alone where they are of two. away: how far these and the next are, ascending."""
-    axes = np.vstack([np.linalg.svd(normal[None])[2][1:], normal])
+    axes = _axes_of(normal)
     framed = apart[near] @ axes.T
     flat, up = framed[:, :2], framed[:, 2]
     reach = max(float(away[-1]), _TINY)
@@ -295,6 +295,16 @@ def _paraboloid_over(apart: Float, near: NDArray[np.intp], away: Float, normal: 
     usual = _median(np.abs(off[np.isfinite(off)]))
     belongs = (np.abs(off) <= _CUT * usual) | ((usual <= 0) & np.isfinite(off))
     return _Patch(0.0, axes, near, flat, up, belongs, factors, _NORMAL * usual, reach)
+
+
+def _axes_of(normal: Float) -> Float:
+    """Two unit vectors across a unit vector (3,), and itself, (3, 3): rows of the reflection that moves the
+    first axis to it (Householder 1958)."""
+    x, y, z = normal.tolist()
+    sign, bent = math.copysign(1.0, x), 1 / (1 + abs(x))
+    one = [-sign * y, 1 - y * y * bent, -y * z * bent]
+    other = [-sign * z, -y * z * bent, 1 - z * z * bent]
+    return np.array([one, other, [x, y, z]])
 
 
 def _robust(flat: Float, up: Float, closeness: Float) -> tuple[Float, Float]:
@@ -328,7 +338,12 @@ def _solved(square: Float, sides: Float) -> Float:
 def _terms(flat: Float, *, is_bent: bool) -> Float:
     """1, x, y of places (n, 2), and xx, xy, yy of a bent surface, (n, 3 or 6)."""
     x, y = flat.T
-    return np.stack([np.ones_like(x), x, y, *([x * x, x * y, y * y] if is_bent else [])], axis=1)
+    terms = np.empty((len(flat), 6 if is_bent else 3))
+    terms[:, 0] = 1
+    terms[:, 1:3] = flat
+    if is_bent:
+        terms[:, 3], terms[:, 4], terms[:, 5] = x * x, x * y, y * y
+    return terms
 
 
 def _median(values: Float) -> float:

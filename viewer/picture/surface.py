@@ -137,7 +137,10 @@ class Surface(RenderTarget):
         ids, points = self.kind.points_along(ray, reach, self.view, partial(self._rows_around, x, y, beside))
         ahead = self.view.depths(points) > self.view.near
         ids, points = ids[ahead], points[ahead]
-        once = np.unique(points, axis=0, return_index=True)[1]
+        once = np.arange(len(points))
+        across = np.sort(points[:, 0])
+        if (across[1:] == across[:-1]).any():  # else no two are at one position
+            once = np.unique(points, axis=0, return_index=True)[1]
         once = once[np.argsort(ids[once])]
         return ids[once], points[once]
 
