@@ -147,3 +147,24 @@ def test_lists_that_are_too_long_are_passed_over_and_then_not_drawn(
     assert compared(look, waits, BALL, AROUND[0], surface) == [False, False, True]
     assert "too long" in surface.stats.skipped["tiles"]
     assert compared(look, waits, BALL, AROUND[0], surface) == [True]
+
+
+def test_fitted_splats_are_listed_without_a_wait(
+    renderer: Renderer, waits: list[bool], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same bits, once splats that hide others are smaller, too."""
+    monkeypatch.setattr(renderer.gpu, "software", False)
+    cloud = PointCloud.from_arrays(BALL.positions, origin=np.zeros(3))
+    pose, params = Pose(0, 0.0, "test", cloud), backend("auto_splats").params({"instancing": "tiles"})
+    surface = Surface(renderer.gpu, SIZE)
+    for number, camera in enumerate(AROUND):
+        waits.clear()
+        other = Surface(renderer.gpu, SIZE)
+        for each in (surface, other):
+            found = list(waits)
+            while render_frame(renderer, Request(pose, camera, "auto_splats", params), each):
+                pass
+        assert found
+        assert all(found) if number == 0 else not any(found)
+        assert_equal(surface, other)
+        np.testing.assert_array_equal(surface.image(), other.image())

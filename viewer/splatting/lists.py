@@ -33,6 +33,7 @@ _ROOM = 4  # entries of the list for each point, to begin with
 # over its list twice, with 73 turns for 64 entries; on hardware a pixel alone with so many would be slow.
 _LONGEST = 28_000
 _SPARE = 4  # times the points that there is room for, beyond which room is given up
+_MORE = 8  # part of the points that there is room for beside them
 _WORK_HEAD = 16  # bytes before the tiles that discs reach, and before those that are shown again
 ALL, TOWARDS, AWAY, NOT_HIDDEN = range(4)  # which discs are listed: SIDE of cells.glsl
 
@@ -120,7 +121,7 @@ class TileLists:
         gpu, second, both, sends = self._gpu, side == AWAY, purpose.both, purpose.sends
         bins = self._away_bins if second else self._bins
         if not second:
-            self._reserve(max(points.count, 1))
+            self._reserve(points)
             self._rows = points.rows
             self._gpu.clear(self._buffer("filled"), 0)
         self._has_second, self._both = second, both
@@ -300,11 +301,13 @@ class TileLists:
         """The farthest depth shown in each tile, a word each: what FARTHEST of show.comp writes."""
         return self._buffer("farthest")
 
-    def _reserve(self, count: int) -> None:
-        """Make room for so many points, and give up what a much larger pose has left."""
-        if self._has_room(count):
+    def _reserve(self, points: Points) -> None:
+        """Make room for points, and for some more of the same pose, which the next picture may show; give up
+        what a much larger pose has left."""
+        if self._has_room(points.count):
             return
-        self._room = count
+        most = min(len(points.pose.cloud), self._gpu.max_storage_bytes // DISC_BYTES)
+        self._room = count = max(min(points.count + points.count // _MORE, most), points.count, 1)
         self._replace("centers", DISC_BYTES * count, gl.RGBA32F)
         self._replace("forms", DISC_BYTES * count, gl.RGBA32F)
         self._replace("disc_looks", DISC_BYTES * count, gl.RGBA32UI)

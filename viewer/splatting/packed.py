@@ -21,7 +21,7 @@ from .lists import TileLists
 from .local import NEAREST_ALONE, Layer, begin_local, settle_depths
 from .passes import blend, blend_by_tiles
 from .splats import FRAGMENT, SURFEL, Splats
-from .tiles import FALLBACK, show_all, show_smaller, show_with, tile_lists
+from .tiles import FALLBACK, show_all, show_smaller, show_with, tile_lists, without_wait
 
 VARIANTS = ("tiles", "tbo", "pull")  # how packed points become splats
 _SLACK = 0.5  # radii of what a pixel shows, behind which a point is hidden by it
@@ -74,11 +74,13 @@ def _splats(radius_scale: float, epsilon: float) -> Splats:
 
 
 def _draw(points: Points, surface: Surface, splats: Splats, variant: str, two: bool, refine: bool) -> None:
-    lists = None
-    if variant == "tiles":
+    def draw() -> bool:
         lists = tile_lists(points, surface, splats, looks=two, numbered=refine)
-    if lists is not None:
-        _draw_by_tiles(points, surface, lists, splats, two, refine)
+        if lists is not None:
+            _draw_by_tiles(points, surface, lists, splats, two, refine)
+        return lists is not None
+
+    if variant == "tiles" and without_wait(points, surface, draw):
         settle_depths(surface, splats)
         return
     feed = FALLBACK if variant == "tiles" else variant

@@ -33,7 +33,8 @@ FALLBACK = "gs"  # what feeds the rasteriser where tiles do not do
 
 
 def without_wait(points: Points, surface: Surface, draw: Callable[[], bool]) -> bool:
-    """Return what `draw` does, which fills the surface's lists once, and once more with what faces away.
+    """Return what `draw` does, which fills the surface's lists once, and perhaps once more with what faces
+    away.
 
     Where the lists of the last picture allow it, the CPU does not wait for the new ones. It reads what they
     counted when all is drawn, and draws anew, with waits, where that was not as expected.
