@@ -110,10 +110,11 @@ def estimate_normals(
     alone = UNKNOWN if search.expansions is None else 2.0**search.expansions
     rules = Search(search.k, search.hidden_neighbors, False, search.growth, alone, adaptive=search.adaptive)
     found.find(resident, surface, view, rules)
-    return _read(resident.cloud, found)
+    return read_normals(resident.cloud, found)
 
 
-def _read(cloud: PointCloud, found: Neighborhoods) -> VisibleNormals:
+def read_normals(cloud: PointCloud, found: Neighborhoods) -> VisibleNormals:
+    """The normals that a search has found, or those of the splats after `auto_splats` drew them."""
     rows = found.read("drawn", np.uint32, 1)[: found.count, 0]
     order = np.argsort(rows)
     rows = rows[order]

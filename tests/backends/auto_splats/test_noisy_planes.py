@@ -14,7 +14,7 @@ from scenes import rarely_together, sphere
 from scipy.spatial import cKDTree
 
 import viewer
-from viewer.analysis.visible_normals import NormalSearch, VisibleNormals
+from viewer.analysis.visible_normals import NormalSearch, VisibleNormals, read_normals
 from viewer.backends import backend
 from viewer.backends.auto_splats import search_of
 from viewer.backends.auto_splats.neighborhoods import Neighborhoods
@@ -54,10 +54,8 @@ def camera_of(cloud: PointCloud) -> Camera:
 
 def drawn(draw: Callable[..., Surface], cloud: PointCloud, **params: Any) -> VisibleNormals:
     """The normals of the splats of a picture."""
-    from viewer.analysis import visible_normals
-
     surface = draw(cloud, camera_of(cloud), SIZE, NAME, params={"cull": False, **params})
-    return visible_normals._read(cloud, surface.cached(Neighborhoods))
+    return read_normals(cloud, surface.cached(Neighborhoods))
 
 
 def errors(normals: NDArray[np.floating], true: NDArray[np.floating]) -> NDArray[np.float64]:
@@ -89,6 +87,28 @@ def test_normals_are_about_as_right_as_those_of_the_whole_cloud(
     of_cloud = errors(cloud_normals(cloud)[rows], true[rows])
     assert np.nanmean(of_splats) < WORST * np.nanmean(of_cloud)
     assert np.nanquantile(of_splats, 0.95) < WORST * np.nanquantile(of_cloud, 0.95)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["bunny", "armadillo"])
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.2, 0.3, 0.5, 1.0])
+def test_normals_are_about_as_right_as_with_the_best_number_of_neighbors(
+    draw: Callable[..., Surface], data_dir: Path, name: str, noise: float
+) -> None:
+    moment = catalog.subject(name, data_dir).moment(0)
+    even = moment.pose.cloud
+    cloud, true = bare(even, noise), even.normals
+    assert true is not None
+
+    def median(found: VisibleNormals) -> float:
+        seen = visible(moment.mesh, even.positions[found.rows], camera_of(cloud), typical_spacing(even))
+        return float(np.nanmedian(errors(found.normals[seen], true[found.rows[seen]])))
+
+    fixed = [
+        median(viewer.estimate_normals(cloud, camera_of(cloud), size=SIZE, search=NormalSearch(k, False)))
+        for k in (6, 10, 16, 24, 32)
+    ]
+    assert median(drawn(draw, cloud)) < 1.1 * min(fixed)
 
 
 @pytest.mark.parametrize("noise", [0.3, 0.5])

@@ -7,8 +7,9 @@ points.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ _ELEVATION = 10.0
 _STEP = 4.0  # median distances between neighbours by which depth steps at a silhouette
 
 Angles = NDArray[np.float64]
+Finder = Callable[[Pose, Camera, tuple[int, int]], VisibleNormals]
 
 
 @dataclass
@@ -86,34 +88,40 @@ def fitted(noise: float) -> list[dict[str, Any]]:
     return [*fixed, *alone, {"k": ks[-1], "hidden_neighbors": True, "adaptive": True}]
 
 
-def fit_errors(cloud: PointCloud, mesh: Mesh, settings: BenchSettings, params: dict[str, Any]) -> Row:
+def fit_errors(
+    cloud: PointCloud, mesh: Mesh, settings: BenchSettings, params: dict[str, Any], find: Finder | None = None
+) -> Row:
     """Angles between the normals found and the cloud's own, from evenly spread directions.
 
     cloud: points on the mesh with true normals, which are not looked at. A point counts where nothing of the
-    mesh hides it. `found_inside`, `found_band`: {median, p95}, degrees; `open3d_...`: of as many neighbours
-    among the same participants. `turned`, `grown`: the median change of a point's normal, degrees, and of
-    its radius, as a share, from one view to another 2 degrees aside.
+    mesh hides it. find: finds the normals; None: `estimate_normals` with these params. `found_inside`,
+    `found_band`: {median, p95}, degrees; `open3d_...`: of as many neighbours among the same participants.
+    `turned`, `grown`: the median change of a point's normal, degrees, and of its radius, as a share, from one
+    view to another 2 degrees aside.
     """
     assert cloud.normals is not None
     pose, pooled = Pose(0, 0.0, "bare", bare(cloud)), _Pooled()
     tolerance = max(_STEP * typical_spacing(cloud), 1e-4 * mesh.bounds.radius)
     views, size = settings.views, settings.size
+    find = find or partial(_estimated, NormalSearch(**params))
     for number in range(views):
         camera = Camera.orbit(mesh.bounds, 360 * number / views, _ELEVATION, aspect=size[0] / size[1])
-        found = estimate_normals(pose, camera, size=size, search=NormalSearch(**params))
+        found = find(pose, camera, size)
         seen = visible(mesh, cloud.positions[found.rows], camera, 0.25 * tolerance)
         rows = found.rows[seen]
         reference = trace(mesh, camera, size)
         pooled.found.append(_off(found.normals[seen], cloud.normals[rows]))
         pooled.reference.append(_off(_open3d(cloud, found, params["k"])[seen], cloud.normals[rows]))
         pooled.in_band.append(at_silhouettes(reference, cloud, rows, tolerance))
-        aside = estimate_normals(
-            pose, camera.orbited(ORBIT_STEP, 0), size=size, search=NormalSearch(**params)
-        )
+        aside = find(pose, camera.orbited(ORBIT_STEP, 0), size)
         turned, grown = changes(found, aside)
         pooled.turned.append(turned)
         pooled.grown.append(grown)
     return pooled.numbers()
+
+
+def _estimated(search: NormalSearch, pose: Pose, camera: Camera, size: tuple[int, int]) -> VisibleNormals:
+    return estimate_normals(pose, camera, size=size, search=search)
 
 
 def bare(cloud: PointCloud) -> PointCloud:

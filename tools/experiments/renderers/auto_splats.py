@@ -12,9 +12,13 @@ from experiments.preiner_2012.fits import fit_errors, noisy
 from experiments.script import Script
 from experiments.tables import Row, spaced
 from experiments.timing import CORES, by_turns
+from viewer.analysis.visible_normals import VisibleNormals, read_normals
+from viewer.backends.auto_splats.neighborhoods import Neighborhoods
 from viewer.bench.run import BenchSettings
 from viewer.bench.scenes.viewpoints import viewpoints
+from viewer.camera import Camera
 from viewer.picture.surface import Surface
+from viewer.scan.pose import Pose
 
 BACKEND = "auto_splats"
 VIEWS, SIZE = 2, (880, 450)
@@ -22,17 +26,29 @@ ROUNDS = 3
 
 
 def normals(_: Namespace) -> Iterator[Row]:
-    """Angles to the true normals by numbers of neighbours, of one model with and without noise."""
+    """Angles to the true normals by numbers of neighbours, and of pictures, of two models with noise."""
     settings = BenchSettings(size=SIZE, views=1)
-    counts = {f"k = {k}": {"k": k, "adaptive": False} for k in (6, 10, 32)}
+    counts = {f"k = {k}": {"k": k, "adaptive": False} for k in (6, 10, 16, 24, 32)}
     counts |= {f"adaptive, {k}": {"k": k, "adaptive": True} for k in (10, 32)}
-    moment = scene("armadillo").moment(0)
-    for noise in (0.0, 0.1, 0.3, 0.6):
-        cloud, row = noisy(moment.pose.cloud, noise, 0), {"noise": str(noise)}
-        for name, params in counts.items():
-            inside = fit_errors(cloud, moment.mesh, settings, params)["found_inside"]
-            row[name] = f"{inside['median']:.1f}, {inside['p95']:.0f}"
-        yield row
+    for name in ("bunny", "armadillo"):
+        moment = scene(name).moment(0)
+        for noise in (0.0, 0.1, 0.2, 0.3, 0.5, 1.0):
+            cloud, row = noisy(moment.pose.cloud, noise, 0), {"scene": f"`{name}`", "noise": str(noise)}
+            found = {
+                column: fit_errors(cloud, moment.mesh, settings, params) for column, params in counts.items()
+            }
+            found["picture"] = fit_errors(cloud, moment.mesh, settings, {"k": 10}, find=of_picture)
+            for column, errors in found.items():
+                inside = errors["found_inside"]
+                row[column] = f"{inside['median']:.1f}, {inside['p95']:.0f}"
+            yield row
+
+
+def of_picture(pose: Pose, camera: Camera, size: tuple[int, int]) -> VisibleNormals:
+    """The normals of the splats of a picture with the default parameters, but of all points that it shows."""
+    surface = Surface(renderer().gpu, size)
+    draw(request(pose, camera, BACKEND, {"cull": False}), surface)
+    return read_normals(renderer().resident(pose).cloud, surface.cached(Neighborhoods))
 
 
 def uneven(_: Namespace) -> Iterator[Row]:
