@@ -78,7 +78,10 @@ FITTED = [
     a_fit("bunny", 0.0, 2.5, hidden_neighbors=False),
     a_fit("bunny", 0.5, 9.0),
 ]
-MADE = preiner.EXPERIMENT.digest({"rows": DRAWN, "searches": SEARCHED, "fits": FITTED})
+ITERATED = [{"scene": "bunny", "n": 40_000, "left": [30_000, 600, 30, 3], **WHERE}]
+MADE = preiner.EXPERIMENT.digest(
+    {"rows": DRAWN, "searches": SEARCHED, "iterations": ITERATED, "fits": FITTED}
+)
 
 
 def page(runs: list[StoredRun]) -> str:
@@ -112,10 +115,10 @@ def test_lists_before_a_pass_are_of_its_stage() -> None:
 
 
 def test_rounds_are_shares_of_the_first() -> None:
-    (line,) = (
-        line for line in cells(page([MADE]), "`bunny`, 40\N{NARROW NO-BREAK SPACE}000") if len(line) == 4
-    )
-    assert line[1:] == ["100", "25.0", "0.500"]
+    text, title = page([MADE]), "`bunny`, 40\N{NARROW NO-BREAK SPACE}000"
+    rounds, iterations = (next(line for line in cells(text, title) if len(line) == count) for count in (4, 5))
+    assert rounds[1:] == ["100", "25.0", "0.500"]
+    assert iterations[1:] == ["100", "2.00", "0.100", "0.0100"]
 
 
 def test_fits_with_and_without_hidden_neighbours() -> None:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from experiments.papers import figures
+from experiments.preiner_2012.bracketing import measure_iterations
 from experiments.preiner_2012.fits import measure_fits
 from experiments.preiner_2012.searches import BACKEND, SEARCH, STAGES, K, measure_searches
 from experiments.suite import Part, Suite, pictures
@@ -38,6 +39,7 @@ _PAPER = {"surface": "nearest"}  # the paper shows the nearest splat, and blends
 DEEP = "horses"  # its depth complexity is 5 to 6
 _MODELS = ("bunny", "armadillo", "igea", "dragon")  # Fig. 6
 _TWO_SCALES = "two-bunnies"  # Fig. 7
+_ITERATIONS = 12  # of the paper's search that the page shows
 _CHUNK = 1 << 18  # points whose planes are fitted at a time
 _FRAMES = {"first": "first", "later": "camera moved", "still": "nothing changed"}
 _ERRORS = {
@@ -145,8 +147,18 @@ def _rounds(runs: Sequence[StoredRun]) -> Iterator[Row]:
     """Fig. 11: percent of the points whose neighbourhood is unknown before each round."""
     for row in (row for each in runs[:1] for row in each["searches"] if row["rounds"]):
         if row["params"]["k"] == K and not row["params"]["cull"]:
-            left = [100 * count / row["rounds"][0] for count in row["rounds"]]
-            yield {"scene": _title(row), "left": {str(n + 1): share for n, share in enumerate(left)}}
+            yield {"scene": _title(row), "left": _shares(row["rounds"])}
+
+
+def _iterations(runs: Sequence[StoredRun]) -> Iterator[Row]:
+    """Fig. 11: percent of the visible points that are not converged before each iteration of the paper."""
+    for row in (row for each in runs[:1] for row in each["iterations"]):
+        yield {"scene": _title(row), "left": _shares(row["left"][:_ITERATIONS])}
+
+
+def _shares(left: Sequence[int]) -> dict[str, float]:
+    """Percent of the points that are left before each round, by its number."""
+    return {str(number): 100 * count / left[0] for number, count in enumerate(left, 1)}
 
 
 def _round_columns(rows: Sequence[Row]) -> list[Column]:
@@ -211,6 +223,7 @@ EXPERIMENT = Suite(
             ("scene", "paper", "n", "visible", "participants", "params", "rounds", "trees", *_FRAMES),
             measure_searches,
         ),
+        "iterations": Part(("scene", "n", "left"), measure_iterations),
         "fits": Part(
             ("scene", "noise", "params", "views", "points", "band_points", "found_inside", "found_band",
              "open3d_inside", "open3d_band", "turned", "grown"),
@@ -246,6 +259,7 @@ EXPERIMENT = Suite(
             _by_stage,
         ),
         Table("rounds", _round_columns, _rounds),
+        Table("iterations", _round_columns, _iterations),
         Table(
             "fits",
             [
