@@ -58,7 +58,11 @@ def initial_radii(view: View, points: Floats, k: int) -> Floats:
 def counts_by_tree(points: Floats) -> Counter:
     """Count points within radii by a k-d tree."""
     tree = cKDTree(points)
-    return lambda rows, radii: tree.query_ball_point(points[rows], radii, return_length=True)
+
+    def count(rows: NDArray[np.intp], radii: Floats) -> NDArray[np.intp]:
+        return np.asarray(tree.query_ball_point(points[rows], radii, return_length=True), np.intp)
+
+    return count
 
 
 def counts_by_splats(view: View, points: Floats) -> Counter:
@@ -84,11 +88,11 @@ def counts_by_splats(view: View, points: Floats) -> Counter:
         asked = np.full(len(points), -np.inf)
         asked[rows] = radii
         feedback = np.zeros(len(points))
-        for number in rows:
+        for number in rows.tolist():
             near = reached(number, asked[number])
             feedback[near] = np.maximum(feedback[near], asked[number])
         counts = np.zeros(len(points), np.intp)
-        for number in np.flatnonzero(feedback):
+        for number in np.flatnonzero(feedback).tolist():
             near = reached(number, feedback[number])
             away = np.linalg.norm(points[near] - points[number], axis=1)
             counts[near[away <= asked[near]]] += 1
@@ -151,8 +155,8 @@ def measure_iterations(bench: Bench) -> Iterator[Row]:
         cloud = moment.pose.cloud
         camera = Camera.orbit(moment.mesh.bounds, 0, 10, aspect=size[0] / size[1])
         search = NormalSearch(K, adaptive=False, hidden_neighbors=False)
-        points = cloud.positions[estimate_normals(cloud, camera, size=size, search=search).rows]
-        points = points.astype(np.float64)
+        rows = estimate_normals(cloud, camera, size=size, search=search).rows
+        points: Floats = cloud.positions[rows].astype(np.float64)
         view = View.of(camera, size, cloud.origin, cloud.bounds())
         found = bracketed(initial_radii(view, points, K), K, counts_by_tree(points))
         yield row_of(bench, scene=scene, n=len(cloud), left=found.left)
