@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..geometry import up_vector
 from ..gpu import gl
 from ..gpu.pose import GpuPose
-from ..look import Look, ValueKind, value_source
+from ..look import COLOR_BY, Look, ValueKind, value_source
 from ..scan.layers import Layers
 from ..scan.ranges import scalar_range
 from ..view import View
@@ -64,7 +64,10 @@ class Coloring:
     def value_source(self) -> str | None:
         """Source of the number that the look colours by ("depth", "height", a scalar's name, one of `finds`),
         else None."""
-        return value_source(self.look, self.layers.names(self.kind.pose.overview.scalars), self.finds)
+        # A picture asks a dozen times, mostly in looks that need no names.
+        is_usual = self.look.color_by in COLOR_BY
+        names = () if is_usual else self.layers.names(self.kind.pose.overview.scalars)
+        return value_source(self.look, names, self.finds)
 
     @property
     def values_key(self) -> tuple[object, ...]:

@@ -22,7 +22,6 @@ from ..look import (
     color_table,
     light_direction,
     rgba,
-    value_source,
 )
 from ..rigid import Rigid
 from ..scan.ranges import robust_range
@@ -33,6 +32,7 @@ _COLOR_CODES = {"plain": 0, "own": 1, "normal": 2, "value": 3, "id": 4}
 _VALUE_CODES = {"depth": 0, "height": 1, "scalar": 2}
 _MOST = float(np.finfo(np.float32).max)
 _LIGHT_CODES = {"flat": 0, "head": 1, "fixed": 2}
+_OWN = {name: f"OWN_{name.upper()}" for name in ("color", "normal", "value")}
 _CHANNEL_TEXTURES = {"color": Texture.COLORS, "normal": Texture.NORMALS}
 
 
@@ -97,7 +97,7 @@ def shade(surface: Surface, look: Look) -> None:
 
 def _recipe(surface: Surface, look: Look) -> _Recipe:
     """Resolve a look for a surface, and note the range of its colour map there."""
-    source = value_source(look, surface.layers.names(surface.pose.overview.scalars), surface.finds)
+    source = surface.value_source
     value = source if source in (None, "depth", "height") else "scalar"
     if value == "height" and not surface.kind.has_positions:
         value = "scalar"
@@ -151,7 +151,7 @@ def _defines(surface: Surface, recipe: _Recipe) -> dict[str, object]:
         **surface.kind.defines(_fetches(surface, recipe)),
         "LEVEL_COLORS": len(LEVEL_COLORS) if recipe.by_level else 0,
         "OWN_LEVEL": int(recipe.by_level and surface.is_own("level")),
-        **{f"OWN_{name.upper()}": int(surface.is_own(name)) for name in ("color", "normal", "value")},
+        **{define: int(surface.is_own(name)) for name, define in _OWN.items()},
     }
 
 
