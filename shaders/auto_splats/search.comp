@@ -71,7 +71,7 @@ void main() {
     uint n = again ? list[i] : first + i;
 #else
     uint i = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
-    if (i >= list_count) return;
+    if (i >= list_count / uint(GROUP)) return;  // which counts GROUP for each
     uint n = list[i];
 #endif
     uvec4 slot = texelFetch(slots, int(texelFetch(listed, int(n)).r));

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,16 +23,17 @@ from scenes import rarely
 
 import viewer
 from viewer.analysis.visible_normals import NormalSearch, VisibleNormals
+from viewer.backends.auto_splats.neighborhoods import Neighborhoods, Search
 from viewer.bench.metrics import angles_between
 from viewer.bench.scenes import catalog
 from viewer.camera import Camera
+from viewer.drawing.renderer import Renderer
 from viewer.errors import InputError
+from viewer.picture.surface import Surface
 from viewer.scan.open import open_scan
 from viewer.scan.points import NOTHING, PointCloud
 from viewer.scan.pose import Pose
-
-if TYPE_CHECKING:
-    from viewer.picture.surface import Surface
+from viewer.view import View
 
 pytestmark = pytest.mark.backend("auto_splats")
 
@@ -163,6 +164,27 @@ def test_splats_reach_as_far_as_cells(name: str) -> None:
     as_expected = np.isclose(found.splat_radii[clear], expected, rtol=0.01)
     assert (as_expected | (found.splat_radii[clear] < expected)).all()  # smaller where points are sparse
     assert np.count_nonzero(as_expected) >= 0.8 * len(expected) or name == "strays"
+
+
+def test_what_a_longer_list_has_left_is_not_searched(renderer: Renderer) -> None:
+    """Work groups are in rows, so that there are more of them than points to be searched together."""
+    scene, size = SCENES["two-scales"](), (640, 480)
+    resident, surface = renderer.resident(pose_of(scene)), Surface(renderer.gpu, size)
+    view = View.of(scene.camera, size, resident.origin, resident.bounds)
+    surface.start(resident, view)
+    found = surface.cached(Neighborhoods)
+
+    def splats() -> NDArray[np.uint32]:
+        found.find(resident, surface, view, Search(K))
+        found["extents"].buffer.clear()  # so that the next search begins alike
+        return found.read("splats", np.uint32, 3)
+
+    expected = splats()
+    together, rows = found.read_rounds()["more"], found._rest._rows
+    assert together % rows > 0
+    found._rest.texels.buffer.clear(chunk=np.uint32(found.count).tobytes())
+    found._searched.texels.buffer.clear(chunk=np.uint32(found.participants).tobytes())
+    np.testing.assert_array_equal(splats(), expected)
 
 
 @pytest.mark.slow
