@@ -40,7 +40,7 @@ uint bits_of(ivec4 parts, ivec2 tile, vec2 center, vec3 key, vec3 form) {
 #endif
 
 void scatter(uint at) {
-    if (at >= disc_count) return;
+    if (at >= disc_count()) return;
     uint disc = first_disc + at, i = texelFetch(listed, int(first_home + at)).r;
     Point point = texel_point(drawn_row(int(i)));
     begin_disc(point);

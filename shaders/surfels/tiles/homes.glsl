@@ -9,7 +9,7 @@ layout(std430, binding = STORAGE_NUMBERS) writeonly buffer Numbers { uint number
 #endif
 
 void scatter(uint at) {
-    if (at >= disc_count) return;
+    if (at >= disc_count()) return;
     uint i = texelFetch(noted, int(at)).r;
     ivec4 parts = unpacked_parts(texelFetch(reach, int(i)).xy);
     uint disc = first_disc + visit(home_of(tiles_of(parts).xy), 0u, i) - first_home;
