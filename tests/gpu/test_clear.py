@@ -61,9 +61,7 @@ def test_depths_rows_and_picture_are_filled_at_once(
         fill(*fills)
 
     monkeypatch.setattr(renderer.gpu, "fill", noted)
-    monkeypatch.setattr(
-        renderer.gpu, "wide_atomics", False
-    )  # which clear neither depths nor rows
+    monkeypatch.setattr(renderer.gpu, "wide_atomics", False)  # which clear neither depths nor rows
     points = np.random.default_rng(0).normal(size=(3000, 3))
     pose = Pose(0, 0.0, "some", PointCloud.from_arrays(points))
     pixels = {surface.depths.buffer, surface.rows.buffer, surface.picture}
