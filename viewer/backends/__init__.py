@@ -61,6 +61,10 @@ class Limit:
 
 
 # Reasons of limits that several backends have.
+AT_EDGES = (
+    "each pixel takes its values from one cell or splat; at the edge between two, or at the end of one, "
+    "rounding decides which that is"
+)
 AROUND_ALL = (
     "octants divide the upright cube around all points, and sectors divide all directions to points: "
     "adding or turning points changes both"

@@ -13,12 +13,7 @@ from ..projection.filled import draw_filled, foresee_filled
 from ..projection.settings import ProjectionParams
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
-from . import NO_SPACING, Backend, FrameView, Limit, Suited
-
-_BY_CELLS = (
-    "each pixel takes its values from one cell; at the edge between two cells, rounding decides which "
-    "cell that is"
-)
+from . import AT_EDGES, NO_SPACING, Backend, FrameView, Limit, Suited
 
 
 class Pyramidal(Backend):
@@ -31,8 +26,8 @@ class Pyramidal(Backend):
     draws_with = ("colors", "normals")
     fills = True
     limits = {
-        "the eye inside the scan": Limit(0.01, _BY_CELLS),
-        "coplanar points": Limit(0.008, _BY_CELLS),
+        "the eye inside the scan": Limit(0.01, AT_EDGES),
+        "coplanar points": Limit(0.008, AT_EDGES),
         "collinear points, viewed along their line, perspective": Limit(0.08, NO_SPACING),
         "collinear points, viewed along their line, orthographic": Limit(0.08, NO_SPACING),
     }

@@ -32,7 +32,7 @@ from ..splatting.splat_culling import draw_unhidden, may_cull
 from ..splatting.splats import FRAGMENT, SURFEL, Splats
 from ..splatting.subpixel import average, splat_subpixel, subpixel_share
 from ..splatting.tiles import FALLBACK, most_listed, splat
-from . import Backend, FrameView, Limit, Suited, share_param, with_levels
+from . import AT_EDGES, Backend, FrameView, Limit, Suited, share_param, with_levels
 
 _SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
@@ -139,7 +139,10 @@ class Surfels(Backend):
         "each point 1000 times in a row": Limit(0.5, _SEEN_THROUGH, _SORTED),
         "the list of points 1000 times": Limit(0.5, _SEEN_THROUGH, _SORTED),
         "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
-        "each point 1000 times, without radii": Limit(0.56, _SEEN_THROUGH, _SORTED),
+        "each point 1000 times, without radii": (
+            Limit(0.56, _SEEN_THROUGH, _SORTED),
+            Limit(0.002, AT_EDGES, {"passes": _TWO}),  # lists of tiles have no room: these are rasterised
+        ),
         "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),

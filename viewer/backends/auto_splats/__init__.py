@@ -147,7 +147,7 @@ class AutoSplats(Backend):
     finds_normals = True
     values = VALUES
     limits = {
-        "a body, each point 1000 times": Limit(0.012, _HIDDEN_COPIES),
+        "a body, each point 1000 times": Limit(0.014, _HIDDEN_COPIES),
         "collinear points, viewed along their line, perspective": Limit(0.001, NO_SPACING),
         "collinear points, viewed along their line, orthographic": Limit(0.001, NO_SPACING),
     }
