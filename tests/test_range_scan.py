@@ -127,7 +127,7 @@ def test_a_window_has_points_merged_by_a_worker(scan: Path, renderer: Renderer) 
     assert pose.is_merged
     assert isinstance(make_plan(own, request, (64, 48), Effort.NONE), Ready)
     assert own.resident(pose).stored is pose.cloud
-    assert own.bytes_of(pose) == 12 * len(pose.cloud)
+    assert own.bytes_of(pose) == (12 + 4) * len(pose.cloud), "positions and colours"
     own.release()
 
 
