@@ -167,6 +167,10 @@ SETTINGS: list[tuple[str, dict[str, object]]] = [
     ("room", {"radius": "own"}),
     ("room", {"passes": "one", "cull_back": True}),
 ]
+QUICK = (SETTINGS[1], SETTINGS[-1])
+PICTURES = [
+    pytest.param(*setting, marks=[] if setting in QUICK else [pytest.mark.slow]) for setting in SETTINGS
+]
 SCENES = {
     "shells": shells,
     "dense": lambda order: shells(order, count=MANY),
@@ -176,9 +180,8 @@ SCENES = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("order", ["bands", "chance"])
-@pytest.mark.parametrize(("scene", "params"), SETTINGS, ids=str)
+@pytest.mark.parametrize(("scene", "params"), PICTURES, ids=str)
 def test_pictures_are_the_same_to_the_bit(
     renderer: Renderer, scene: str, params: dict[str, object], order: str
 ) -> None:

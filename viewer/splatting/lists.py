@@ -320,7 +320,7 @@ class TileLists:
 
     def _has_room(self, count: int) -> bool:
         """Whether there is room for so many points, and not much more."""
-        return count <= self._room <= _SPARE * max(count, 1)
+        return max(count, 1) <= self._room <= _SPARE * max(count, 1)
 
     def _replace(self, name: str, nbytes: int, texel_format: int) -> None:
         self._gpu.discard(self._textures.pop(name, None))
