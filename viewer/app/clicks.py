@@ -17,10 +17,9 @@ from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
 from .scene.viewport import Viewport
 
-_HINTS = {
-    "filled": "Zoom in, or tick 'Allow clicks on filled holes'.",
-    "doubtful": "Click here again to use it anyway, or turn the view to see the surface from its front.",
-}
+_FILLED = "Click beside the hole, or zoom in and click at a point."
+_MAY_FILL = "Zoom in, or tick 'Allow clicks on filled holes'."
+_DOUBTFUL = "Click here again to use it anyway, or turn the view to see the surface from its front."
 _SAME = 3.0  # pixels, within which two clicks are in one place
 
 
@@ -43,18 +42,20 @@ class Click:
     pixel: tuple[int, int] = (0, 0)
     is_again: bool = False
 
-    def surface_point(self, *, filled: bool = False) -> SurfacePoint:
-        """The surface point that was clicked. filled: as of `SurfacePoint.of`. Raises InputError where
-        nothing is seen, and where it may not be taken."""
+    def surface_point(self, *, filled: bool | None = None) -> SurfacePoint:
+        """The surface point that was clicked. filled: as of `SurfacePoint.of`; None where the user has no
+        choice. Raises InputError where nothing is seen, and where it may not be taken."""
         if self.picked is None:
             raise InputError("No surface here: click on the scan.")
         try:
             return SurfacePoint.of(
-                self.picked, self.pose, filled=filled, doubtful=self.is_again, place=self.motion
+                self.picked, self.pose, filled=bool(filled), doubtful=self.is_again, place=self.motion
             )
         except UncertainPosition as error:
             what = f"{error.what[:1].upper()}{error.what[1:]}"
-            raise InputError(what, hint=_HINTS[error.accepted_by]) from None
+            in_hole = _FILLED if filled is None else _MAY_FILL
+            hint = _DOUBTFUL if error.accepted_by == "doubtful" else in_hole
+            raise InputError(what, hint=hint) from None
 
 
 class Clicks:

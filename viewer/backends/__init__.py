@@ -131,9 +131,7 @@ class Backend(ABC):
     rows: str = "points"  # what a row of its pictures stands for: one of `ROWS`
     blends: bool = False  # a pixel may show several points
     fills: bool = False  # it may fill pixels that no point gave
-    draws_with: tuple[
-        str, ...
-    ] = ()  # names of arrays that it reads beside its needs, where the pose has them
+    draws_with: tuple[str, ...] = ()  # arrays that it reads beside its needs, where the pose has them
     finds_normals: bool = False  # it writes its own normals, so looks need none of the pose
     takes_parts: bool = False  # it draws poses in runs of points that a driver takes, see `GpuPose.parts`
     accumulates: bool = False  # moving pictures of a share of the points continue the one before

@@ -12,7 +12,8 @@ others that some tile they reach lets through, going by the farthest depth it sh
 that leaves the outline alone. A second pass goes over both lists.
 
 The CPU reads how long the lists are, to size them, and whether any splat is large. It waits for that after
-each counting. On graphics cards, once a picture was as usual, it reads all numbers when the next is drawn.
+each counting. On graphics cards, once a picture was as usual, it reads all numbers at the end of the next
+picture, see `without_wait`.
 """
 
 from __future__ import annotations

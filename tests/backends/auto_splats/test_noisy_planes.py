@@ -58,6 +58,21 @@ def drawn(draw: Callable[..., Surface], cloud: PointCloud, **params: Any) -> Vis
     return read_normals(cloud, surface.cached(Neighborhoods))
 
 
+def subject(
+    data_dir: Path, name: str, noise: float
+) -> tuple[PointCloud, NDArray[np.floating], Callable[[VisibleNormals], NDArray[np.bool_]]]:
+    """A bare cloud with noise, its true normals, and a function that tells which splats are truly seen."""
+    moment = catalog.subject(name, data_dir).moment(0)
+    even = moment.pose.cloud
+    assert even.normals is not None
+    camera, spacing = camera_of(bare(even, noise)), typical_spacing(even)
+
+    def is_seen(found: VisibleNormals) -> NDArray[np.bool_]:
+        return visible(moment.mesh, even.positions[found.rows], camera, spacing)
+
+    return bare(even, noise), even.normals, is_seen
+
+
 def errors(normals: NDArray[np.floating], true: NDArray[np.floating]) -> NDArray[np.float64]:
     """Angles without regard to the sides of normals, degrees."""
     angles = angles_between(normals, true)
@@ -76,12 +91,9 @@ def errors(normals: NDArray[np.floating], true: NDArray[np.floating]) -> NDArray
 def test_normals_are_about_as_right_as_those_of_the_whole_cloud(
     draw: Callable[..., Surface], data_dir: Path, name: str, noise: float
 ) -> None:
-    moment = catalog.subject(name, data_dir).moment(0)
-    even = moment.pose.cloud
-    cloud, true = bare(even, noise), even.normals
-    assert true is not None
+    cloud, true, is_seen = subject(data_dir, name, noise)
     found = drawn(draw, cloud)
-    seen = visible(moment.mesh, even.positions[found.rows], camera_of(cloud), typical_spacing(even))
+    seen = is_seen(found)
     rows = found.rows[seen]
     of_splats = errors(found.normals[seen], true[rows])
     of_cloud = errors(cloud_normals(cloud)[rows], true[rows])
@@ -95,13 +107,10 @@ def test_normals_are_about_as_right_as_those_of_the_whole_cloud(
 def test_normals_are_about_as_right_as_with_the_best_number_of_neighbors(
     draw: Callable[..., Surface], data_dir: Path, name: str, noise: float
 ) -> None:
-    moment = catalog.subject(name, data_dir).moment(0)
-    even = moment.pose.cloud
-    cloud, true = bare(even, noise), even.normals
-    assert true is not None
+    cloud, true, is_seen = subject(data_dir, name, noise)
 
     def median(found: VisibleNormals) -> float:
-        seen = visible(moment.mesh, even.positions[found.rows], camera_of(cloud), typical_spacing(even))
+        seen = is_seen(found)
         return float(np.nanmedian(errors(found.normals[seen], true[found.rows[seen]])))
 
     fixed = [
