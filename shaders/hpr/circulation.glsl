@@ -1,8 +1,9 @@
-// What a sector tells of its candidate's surroundings (Machado e Silva 2014, 5.3). Its neighbours are gone around: two
-// candidates that follow one another there, at most WIDEST sectors apart, make a triangle with its own. Each is added
+// What a listed sector tells of its candidate's surroundings (Machado e Silva 2014, 5.3). Its neighbours are gone around:
+// two candidates that follow one another there, at most WIDEST sectors apart, make a triangle with its own. Each is added
 // to the candidate: the triangles' normals towards the eye, the less the farther apart (Max 1999), and of all neighbours
 // with another candidate how many there are, and the inverse distances of these, in edges of a sector.
 #include "common/view.glsl"
+#include "common/list.glsl"
 #include "hpr/extents.glsl"
 
 layout(binding = TEXTURE_CANDIDATES) uniform usamplerBuffer candidates;  // a row for each sector
@@ -25,9 +26,10 @@ vec3 normal_between(vec3 a, vec3 b, vec3 to_eye) {
 }
 
 void scatter(uint i) {
-    uint own = texelFetch(candidates, int(i)).r;
+    uint sector = list[i];
+    uint own = texelFetch(candidates, int(sector)).r;
     if (own == NOTHING) return;
-    ivec3 place = place_of(i);
+    ivec3 place = place_of(sector);
     vec3 center = texelFetch(positions, int(own)).xyz;
     vec3 to_eye = (view_perspective ? -to_view(center) : vec3(0.0, 0.0, 1.0)) * mat3(world_to_view);
     float width = sector_width(spot_of(own));

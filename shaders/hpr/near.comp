@@ -10,11 +10,17 @@
 uniform uint point_count;
 layout(std430, binding = STORAGE_VISIBLE) buffer Visible { uint visible[]; };
 layout(binding = TEXTURE_HOMES) uniform usamplerBuffer homes;
-layout(binding = TEXTURE_KEYS) uniform usamplerBuffer keys;
+layout(binding = TEXTURE_BEST) uniform usamplerBuffer rows;
+layout(binding = TEXTURE_SPOTS) uniform samplerBuffer spots;
 
 const int RUN = 8;
 uniform int stride;
 const float FARTHEST = 6.0;  // of strides, squared: behind more, hardly a point is visible
+
+uint key_of_candidate(uint sector) {
+    uint row = texelFetch(rows, int(sector)).r;
+    return key_of(texelFetch(spots, int(row)).xyz, direction_of(sector));
+}
 
 void main() {
     uint first = item() * uint(RUN), found = 0u, bits = 0u;
@@ -24,7 +30,7 @@ void main() {
         if (i >= point_count) break;
         uvec2 home = texelFetch(homes, int(i)).rg;
         bool near = home.x != NOTHING;
-        if (near) near = key_from(home.y) - key_from(texelFetch(keys, int(home.x)).r) <= most;
+        if (near) near = key_from(home.y) - key_from(key_of_candidate(home.x)) <= most;
         uint row = drawn_row(i);
         visible[row] = uint(home.x == NOTHING && home.y == 0u);
         bits |= uint(near) << n;

@@ -160,10 +160,10 @@ def test_points_before_a_plane_are_left_out(find: Find) -> None:
 
 
 def test_memory_is_what_it_says(find: Find) -> None:
-    """24 bytes a sector, 4 a cell of empty ones, 28 a point."""
+    """28 bytes a sector, 4 a cell of empty ones, 28 a point."""
     sectors = Sectors.around(ZERO, 1.0, np.array([0.0, 0.0, 3.0]), ZERO, 64)
     held = find(points_in_ball(1000), sectors, 1).nbytes
-    assert held == pytest.approx(28 * (sectors.count + 1000), rel=0.01)
+    assert held == pytest.approx((32 * sectors.count + 28 * 1000), rel=0.01)
 
 
 def test_more_sectors_than_the_driver_takes_are_refused(renderer: Renderer) -> None:

@@ -24,6 +24,7 @@ from .sectors import Sectors
 
 UNLIMITED = 1 << 30  # steps: until nothing changes
 _RUN = 8  # sectors an invocation of hpr/empty.comp looks at, points one of hpr/near.comp
+_STEPS_OF_ALL = 2  # of propagation, in which most sectors change: lists of those that do would take longer
 _STEPS_AT_ONCE = 32  # of propagation, before the CPU asks whether anything still changes
 _EMPTY_BELOW = 0.25  # sectors for each point, above which the map of empty ones is coarser (4.3)
 # The same among visible points, half of all: where 12 of them usually lie in a cell, chance leaves none
@@ -42,8 +43,8 @@ class RowSample(NamedTuple):
 class Candidates:
     """Candidates of the sectors around an eye, and what is visible, on the GPU.
 
-    rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. keys: R32UI, its key.
-    sector_positions: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector
+    rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. inside: the
+    sectors that may have one. sector_positions: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector
     that it lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where it is on the
     hull of the flipped candidates around it, or lies in no sector, so that nothing known hides it. state:
     another object after each `find`. sectors: what `rows` are of; shaders that include hpr/sectors.glsl take
@@ -66,13 +67,13 @@ class Candidates:
         def texels(count: int, texel_format: int, words: int) -> gl.BufferTexture:
             return gl.BufferTexture(gpu.buffer(reserve=4 * words * max(count, 1)), texel_format)
 
-        self.rows, self.keys, self._stamps, self._found, self._occupied = (
+        self.rows, self._keys, self._stamps, self._found, self._occupied = (
             texels(sectors.count, gl.R32UI, 1) for _ in range(5)
         )
         self.sector_positions = texels(points, gl.RGB32F, 3)
         self.homes = texels(points, gl.RG32UI, 2)
         self.visible = texels(points, gl.R32UI, 1)
-        self._todo, self._changed = (IndexList(gpu, sectors.count) for _ in range(2))
+        self.inside, self._todo, self._changed = (IndexList(gpu, sectors.count) for _ in range(3))
         self._near = IndexList(gpu, max(points, 1))
         self.steps, self.looked_at = 0, points
         self.state = object()
@@ -80,11 +81,11 @@ class Candidates:
 
     @property
     def nbytes(self) -> int:
-        """Bytes held on the GPU: 24 a sector and up to 4 of cells, 28 a point."""
-        held = (self.rows, self.keys, self._stamps, self._found, self._occupied)
+        """Bytes held on the GPU: 28 a sector and up to 4 of cells, 28 a point."""
+        held = (self.rows, self._keys, self._stamps, self._found, self._occupied)
         by_row = (self.sector_positions, self.homes, self.visible)
         return sum(each.buffer.size for each in (*held, *by_row)) + sum(
-            each.nbytes for each in (self._todo, self._changed, self._near)
+            each.nbytes for each in (self.inside, self._todo, self._changed, self._near)
         )
 
     @property
@@ -137,7 +138,7 @@ class Candidates:
         defines = {"FILTERED": int(among is not None), "CELLS": 1, **sampled, **self.defines}
         visits = Visits("hpr/candidates.glsl", self.looked_at, bind, defines, sectors)
         with gpu.timers.measure("candidates"):
-            scatter(gpu, visits, self.keys, self.rows)
+            scatter(gpu, visits, self._keys, self.rows)
         self._list_inside(shift)
         with gpu.timers.measure("propagate"):
             self._propagate(steps)
@@ -154,8 +155,8 @@ class Candidates:
         gpu = self._gpu
         program = gpu.compute("hpr/empty.comp", self.defines, params=self.sectors)
         with gpu.timers.measure("empty"):
-            self._todo.clear()
-            self._todo.bind()
+            self.inside.clear()
+            self.inside.bind()
             self._occupied.bind(Texture.OCCUPIED)
             self._stamps.buffer.bind_to_storage_buffer(Storage.STAMPS)
             gpu.set(program, cell_shift=shift)
@@ -163,27 +164,39 @@ class Candidates:
 
     def _propagate(self, steps: int) -> None:
         gpu = self._gpu
-        look, take, take_last = (
-            gpu.compute("hpr/propagate.comp", {**step, **self.defines}, params=self.sectors)
-            for step in ({"TAKE": 0}, {"TAKE": 1, "LAST": 0}, {"TAKE": 1, "LAST": 1})
+        every, some = (
+            gpu.compute("hpr/propagate.comp", {"EVERY": every, **self.defines}, params=self.sectors)
+            for every in (1, 0)
+        )
+        take, take_last = (
+            gpu.compute("hpr/take.comp", {"LAST": last, **self.defines}, params=self.sectors)
+            for last in (0, 1)
         )
         self.sector_positions.bind(Texture.SPOTS)
-        self.keys.bind(Texture.KEYS)
+        of_all = _STEPS_OF_ALL if steps >= _STEPS_OF_ALL else 0
+        for step in range(of_all):
+            source, target = (self.rows, self._found)[:: 1 if step % 2 == 0 else -1]
+            if step == 0:
+                gpu.clear(target.buffer, NOTHING)
+            source.bind(Texture.BEST)
+            target.buffer.bind_to_storage_buffer(Storage.NEXT_ROWS)
+            self.inside.run(every)
         self.rows.bind(Texture.BEST)
         self._found.bind(Texture.FOUND)
-        for step in range(1, steps + 1):
+        todo = self.inside
+        for step in range(of_all + 1, steps + 1):
             self._changed.clear()
             self._changed.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
             self._found.buffer.bind_to_storage_buffer(Storage.NEXT_ROWS)
-            self._todo.run(look)
-            self._todo.clear()
-            self._todo.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
-            self.keys.buffer.bind_to_storage_buffer(Storage.KEYS)
+            todo.run(some)
+            todo = self._todo
+            todo.clear()
+            todo.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
             self.rows.buffer.bind_to_storage_buffer(Storage.BEST)
             self._stamps.buffer.bind_to_storage_buffer(Storage.STAMPS)
             gpu.set(take, step_number=step)
             self._changed.run(take if step < steps else take_last)
-            if step % _STEPS_AT_ONCE == 0 and not len(self._todo):
+            if step % _STEPS_AT_ONCE == 0 and not len(todo):
                 break
 
     def _mark_visible(self, sampled: dict[str, int], stride: int) -> None:
@@ -197,7 +210,6 @@ class Candidates:
             self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
             self.homes.bind(Texture.HOMES)
             self.rows.bind(Texture.BEST)
-            self.keys.bind(Texture.KEYS)
             self.sector_positions.bind(Texture.SPOTS)
             self._near.clear()
             self._near.bind()
@@ -223,9 +235,9 @@ class Candidates:
 
     def release(self) -> None:
         """Delete all of it."""
-        for each in (self.rows, self.keys, self._stamps, self._found, self._occupied):
+        for each in (self.rows, self._keys, self._stamps, self._found, self._occupied):
             each.release()
         for each in (self.sector_positions, self.homes, self.visible):
             each.release()
-        for listed in (self._todo, self._changed, self._near):
+        for listed in (self.inside, self._todo, self._changed, self._near):
             listed.release()

@@ -97,7 +97,7 @@ class SectorSplats:
             steady_points(pose).bind(Texture.POSITIONS)
 
         def visits(cells: str) -> Visits:
-            return Visits(cells, sectors.count, bind, candidates.defines, sectors)
+            return Visits(cells, 0, bind, candidates.defines, sectors, candidates.inside)
 
         fixed = _fixed(candidates)
         with gpu.timers.measure("circulation"):
