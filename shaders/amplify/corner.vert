@@ -7,7 +7,7 @@
 #include <shape>
 
 flat out uint row;
-#ifdef FED_COLOR
+#ifdef SHADED
 flat out vec3 color;
 #endif
 out vec2 local;
@@ -15,8 +15,8 @@ out vec2 local;
 void main() {
     Point point = fetch_point();
     row = point.row;
-#ifdef FED_COLOR
-    color = fed_color;
+#ifdef SHADED
+    color = color_of(point);
 #endif
     local = vec2(0.0);
     gl_Position = vec4(0.0, 0.0, -1.0, 1.0);  // nowhere: in front of the near plane

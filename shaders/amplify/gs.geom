@@ -10,13 +10,13 @@ layout(triangle_strip, max_vertices = CORNERS) out;
 
 in Forwarded {
     Point point;
-#ifdef FED_COLOR
+#ifdef SHADED
     vec3 color;
 #endif
 } forwarded[];
 
 flat out uint row;
-#ifdef FED_COLOR
+#ifdef SHADED
 flat out vec3 color;
 #endif
 out vec2 local;
@@ -28,7 +28,7 @@ void main() {
         gl_Position = to_clip(c.view);
         local = c.local;
         row = forwarded[0].point.row;
-#ifdef FED_COLOR
+#ifdef SHADED
         color = forwarded[0].color;
 #endif
         EmitVertex();

@@ -3,14 +3,14 @@
 
 out Forwarded {
     Point point;
-#ifdef FED_COLOR
+#ifdef SHADED
     vec3 color;
 #endif
 } forwarded;
 
 void main() {
     forwarded.point = attribute_point(gl_VertexID);
-#ifdef FED_COLOR
-    forwarded.color = fed_color;
+#ifdef SHADED
+    forwarded.color = color_of(forwarded.point);
 #endif
 }

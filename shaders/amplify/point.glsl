@@ -12,6 +12,17 @@ struct Point {
 vec3 fed_color;  // sRGB, of the point that was fetched
 #endif
 
+#ifdef SHADED
+// The colour of the point that was fetched, sRGB; by its normal where the feed brings none (Slomp 2014, III).
+vec3 color_of(Point point) {
+#ifdef FED_COLOR
+    return fed_color;
+#else
+    return 0.5 + 0.5 * normalize(point.normal);
+#endif
+}
+#endif
+
 // What a shape's size is multiplied by, so that the points drawn make up for those left out.
 uniform float enlarged;
 

@@ -5,6 +5,9 @@
 precise vec3 surfel_u, surfel_v;  // half edges, view space
 precise vec3 surfel_center;
 vec4 surfel_part;  // lowest, highest local coordinates of what is drawn of the quad
+#ifdef PUSHED
+float surfel_push;  // how far away from the eye it is drawn, scan units
+#endif
 
 const float HUGE = 8.0;  // depths of the centre, or heights of the picture
 
@@ -38,6 +41,9 @@ bool begin_shape(Point point) {
 
     vec3 u, v;
     vec2 lengths = splat_axes(point, n, depth, u, v);
+#ifdef PUSHED
+    surfel_push = epsilon * max(lengths.x, lengths.y);
+#endif
     surfel_u = mat3(world_to_view) * u * lengths.x;
     surfel_v = mat3(world_to_view) * v * lengths.y;
 #if HAS_CELLS
@@ -62,5 +68,8 @@ bool begin_shape(Point point) {
 Corner corner(int i) {
     vec2 local = vec2((i & 1) == 0 ? surfel_part.x : surfel_part.z, (i >> 1) == 0 ? surfel_part.y : surfel_part.w);
     precise vec3 view = surfel_center + local.x * surfel_u + local.y * surfel_v;
+#ifdef PUSHED
+    view -= surfel_push * normalize(towards_eye(view));
+#endif
     return Corner(view, local);
 }

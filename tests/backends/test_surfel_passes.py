@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,6 +30,7 @@ from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.simulate.scanner import Faults, around, capture, rig
+from viewer.splatting.amplify import FEEDS
 from viewer.srgb import bytes_from_linear, linear_from_bytes
 
 pytestmark = pytest.mark.backend("surfels")
@@ -51,6 +53,11 @@ def discs(depths: list[float], colors: list[tuple[int, int, int]], radius: float
         colors=np.array(colors, np.uint8),
         radii=[radius] * len(depths),
     )
+
+
+def _bytes_of(colors: np.ndarray) -> np.ndarray:
+    """sRGB from 0 to 1, (n, 3), as a cloud stores it."""
+    return np.column_stack([np.rint(255 * colors), np.full(len(colors), 255)]).astype(np.uint8)
 
 
 def shown(surface: Surface, x: int, y: int) -> list[int]:
@@ -334,6 +341,78 @@ def test_sorted_blending_is_that_of_the_masks(draw: Draw, instancing: str) -> No
     np.testing.assert_allclose(shown(surface, x, 20), bytes_from_linear(light) * covered, atol=2)
 
 
+@every_feed
+def test_as_printed_blends_enlarged_masks_in_the_order_of_the_file(draw: Draw, instancing: str) -> None:
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=4.0), (41, 41)
+    look = Look(light="flat", background="#000000")
+    near, far = (
+        surfels(
+            draw,
+            discs(depths, [GREEN, RED], radius=0.5),
+            camera,
+            size,
+            look,
+            instancing=instancing,
+            passes="as_printed",
+            radius="own",
+        )
+        for depths in ([5.0, 5.4], [5.0, 5.6])
+    )
+    x = 25  # 5 pixels of 4 / 41 off the middle; splats of the second pass are twice as large
+    mask = np.exp(-4 * (5 * 4 / 41) ** 2)
+    covered = 1 - (1 - mask) ** 2
+    bytes_of = 255 * np.array([mask, mask * (1 - mask), 0]) / covered
+    np.testing.assert_allclose(near._read_texels("color", np.uint8)[20, x, :3], bytes_of, atol=3)
+    assert near.coverage[20, x] == pytest.approx(covered, abs=0.01)
+    assert near.depth[20, x] == pytest.approx(5.0, rel=1e-6)
+    assert far.coverage[20, x] == pytest.approx(mask, abs=0.01), "more than epsilon behind"
+    assert (near.row == NOTHING).all()
+    assert (near.level[np.isfinite(near.depth)] == 1).all()
+
+
+@every_feed
+def test_as_printed_transparent_corners_hide_what_is_behind(draw: Draw, instancing: str) -> None:
+    """The first pass writes depths of whole quads: their corners leave a hole in what lies behind."""
+    camera, size = looking_down_z(fov_y=60, projection="orthographic", height=4.0), (41, 41)
+    cloud = discs([5.0, 8.0], [GREEN, RED])
+    cloud = replace(cloud, radii=np.array([0.5, 2.0], np.float32))
+
+    def covers(passes: str, x: int, y: int) -> bool:
+        params = {"passes": passes, "radius": "own", "enlarge": 1, "instancing": instancing}
+        return bool(np.isfinite(surfels(draw, cloud, camera, size, **params).depth[y, x]))
+
+    corner = 20 + 4, 20 - 4  # 0.39 off the middle in both directions, 0.55 in all
+    assert covers("two", *corner)
+    assert not covers("as_printed", *corner)
+    assert covers("as_printed", 20 + 8, 20)
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_as_printed_shows_about_the_colours_of_two_passes(draw: Draw, projection: str) -> None:
+    cloud = sphere(3000)
+    camera = Camera.orbit(cloud.bounds(), 30, 20, aspect=4 / 3, projection=projection)
+    look = Look(light="flat")
+    two = surfels(draw, cloud, camera, look=look, passes="two", cull_back=True, instancing="tbo")
+    printed = surfels(draw, cloud, camera, look=look, passes="as_printed", instancing="tbo")
+    both = np.isfinite(two.depth) & np.isfinite(printed.depth)
+    assert both.sum() > 0.98 * np.isfinite(two.depth).sum()
+    assert np.quantile(np.abs(two.image().astype(int) - printed.image())[both], 0.9) < 16, "levels"
+    assert (np.abs(printed.depth[both] / two.depth[both] - 1) < 0.02).mean() > 0.99
+
+
+@pytest.mark.parametrize("instancing", FEEDS)
+def test_as_printed_colours_points_without_colours_by_their_normals(draw: Draw, instancing: str) -> None:
+    colored = sphere(3000)
+    assert colored.normals is not None
+    colored = replace(colored, colors=_bytes_of(0.5 + 0.5 * colored.normals))
+    camera = Camera.orbit(colored.bounds(), 30, 20, aspect=4 / 3)
+    pictures = [
+        surfels(draw, cloud, camera, instancing=instancing, passes="as_printed", radius="own").image()
+        for cloud in (colored, replace(colored, colors=None))
+    ]
+    np.testing.assert_allclose(*pictures, atol=4)
+
+
 @pytest.mark.parametrize("passes", ["two", "one_blended", "one_no_depth", "sorted"])
 def test_feeds_blend_alike(draw: Draw, passes: str) -> None:
     cloud = sphere(8000)
@@ -463,7 +542,7 @@ def test_nothing_is_shown_before_the_near_plane(draw: Draw, instancing: str, pro
     assert before == 0
 
 
-@pytest.mark.parametrize("passes", ["two", "sorted", "one_blended", "visibility"])
+@pytest.mark.parametrize("passes", ["two", "sorted", "one_blended", "visibility", "as_printed"])
 @every_feed
 def test_empty_poses_and_previews(renderer: Renderer, draw: Draw, instancing: str, passes: str) -> None:
     empty = PointCloud.from_arrays(np.zeros((0, 3)), normals=np.zeros((0, 3)))
@@ -475,9 +554,9 @@ def test_empty_poses_and_previews(renderer: Renderer, draw: Draw, instancing: st
     camera = Camera.orbit(cloud.bounds(), aspect=4 / 3)
     request = Request(Pose(0, 0.0, "", cloud), camera, "surfels", params, Look(light="flat"))
     assert render_frame(renderer, request, surface, share=0.25), "a preview would be refined"
-    preview = (surface.row != NOTHING).sum()
+    preview = np.isfinite(surface.depth).sum()
     assert not render_frame(renderer, request, surface)
-    assert preview == pytest.approx((surface.row != NOTHING).sum(), rel=0.05)
+    assert preview == pytest.approx(np.isfinite(surface.depth).sum(), rel=0.05)
     assert render_frame(renderer, request, surface, share=1e-12)
     assert (surface.row == NOTHING).all(), "a share that no point falls into"
 

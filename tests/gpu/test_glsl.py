@@ -19,7 +19,6 @@ import numpy as np
 import packed
 import pytest
 import sampling
-from experiments.slomp_2014 import literal
 from range_scenes import sphere_view
 from scenes import DRAWS_POINTS, sphere, sphere_mesh
 from test_bins import filled, some_visits
@@ -53,7 +52,7 @@ from viewer.task import Task
 
 TESTS_OWN = str(Path(__file__).resolve().parents[1])  # where tests have shaders of their own
 SIZE = (96, 64)
-PASSES = ("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted")
+PASSES = ("one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted", "as_printed")
 CAMERA = {"azimuth": 30.0, "elevation": 20.0, "aspect": SIZE[0] / SIZE[1]}
 LOOKS = [
     *(Look(color_by=color) for color in ("plain", "normal", "depth", "height", "height_of", "id", "level")),
@@ -140,7 +139,6 @@ def draw_all(renderer: Renderer, whole: bool) -> None:
     draw(sphere(1500), "surfels", radius_scale=0.01)
     mesh = sphere_mesh(16)
     draw(mesh.points, baselines.mesh(mesh))
-    draw(literal.colored(mesh.points), literal.paper_splats())
     Presenter(renderer.gpu).release()
 
 

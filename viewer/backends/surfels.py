@@ -41,7 +41,9 @@ _SEEN_THROUGH = (
 )
 
 _VARIANTS = ("tiles", *FEEDS)
-_TWO = ("two", "two_large")  # values of `passes`
+AS_PRINTED = "as_printed"  # a value of `passes`
+_TWO = ("two", "two_large")
+_ENLARGED = (*_TWO, AS_PRINTED)
 _HIDING = ("one", *_TWO)  # those in which nothing shows through what lies before it
 # A uniform radius of 1.5 times the spacing closes a surface that is evenly covered.
 _RADIUS_PER_SPACING = 1.5
@@ -59,8 +61,12 @@ class Params:
         "How Scan4D draws overlapping splats. one: show the nearest splat; two: blend the nearest splat "
         "with the splats close behind it; auto: two with enlarge=1, or one if two is too slow in motion. "
         "For comparison, the other values reproduce the pictures of Slomp 2014, Fig. 3: one_blended (a), "
-        "one_no_depth (b), visibility (c), two_large (e), and sorted (blended from back to front)",
-        choices=("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
+        "one_no_depth (b), visibility (c), two_large (e), sorted (blended from back to front), and "
+        "as_printed (two passes as that paper prints them: colours without light or points)",
+        choices=(
+            *("auto", "one", "two", "one_blended", "one_no_depth", "visibility", "two_large", "sorted"),
+            AS_PRINTED,
+        ),
         sweep=("auto", "one", "two"),
         group="Surface",
     )
@@ -70,7 +76,7 @@ class Params:
         low=1.0,
         high=8.0,
         group="Surface",
-        when={"passes": _TWO},
+        when={"passes": _ENLARGED},
     )
     epsilon: float = param(
         1.0,
@@ -105,7 +111,12 @@ class Params:
         high=0.99,
         group="Splats",
     )
-    cull_back: bool = param(False, "Leave out splats that face away from the viewer", group="Splats")
+    cull_back: bool = param(
+        False,
+        "Leave out splats that face away from the viewer",
+        group="Splats",
+        unless={"passes": (AS_PRINTED,)},  # which leaves them out
+    )
     share: float | None = share_param(
         None, "all points, or with a software driver, as many points as its lists can hold", "Splats"
     )
@@ -197,7 +208,7 @@ class Surfels(Backend):
             return "tiles" in surface.stats.skipped  # as there are many large ones among these
 
         reach, margin = params.radius_scale * sizes.largest, _splats(params, 0.0).least_radius
-        larger = max(params.enlarge, 1.0) if params.passes in _TWO else 1.0
+        larger = max(params.enlarge, 1.0) if params.passes in _ENLARGED else 1.0
         may_thin = params.share is None and instancing == "tiles" and surface.gpu.software
         most = most_listed(surface.gpu) if may_thin else len(pose.cloud)
         stays = frame.share >= 1 and "pose" not in frame.changed and len(pose.cloud) <= most
@@ -276,6 +287,8 @@ def _with_passes(params: Params, pose: GpuPose, frame: FrameView, surface: Surfa
     what is shown of layers."""
     if params.passes == "auto":
         params = replace(params, passes="two" if passes.blends(frame, surface) else "one", enlarge=1.0)
+    if params.passes == AS_PRINTED:
+        params = replace(params, cull_back=True)
     if params.passes not in _HIDING:
         return params, NEAREST_ALONE
     layer = layer_of(pose, frame, surface, blends=params.passes in _TWO)
@@ -343,9 +356,12 @@ def _draw_subpixel(points: Points, surface: Surface, params: Params, instancing:
 
 
 def _draw_one(points: Points, surface: Surface, params: Params, instancing: str, splats: Splats) -> None:
-    """The nearest splats, and what is made of them beyond that."""
-    _draw_nearest(points, surface, instancing, splats)
+    """The nearest splats, and what is made of them beyond that; or what Slomp 2014 prints."""
     feed = FALLBACK if instancing == "tiles" else instancing
+    if params.passes == AS_PRINTED:
+        passes.splat_as_printed(points, surface, feed, splats)
+        return
+    _draw_nearest(points, surface, instancing, splats)
     if params.passes == "visibility":
         passes.show_visibility(points, surface, splats)
     elif params.passes == "sorted":

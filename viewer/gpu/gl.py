@@ -29,12 +29,14 @@ from OpenGL.raw.GL.VERSION import (  # noqa: E402
     GL_1_0,
     GL_1_1,
     GL_1_3,
+    GL_1_4,
     GL_1_5,
     GL_2_0,
     GL_3_0,
     GL_3_1,
     GL_3_2,
     GL_3_3,
+    GL_4_0,
     GL_4_2,
     GL_4_3,
     GL_4_4,
@@ -145,6 +147,16 @@ def kept_colors() -> Iterator[None]:
         yield
     finally:
         GL_1_0.glColorMask(True, True, True, True)
+
+
+@contextmanager
+def keeping_largest(image: int) -> Iterator[None]:
+    """An image keeps the largest of what is drawn meanwhile, while others are blended."""
+    GL_4_0.glBlendEquationi(image, GL_1_4.GL_MAX)
+    try:
+        yield
+    finally:
+        GL_4_0.glBlendEquationi(image, GL_1_4.GL_FUNC_ADD)
 
 
 @contextmanager
@@ -332,6 +344,17 @@ class Target:
         self._renderbuffer, self._framebuffer = renderbuffer, framebuffer
         self.target = ctx.detect_framebuffer(framebuffer.value)
 
+    def clear(self) -> None:
+        """Set both images to zero; it is bound. The depth buffer stays."""
+        zero = (ctypes.c_float * 4)(*[0.0] * 4)
+        for index in range(2):
+            GL_3_0.glClearBufferfv(GL_1_1.GL_COLOR, index, zero)
+
+    def clear_depth(self) -> None:
+        """Set the depth buffer to its far end; it is bound."""
+        GL_1_0.glDepthMask(True)
+        GL_3_0.glClearBufferfv(GL_1_1.GL_DEPTH, 0, (ctypes.c_float * 1)(0.0))
+
     def bind_images(self, *units: int) -> None:
         """Bind each image to its texture unit."""
         for unit, image in zip(units, self.images, strict=True):
@@ -390,13 +413,11 @@ class Sums(Target):
         super().__init__(ctx, size, (ctx.texture(size, 4, dtype="f4"), ctx.texture(size, 4, dtype="f4")))
         self.nbytes = (16 + 16 + 4) * size[0] * size[1]
 
-    def clear(self) -> None:
-        """Set both images to zero; it is bound. The depth buffer stays."""
-        zero = (ctypes.c_float * 4)(*[0.0] * 4)
-        for index in range(2):
-            GL_3_0.glClearBufferfv(GL_1_1.GL_COLOR, index, zero)
 
-    def clear_depth(self) -> None:
-        """Set the depth buffer to its far end; it is bound."""
-        GL_1_0.glDepthMask(True)
-        GL_3_0.glClearBufferfv(GL_1_1.GL_DEPTH, 0, (ctypes.c_float * 1)(0.0))
+class Blended(Target):
+    """An image of 8-bit colours, to which what is drawn is blended, and one of floats, which keeps the
+    largest of what is drawn with `keeping_largest`."""
+
+    def __init__(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+        super().__init__(ctx, size, (ctx.texture(size, 4), ctx.texture(size, 1, dtype="f4")))
+        self.nbytes = (4 + 4 + 4) * size[0] * size[1]

@@ -128,6 +128,38 @@ def _farthest_first(points: Points, surface: Surface) -> Points:
     return replace(points, rows=order)
 
 
+def splat_as_printed(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
+    """Draw both passes as Slomp 2014 prints them (V-B): depths of whole quads alone; then enlarged splats over
+    one another, in the order in which they are fed, tested against these depths.
+
+    Pixels have a colour, which the feed brings, and the depth of the nearest splat there; none shows a point.
+    Depths of the first pass lie `epsilon` radii farther from the eye, as in the papers that Slomp 2014 cites
+    for the two passes; it prints no number.
+    """
+    gpu, points = surface.gpu, replace(points, colored=points.pose.has("colors"))
+    feed, target = usable_feed(points, feed, surface), surface.cached(_new_blended)
+    target.target.use()
+    target.clear()
+    target.clear_depth()
+    gpu.ctx.enable_only(moderngl.DEPTH_TEST)
+    gpu.ctx.depth_func = ">"  # reversed depth: near is 1
+    with gpu.timers.measure("visibility"), gl.kept_colors():
+        draw_shapes(points, feed, SURFEL, "surfels/passes/depth_alone.frag", splats, {"PUSHED": 1})
+    gpu.ctx.enable_only(moderngl.DEPTH_TEST | moderngl.BLEND)
+    gpu.ctx.depth_func = ">="
+    gpu.ctx.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
+    with gpu.timers.measure("shading"), gl.kept_depth(), gl.keeping_largest(1):
+        larger = splats.larger(points)
+        draw_shapes(larger, feed, SURFEL, "surfels/passes/as_printed.frag", splats, {"SHADED": 1})
+    gpu.ctx.disable(moderngl.BLEND)
+    with gpu.timers.measure("resolve"):
+        surface.clear()
+        surface.bind_storage()
+        surface.bind_own("color")
+        target.bind_images(Texture.COLOR_SUMS, Texture.LARGE_DEPTHS)
+        gpu.dispatch(gpu.compute("surfels/passes/as_printed.comp"), surface.size[0] * surface.size[1])
+
+
 def show_visibility(points: Points, surface: Surface, splats: Splats) -> None:
     """Turn what a single pass found into what the first of two leaves to the second: depth in grey."""
     gpu, pose = surface.gpu, points.pose
@@ -308,6 +340,10 @@ def _close(points: Points, surface: Surface, splats: Splats) -> None:
         surface.gpu.clear(surface.own("level").buffer, 0)
         surface.bind_own("level")
         run(2)
+
+
+def _new_blended(gpu: Gpu, size: tuple[int, int]) -> gl.Blended:
+    return gl.Blended(gpu.ctx, size)
 
 
 def _new_sums(gpu: Gpu, size: tuple[int, int]) -> gl.Sums:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from experiments.slomp_2014 import literal
 from experiments.slomp_2014.scans import FEED, PAPER, by_feed, feed_tables, scans
 from experiments.suite import Suite, pictures
 from experiments.tables import Machines
+from viewer.backends import backend
+from viewer.backends.surfels import AS_PRINTED
 from viewer.bench.plan import Contender, Group
 from viewer.bench.run import BenchSettings
 from viewer.splatting.amplify import FEEDS
@@ -17,19 +18,17 @@ _METHOD = {"passes": "two", "enlarge": 2.0, "cull_back": True, "radius": "unifor
 
 
 def groups() -> list[Group]:
-    """A group for each scan of Table II, and for the demo: the backend's feeds, the paper's own splats."""
-    own = [
-        Contender(literal.NAME, literal.PaperParams(feed), FEED, drawn=literal.drawn_as_printed)
-        for feed in FEEDS
-    ]
+    """A group for each scan of Table II, and for the demo: the backend's feeds, and the passes as printed."""
+    printed = {**_METHOD, "passes": AS_PRINTED}
+    own = [Contender(BACKEND, backend(BACKEND).params({**printed, FEED: feed}), FEED) for feed in FEEDS]
     return [by_feed(scan, BACKEND, _METHOD, own) for scan in scans()]
 
 
 EXPERIMENT = Suite(
     page="table-two.md",
-    parts={"rows": pictures(params={FEED: "feed"}, sweeps=[FEED])},
+    parts={"rows": pictures(params={FEED: "feed", "passes": "passes"}, sweeps=[FEED])},
     tables=[
-        *feed_tables("surfels_ms", lambda scan: scan.title, {literal.NAME: "as printed"}),
+        *feed_tables("surfels_ms", lambda scan: scan.title, {AS_PRINTED: "as printed"}),
         Machines(BACKEND, PAPER),
     ],
     groups=lambda *_: groups(),

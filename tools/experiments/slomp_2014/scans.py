@@ -82,7 +82,7 @@ def feed_tables(
     """Two tables of feeds: milliseconds, means over the views; and times of each feed as a part of the first
     feed's, medians over the views.
 
-    theirs: the name of the table in the paper's figures. forms: how lines of other backends are called.
+    theirs: the name of the table in the paper's figures. forms: how lines of other passes are called.
     """
 
     def rows(runs: Sequence[StoredRun]) -> Iterator[Row]:
@@ -118,7 +118,7 @@ def _lines(scan: Scan, theirs: str, runs: Sequence[StoredRun], forms: Mapping[st
     for each in runs:
         by_form: dict[str, list[Row]] = {}
         for row in scan.rows(each):
-            by_form.setdefault(forms.get(row["backend"], ""), []).append(row)
+            by_form.setdefault(forms.get(row.get("passes", ""), ""), []).append(row)
         for form, rows in by_form.items():
             covered = [percent for row in rows if row.get("feed") for percent in row["covered"]]
             line = {"points": rows[0]["n"], "covered": (min(covered), max(covered))}
