@@ -167,6 +167,23 @@ def test_points_that_make_no_surface(renderer: Renderer, draw: Draw) -> None:
     assert (np.abs(radii[:-1] / found(renderer, body) - 1) > 1e-4).mean() < 0.005
 
 
+def test_points_alone_beside_a_denser_body_are_no_larger_than_its_discs(renderer: Renderer) -> None:
+    """Stray pairs before a sparse wall, where discs as large as the wall's would hide the body."""
+    body, wall_arrays = sphere(6000), wall(60, 60, 0.4)
+    assert body.normals is not None
+    strays = np.array([[1.5, 0, 0.3], [1.51, 0, 0.3], [0, -1.4, 0.2], [0, -1.4, 0.22]])
+    behind = wall_arrays["positions"] - (0, 0, 6)
+    facing = np.tile([0.0, 0, 1], (len(strays) + len(behind), 1))
+    cloud = PointCloud.from_arrays(
+        np.concatenate([body.world(), strays, behind]), normals=np.concatenate([body.normals, facing])
+    )
+    of_body, of_strays, of_wall = np.split(found(renderer, cloud), [6000, 6000 + len(strays)])
+    assert (of_strays > 0).all()
+    assert of_strays.max() <= of_body.max()
+    assert np.quantile(of_wall, 0.1) > 5 * of_body.max()
+    np.testing.assert_array_equal(np.flatnonzero(of_wall == 0), [])
+
+
 def test_without_usable_normals_they_are_of_that_size(renderer: Renderer) -> None:
     cloud = torus(3000)
     assert cloud.normals is not None

@@ -41,7 +41,7 @@ _WIDER = 3.0  # times the cells of the round before
 _KNOWN = 0.6  # cells: the 27 around tell all of a radius of 0.5, and nearly always of one little larger
 _BORDER = 2.0  # times as far as a point's cell reaches to most sides: where it has no end
 _ROWS = 4.0  # times as far, where points lie in rows: to opposite sides alike
-_CELL = {"DIRECTIONS": 8, "KNOWN": _KNOWN, "BORDER": _BORDER, "ROWS": _ROWS}
+_CELL = {"DIRECTIONS": 8, "KNOWN": _KNOWN, "BORDER": _BORDER, "ROWS": _ROWS, "WIDER": _WIDER, "LAST": 0}
 _SPARE = 1.2  # times the radii found: these go by some directions, in a plane
 _FIT = {
     "SPARE_FIT": 1.25,  # times how far cells reach: how far ellipses do
@@ -252,14 +252,18 @@ class _Search:
         """The splats of all rows. fit: macros that say whether and how they are fitted to cells."""
         grid = self._grid
         yield from self._round(grid, self._visits(grid), None, fit)
-        for _ in range(1, _ROUNDS):
+        for number in range(1, _ROUNDS):
             self._list_unknown()
-            if len(self._listed) * _FEW <= self._count:
-                break
+            unknown = len(self._listed)
+            is_last = number == _ROUNDS - 1 or unknown * _FEW <= self._count
+            if not unknown or (is_last and number == 1):
+                break  # in a scan of one density, what is left is as large as usual
             grid = _Grid.of(_WIDER * grid.cell_size, self._extent, self._lists)
             visits = self._visits(grid, thinned=True)
             self._bins.count(visits)
-            yield from self._round(grid, visits, self._listed, fit)
+            yield from self._round(grid, visits, self._listed, {**fit, "LAST": int(is_last)})
+            if is_last:
+                break
         axes, cells = (self._read(texels).reshape(-1, 4) for texels in (self._axes, self._cells))
         return FittedSplats(_SPARE * self._read(self._radii), axes, cells)
 

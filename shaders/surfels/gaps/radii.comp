@@ -7,6 +7,10 @@
 // LISTED: invocations are of the points in the list, else of slots. ENDED: no radius at a border or on a line. What
 // cells cannot tell stays 0. FITTED: ellipses and planes as well (surfels/gaps/fit.glsl);
 // TRUSTED: also of points in rows, as the scan stores normals.
+//
+// A point that lies off much denser ones, almost alone, is no surface: its disc is no larger than theirs. Rounds of the
+// search find it after these (LISTED). LAST: a point whose cell never ends is as large as the nearest that is found.
+// Both go by radii of earlier rounds alone, since those of this round come in any order.
 #include "common/item.glsl"
 #if LISTED
 #include "common/list.glsl"
@@ -18,7 +22,7 @@
 layout(binding = TEXTURE_SLOTS) uniform samplerBuffer slots;
 layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
-layout(std430, binding = STORAGE_RADII) writeonly buffer Radii { float radii[]; };
+layout(std430, binding = STORAGE_RADII) buffer Radii { float radii[]; };
 #if FITTED
 #include "surfels/gaps/fit.glsl"
 #endif
@@ -59,6 +63,54 @@ float fourth(vec4 a, vec4 b) {
     return min(min(min(a.w, b.w), max(a.z, b.x)), min(max(a.y, b.y), max(a.x, b.z)));
 }
 
+#if LISTED && !ENDED
+const float AROUND = 1.75;  // times as far as the cell reaches: from where on points are not beside it
+const float DENSER = 3.0;  // times smaller discs
+const float APART = 0.25;  // times as far as the cell reaches: a nearer point is no neighbour, but the same place
+const int SURFACE = 3;     // neighbours that are as sparse: so many are a surface
+
+// The largest disc around a point that is alone beside denser points, scan units; 0 for others. reach: cells.
+float denser_around(ivec3 cell, vec3 place, float reach) {
+    float largest = 0.0;
+    int alike = 0;
+    for (int z = -1; z <= 1; ++z)
+        for (int y = -1; y <= 1; ++y) {
+            int run = int(list_of(cell + ivec3(-1, y, z))), last = int(texelFetch(starts, run + 3).r);
+            for (int j = int(texelFetch(starts, run).r); j < last; ++j) {
+                vec4 other = texelFetch(slots, j);
+                float away = distance(other.xyz, place) / (reach * cell_size);
+                if (away > AROUND) continue;
+                float radius = radii[floatBitsToUint(other.w)];
+                if (radius > 0.0 && radius * DENSER < reach * cell_size) largest = max(largest, radius);
+                else if (away > APART) ++alike;
+            }
+        }
+    return alike < SURFACE ? largest : 0.0;
+}
+#endif
+
+#if LAST
+const float EARLIER = KNOWN / WIDER;  // cells: what an earlier round finds is smaller
+
+// The radius of the nearest point in the cells around that an earlier round found; 0 without one.
+float nearest_radius(ivec3 cell, vec3 place) {
+    float nearest = UNKNOWN, radius = 0.0;
+    for (int z = -1; z <= 1; ++z)
+        for (int y = -1; y <= 1; ++y) {
+            int run = int(list_of(cell + ivec3(-1, y, z))), last = int(texelFetch(starts, run + 3).r);
+            for (int j = int(texelFetch(starts, run).r); j < last; ++j) {
+                vec4 other = texelFetch(slots, j);
+                float away = distance(other.xyz, place), its = radii[floatBitsToUint(other.w)];
+                if (its <= 0.0 || its > EARLIER * cell_size) continue;
+                if (away > nearest || (away == nearest && its <= radius)) continue;
+                nearest = away;
+                radius = its;
+            }
+        }
+    return radius;
+}
+#endif
+
 void main() {
 #if LISTED
     uint i = item();
@@ -97,13 +149,25 @@ void main() {
     if (farthest < most_sides / BORDER || any(lessThan(across, across.zwxy / BORDER))) return;
 #endif
     vec4 forth = highest[0], back = -lowest[0];
-    if (has_normal && is_undecided(forth, back, most_sides)) return;
+    bool is_open = has_normal && is_undecided(forth, back, most_sides);
     float rows = has_normal ? ROWS : BORDER;
     forth = bounded(forth, back, most_sides, rows);
     back = bounded(back, highest[0], most_sides, rows);
     float inverse = least_of(min(forth, back));
     float reach = 0.5 / max(inverse, 1e-30);
-    if (reach > KNOWN) return;
+    if (is_open || reach > KNOWN) {
+#if LAST
+        radii[row] = nearest_radius(cell, place);
+#endif
+        return;
+    }
+#if LISTED && !ENDED
+    float denser = denser_around(cell, place, reach);
+    if (denser > 0.0) {
+        radii[row] = denser;
+        return;
+    }
+#endif
     radii[row] = reach * cell_size;
 #if FITTED
     if (!has_normal) return;
