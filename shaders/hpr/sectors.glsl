@@ -146,7 +146,7 @@ float farther_of(vec3 spot) { return CUBE == 1 ? length(spot) : spot.z; }
 // The way from one spot's direction to another's, near it, along axes at right angles: its square is q of keys.
 vec3 across(vec3 from, vec3 to) {
 #if CUBE
-    precise vec3 apart = normalize(to) - normalize(from);  // 0 between equal points, as hpr/voxels.glsl has it
+    precise vec3 apart = normalize(to) - normalize(from);  // 0 between equal points, where a contracted product would leave a rest
     return apart;
 #else
     vec2 apart = to.xy - from.xy;

@@ -24,7 +24,7 @@ from viewer.visibility.covering import CLEAR, REACH, STEEP, Covering, SpacedPoin
 from viewer.visibility.exact import SeenPoints, exact_visible_points, flipping, hull_rows
 from viewer.visibility.search import calibrated, visible_points
 from viewer.visibility.sectors import Sectors
-from viewer.visibility.spacing import FEWEST, NEAREST, Spacings
+from viewer.visibility.spacing import FEWEST, NEAREST, local_spacings, spacing_texels
 
 COUNT = 3000
 SPACING = np.sqrt(4 * np.pi / COUNT)
@@ -97,7 +97,7 @@ class Watched:
         """finer: than they usually are, the cells."""
         covering = Covering(self.pose.gpu, len(self.pose.cloud))
         covering.find(
-            SpacedPoints(self.pose.array("positions"), self.pose.cached(Spacings).texels),
+            SpacedPoints(self.pose.array("positions"), spacing_texels(self.pose)),
             self.found.sectors,
             self.found.spacing / self.found.sectors.edge / finer,
             front=front,
@@ -149,13 +149,12 @@ def test_what_is_left_out_at_first_is_hidden(renderer: Renderer, name: str) -> N
     assert np.count_nonzero(watched.seen() != watched.seen(front=False)) <= 0.003 * len(scene())
 
 
-def test_spacings_are_those_of_the_plain_twin(renderer: Renderer) -> None:
+def test_spacings_are_those_of_the_plain_twin() -> None:
     rng = np.random.default_rng(3)
     sparse = rng.uniform(3, 9, (200, 3))
     points = np.concatenate([spread(2000), sparse])
-    pose = GpuPose(renderer.gpu, Pose(0, 0.0, "", PointCloud.from_arrays(points)))
-    found = np.frombuffer(pose.cached(Spacings).texels.buffer.read(), np.float32)
-    np.testing.assert_allclose(found, apart_at(pose.stored.world()), rtol=1e-5)
+    cloud = PointCloud.from_arrays(points)
+    np.testing.assert_allclose(local_spacings(cloud), apart_at(cloud.world()), rtol=1e-5)
 
 
 # --- what is known exactly ------------------------------------------------------------------

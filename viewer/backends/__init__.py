@@ -192,6 +192,11 @@ class Backend(ABC):
         for, before pictures are due; on any thread. By default, there are none."""
         return
 
+    def awaits_facts(self, params: Any) -> bool:
+        """Whether pictures do wait for the facts that `foresee` finds, so that the window never computes them
+        itself."""
+        return False
+
     @property
     def about(self) -> str:
         """The docstring of its module: what it does, and from which paper."""
@@ -224,8 +229,8 @@ class Backend(ABC):
         """Whether it draws this pose from samples of its range views alone, and reads no points."""
         return set(self.needs(pose, params)) == {"views"}
 
-    def derive_key(self, params: Any) -> tuple[Any, ...]:
-        """The parameter values that what it derives depends on."""
+    def derive_key(self, params: Any) -> tuple[Any, ...] | None:
+        """The parameter values that what it derives depends on; None if it derives nothing with them."""
         return tuple(getattr(params, p.name) for p in self.parameters if p.affects == "derive")
 
 

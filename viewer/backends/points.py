@@ -76,6 +76,10 @@ class PointSquares(Backend):
         if params.hide_hidden:
             foresee_spacing(cloud)
 
+    def awaits_facts(self, params: Params) -> bool:
+        """Whether it searches for visible points."""
+        return params.hide_hidden
+
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Scatter the points; complete where all shall be drawn."""
         params: Params = frame.params

@@ -18,6 +18,7 @@ class Stage(Enum):
     MERGE = "merge"  # the points of range views become one cloud
     UPLOAD = "upload"  # the arrays that the backend reads go to the GPU
     ESTIMATE = "estimate"  # normals and radii that the scan lacks
+    FORESEE = "foresee"  # facts about the points, where pictures wait for them
     DERIVE = "derive"  # what the backend prepares for the pose
     DERIVE_VIEW = "derive for the view"  # what the backend prepares for one view of the pose
 

@@ -21,12 +21,14 @@ _CONFIGURATIONS = 4  # results of a pose for different backends and parameters
 @dataclass(eq=False)
 class Resident:
     """A pose on the GPU. life: of the pose as it was given; that of the GpuPose is the same but does not keep
-    it alive. derived: what was derived, the last used last."""
+    it alive. derived: what was derived, the last used last. foreseen: backends and parameters for which the
+    facts about the points are known."""
 
     life: weakref.ref[Life]
     gpu_pose: GpuPose
     derived: OrderedDict[DerivedKey, Derived] = field(default_factory=OrderedDict)
     jobs: Jobs = field(default_factory=Jobs)
+    foreseen: set[object] = field(default_factory=set)
 
     def store(self, key: DerivedKey, derived: Derived) -> None:
         """Store derived data. The results for the views and the parameters used longest ago go."""

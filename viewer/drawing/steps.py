@@ -39,6 +39,8 @@ def next_step(resident: Resident, request: Request, view: View | None) -> Prepar
             gpu_pose.pose.scan.note_sides(found.sides)
 
         return Preparation(Stage.ESTIMATE, missing, name, estimate, args, take)
+    if _awaits_facts(resident, request):
+        return _foresee(resident, request)
     key = derived_key(request, view)
     return None if key is None or key in resident.derived else _derive(resident, request, key, view)
 
@@ -47,10 +49,11 @@ def derived_key(request: Request, view: View | None) -> DerivedKey | None:
     """Key of what the backend derives for this picture; None where it derives nothing, or for a view that is
     not given."""
     backend, params = request.backend, request.params
-    if backend.derives is Derives.NEVER or (backend.derived_by_camera and view is None):
+    what = None if backend.derives is Derives.NEVER else backend.derive_key(params)
+    if what is None or (backend.derived_by_camera and view is None):
         return None
     seen = view.key if backend.derived_by_camera and view is not None else None
-    return DerivedKey((backend.name, *backend.derive_key(params)), seen)
+    return DerivedKey((backend.name, *what), seen)
 
 
 def _derive(resident: Resident, request: Request, key: DerivedKey, view: View | None) -> Preparation:
@@ -67,6 +70,26 @@ def _derive(resident: Resident, request: Request, key: DerivedKey, view: View | 
     stage = Stage.DERIVE if key.view is None else Stage.DERIVE_VIEW
     on_thread = backend.derives is Derives.ON_THREAD
     return Preparation(stage, key, f"Preparing {backend.title}", backend.derive, args, take, on_thread)
+
+
+def _awaits_facts(resident: Resident, request: Request) -> bool:
+    backend, params = request.backend, request.params
+    if not backend.awaits_facts(params) or (backend, params) in resident.foreseen:
+        return False
+    return not (resident.gpu_pose.is_split or request.draws_samples)
+
+
+def _foresee(resident: Resident, request: Request) -> Preparation:
+    backend, params = request.backend, request.params
+
+    def args() -> tuple[Any, ...]:
+        return resident.gpu_pose.stored, params
+
+    def take(_: None) -> None:
+        resident.foreseen.add((backend, params))
+
+    name = f"Preparing {backend.title}"
+    return Preparation(Stage.FORESEE, (backend, params), name, backend.foresee, args, take, on_thread=True)
 
 
 def _merge(pose: GpuPose) -> bool:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from ..picture.sample import lots
 from ..scan.points import NOTHING, PointCloud, strided
+from ..view import View
 from .sectors import Sectors
 
 _OCCUPIED = 0.5  # of the sectors inside the object's outline: a of eq. 5
@@ -21,6 +22,7 @@ _COARSE = 64  # cells along an edge of the coarse map
 _PARTS = 4  # steps in which the edge doubles: small changes of a scan leave it
 _NEAREST = 0.02  # share of the points
 _LEAST = 1 / 16  # of the usual distance: gaps between nearer points stay open
+_EYE_BITS = 36  # of an eye's position
 _ROOM = 1 + 1e-5  # so that rounding puts no point of the sphere outside the grid
 
 
@@ -49,6 +51,23 @@ def _body(cloud: PointCloud) -> Body:
     radius = math.sqrt(float(np.einsum("ij,ij->i", away, away).max()))
     least = float(np.abs(points).max()) * 1e-6 or 1.0  # of points that all coincide
     return Body(center + cloud.origin, max(radius, least) * _ROOM, _distinct(cloud.positions))
+
+
+def directions_of(cloud: PointCloud, origin: NDArray[np.float64], view: View) -> tuple[Sectors, Body]:
+    """How directions from a view's eye are divided, and the body that it sees. origin: (3,), what positions
+    of the cloud are relative to on the GPU."""
+    body = body_of(cloud)
+    if view.perspective:
+        eye = _snapped(view.origin - view.rotation.T @ view.translation, body)
+        return Sectors.around(body.center, body.radius, eye, origin), body
+    return Sectors.along(body.center, body.radius, -view.rotation[2], origin), body
+
+
+def _snapped(eye: NDArray[np.float64], body: Body) -> NDArray[np.float64]:
+    """The eye without what rounding makes of it when the camera turns."""
+    away = eye - body.center
+    step = 2.0 ** (math.ceil(math.log2(max(float(np.abs(away).max()), body.radius))) - _EYE_BITS)
+    return body.center + np.round(away / step) * step
 
 
 def copies(cloud: PointCloud) -> NDArray[np.uint32]:
@@ -85,7 +104,7 @@ def _words(positions: NDArray[np.float32]) -> NDArray[np.uint64]:
 class SectorSearch(NamedTuple):
     """A search for visible points. sectors: how directions are divided. steps: of propagation, which close
     the gaps between visible points. stride: sectors between those whose candidates are compared with a
-    point."""
+    point; 0: none is."""
 
     sectors: Sectors
     steps: int

@@ -44,11 +44,11 @@ class Candidates:
     """Candidates of the sectors around an eye, and what is visible, on the GPU.
 
     rows: R32UI, a texel a sector, the row of its candidate, NOTHING where it has none. inside: the
-    sectors that may have one. sector_positions: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI, a texel a row, the sector
-    that it lies in, NOTHING in none, and its key there. visible: R32UI, a texel a row, 1 where it is on the
-    hull of the flipped candidates around it, or lies in no sector, so that nothing known hides it. state:
-    another object after each `find`. sectors: what `rows` are of; shaders that include hpr/sectors.glsl take
-    it as `params`, with `defines`.
+    sectors that may have one. sector_positions: RGB32F, a texel a row of the pose (`Sectors`). homes: RG32UI,
+    a texel a row, the sector that it lies in, NOTHING in none, and its key there. visible: R32UI, a texel a
+    row, 1 where it is on the hull of the flipped candidates around it, or lies in no sector, so that nothing
+    known hides it; but see `stride` of `find`. state: another object after each `find`. sectors: what `rows`
+    are of; shaders that include hpr/sectors.glsl take it as `params`, with `defines`.
 
     Raises InputError for more sectors or points than the driver takes.
     """
@@ -111,10 +111,10 @@ class Candidates:
         """Find the candidates of sectors, and which points are visible.
 
         positions: RGB32F, a texel a point, relative to the origin of the sectors. steps: of propagation at
-        most. stride: sectors between those whose candidates a point is compared with. sample: None: all
-        rows are looked at. among: R32UI, a texel a point, leaves out those where
-        it is 0; `visible` is then left as it is. clip: planes, points below one of which are left out, and
-        not visible.
+        most. stride: sectors between those whose candidates a point is compared with; 0: with none, so that
+        the candidates are visible, and nothing more, as in the paper. sample: None: all rows are looked at.
+        among: R32UI, a texel a point, leaves out those where it is 0; `visible` is then left as it is. clip:
+        planes, points below one of which are left out, and not visible.
         """
         self.sectors, self.steps, self.state = sectors, steps, object()
         gpu, shift = self._gpu, self._cell_shift(_EMPTY_BELOW if among is None else _EMPTY_AMONG_VISIBLE)
@@ -142,8 +142,10 @@ class Candidates:
         self._list_inside(shift)
         with gpu.timers.measure("propagate"):
             self._propagate(steps)
-        if among is None:
+        if among is None and stride:
             self._mark_visible(sampled, stride)
+        elif among is None:
+            self._mark_candidates()
 
     def _cell_shift(self, cells: float) -> int:
         """Halvings of the grid, until it has no more cells than so many for each point."""
@@ -217,6 +219,13 @@ class Candidates:
             gpu.set(on_hull, stride=stride)
             gpu.dispatch(near, -(-self.looked_at // _RUN))
             self._near.run(on_hull)
+
+    def _mark_candidates(self) -> None:
+        self._gpu.clear(self.visible.buffer, 0)
+        with self._gpu.timers.measure("visible"):
+            self.rows.bind(Texture.BEST)
+            self.visible.buffer.bind_to_storage_buffer(Storage.VISIBLE)
+            self.inside.run(self._gpu.compute("hpr/mark_candidates.comp"))
 
     def visible_rows(self) -> NDArray[np.uint32]:
         """The rows that are visible, ascending; waits for the GPU."""

@@ -19,29 +19,29 @@ from ..picture.surface import Surface
 from ..scan.noise import noise_of
 from ..scan.points import PointCloud, checked_viewpoint
 from ..scan.pose import Pose
-from ..view import View
-from .calibration import Body, EyeCalibration, SectorSearch, body_of, calibrate
+from .calibration import EyeCalibration, SectorSearch, body_of, calibrate, directions_of
 from .candidates import Candidates, RowSample
 from .clipping import EVERYWHERE, Planes, near_plane, side_planes
 from .covering import CLEAR, CLEAR_OF_NOISE, Covering, SpacedPoints
 from .exact import SeenPoints, as_cloud, flipping
+from .exact_search import ExactlySeen
 from .sectors import Sectors
-from .spacing import Spacings, copies_in, steady_points
+from .spacing import copies_in, spacing_texels, steady_points
 
-HULL = "hull"
-MODES = ("combined", HULL)
+HULL, PAPER, EXACT = "hull", "paper", "exact"
+MODES = ("combined", HULL, PAPER)  # of the search on the GPU
+_BY_SECTORS = (HULL, PAPER)
 DEPTH = 2.0  # of 1 to 4 the least errors in all, of three views of armadillo, igea and dragon each
 QUALITY = 0.5
 MOST_SECTORS = 1 << 24
 _MOVING = 0.5  # of the quality while the picture moves
-_EYE_BITS = 36  # of its position
 
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """Settings of a search; all but `mode` count for the hull alone."""
+    """Settings of a search; all but `mode` count for those that flip points alone."""
 
-    mode: str = MODES[0]  # one of `MODES`
+    mode: str = MODES[0]  # one of `MODES`, or `EXACT`
     quality: float = QUALITY  # sectors, relative to the number of which half would hold a point
     depth: float = DEPTH  # how far behind a surface points count as hidden, distances between points
     radius: float | None = None  # R of the flip, distances from the eye to the farthest point; None: found
@@ -71,7 +71,11 @@ class _Search:
         return sum(each.nbytes for each in (self._candidates, self._covering) if each)
 
     def hull(
-        self, pose: GpuPose, search: SectorSearch, sample: RowSample | None = None, clip: Planes = EVERYWHERE
+        self,
+        pose: GpuPose,
+        search: SectorSearch,
+        sample: RowSample | None = None,
+        clip: Planes = EVERYWHERE,
     ) -> Candidates:
         """Find the points on the hull of the flipped ones."""
         count = len(pose.cloud)
@@ -95,7 +99,7 @@ class _Search:
             self._covering = None
             self._covering = Covering(self._gpu, len(pose.cloud))
         self._covering.find(
-            SpacedPoints(steady_points(pose), pose.cached(Spacings).texels, copies_in(pose)),
+            SpacedPoints(steady_points(pose), spacing_texels(pose), copies_in(pose)),
             found.sectors,
             found.spacing / found.sectors.edge,
             _clearance(pose),
@@ -116,23 +120,29 @@ class SeenPicture(_Search):
 
     def __init__(self, gpu: Gpu, _: tuple[int, int]) -> None:
         super().__init__(gpu)
-        self._found: Candidates | Covering | None = None
+        self._found: Candidates | Covering | ExactlySeen | None = None
         self._pose: weakref.ref[GpuPose] | None = None
         self._sought: tuple[object, ...] = ()
         self._chosen: dict[str, str] = {}
         self.calibration: EyeCalibration | None = None  # for what was found
 
     def look(
-        self, pose: GpuPose, frame: FrameView, surface: Surface, settings: SearchSettings
-    ) -> Candidates | Covering:
-        """Find the visible points of a picture, unless they are known."""
-        directions, body = _directions(pose, frame.view)
+        self,
+        pose: GpuPose,
+        frame: FrameView,
+        surface: Surface,
+        settings: SearchSettings,
+        exact: ExactlySeen | None = None,
+    ) -> Candidates | Covering | ExactlySeen:
+        """Find the visible points of a picture, unless they are known. exact: those of `EXACT`."""
+        directions, body = directions_of(pose.stored, pose.origin, frame.view)
         near, sample = near_plane(frame.view, body), surface.take_sample(frame.share)
         hull = (settings.quality, settings.depth, settings.radius, settings.sectors, settings.steps)
-        sought = (sample[1], directions, near, *(hull if settings.mode == HULL else ()))
+        by_sectors = hull if settings.mode in _BY_SECTORS else ()
+        sought = (settings.mode, exact, sample[1], directions, near, *by_sectors)
         # What is found at rest is in all directions, and stays while the camera turns.
         sides = side_planes(frame.view, body) if frame.moving else None
-        if settings.mode != HULL and sides == EVERYWHERE[1:]:
+        if settings.mode == EXACT or (settings.mode not in _BY_SECTORS and sides == EVERYWHERE[1:]):
             sides = None  # nothing else is coarser
         stats = surface.stats
         known = self._found is not None and self._pose is not None and self._pose() is pose
@@ -140,7 +150,7 @@ class SeenPicture(_Search):
             stats.skipped["visible"] = "the pose and the position of the camera are the same as before"
         else:
             clip = (near, *(sides or EVERYWHERE[1:]))
-            self._find(pose, directions, clip, (settings, frame.moving), sample, surface.stats.share)
+            self._find(pose, directions, clip, (settings, frame.moving, exact), sample, surface.stats.share)
             self._pose, self._sought = weakref.ref(pose), (sought, sides)
         assert self._found is not None
         stats.chosen.update(self._chosen)
@@ -153,28 +163,36 @@ class SeenPicture(_Search):
         pose: GpuPose,
         directions: Sectors,
         clip: Planes,
-        asked: tuple[SearchSettings, bool],
+        asked: tuple[SearchSettings, bool, ExactlySeen | None],
         sample: tuple[gl.BufferTexture | None, int],
         share: float,
     ) -> None:
-        settings, is_moving = asked
+        settings, is_moving, exact = asked
         radius = None if settings.radius is None else settings.radius * directions.farthest
         rows, count = sample
         drawn = count / len(pose.cloud)
         found = calibrate(pose.stored, directions, pose.origin, settings.depth, radius, drawn)
         self.calibration = found
+        if exact is not None:
+            length = exact.radius * directions.farthest if math.isfinite(found.radius) else math.inf
+            self._found, self._chosen = exact, {"radius": _told(length)}
+            return
         only = None if rows is None else RowSample(rows, count, share)
-        if settings.mode != HULL:
+        if settings.mode not in _BY_SECTORS:
             self._found, self._chosen = self.uncovered(pose, found, only, clip), {}
             return
         quality = settings.quality * (_MOVING if is_moving else 1.0)
-        search = chosen_search(found, settings.sectors, settings.steps, quality)
+        search = _compared(chosen_search(found, settings.sectors, settings.steps, quality), settings.mode)
         self._found = self.hull(pose, search, only, clip)
         self._chosen = {
-            "radius": "parallel rays" if math.isinf(found.radius) else f"{found.radius:.4g}",
+            "radius": _told(found.radius),
             "sectors": f"{search.sectors.count:,} ({search.sectors.mapping})",
             "steps": str(search.steps),
         }
+
+
+def _told(radius: float) -> str:
+    return f"{radius:.4g}" if math.isfinite(radius) else "parallel rays"
 
 
 class _Asked(_Search):
@@ -194,22 +212,6 @@ class _Asked(_Search):
         return self._pose
 
 
-def _directions(pose: GpuPose, view: View) -> tuple[Sectors, Body]:
-    """How directions from a view's eye are divided, and the body that it sees."""
-    body = body_of(pose.stored)
-    if view.perspective:
-        eye = _snapped(view.origin - view.rotation.T @ view.translation, body)
-        return Sectors.around(body.center, body.radius, eye, pose.origin), body
-    return Sectors.along(body.center, body.radius, -view.rotation[2], pose.origin), body
-
-
-def _snapped(eye: NDArray[np.float64], body: Body) -> NDArray[np.float64]:
-    """The eye without what rounding makes of it when the camera turns."""
-    away = eye - body.center
-    step = 2.0 ** (math.ceil(math.log2(max(float(np.abs(away).max()), body.radius))) - _EYE_BITS)
-    return body.center + np.round(away / step) * step
-
-
 def chosen_search(
     found: EyeCalibration, count: int | None, steps: int | None, quality: float = QUALITY
 ) -> SectorSearch:
@@ -219,6 +221,11 @@ def chosen_search(
     edge = math.sqrt(min(wanted, MOST_SECTORS) / faces)
     search = found.with_sectors(max(round(edge), 1))
     return search if steps is None else search._replace(steps=steps)
+
+
+def _compared(search: SectorSearch, mode: str) -> SectorSearch:
+    """The search, in which points are compared with candidates or, in the paper's way, with none."""
+    return search._replace(stride=0) if mode == PAPER else search
 
 
 def calibrated(
@@ -254,8 +261,9 @@ def visible_points(
     points: a pose, or (N, 3) absolute; ids count the points that it came with, also those that are
     left out because a coordinate is not finite. eye: (3,), absolute. radius: R of the flip, scan units, not
     less than the distance to the farthest point; sectors: how many, k; steps: of propagation at most; None:
-    as `calibrated` says; the hull alone goes by these. mode: "hull" takes the points on the hull of the
-    flipped ones, as the sectors find it; "combined" those that no others cover (`Covering`). Of points at one
+    as `calibrated` says; "hull" and "paper" alone go by these. mode: "hull" takes the points on the hull of
+    the flipped ones, as the sectors find it; "paper" only the candidates of sectors (Machado e Silva 2014);
+    "combined" those that no others cover (`Covering`). Of points at one
     position one is visible, and so is a point in the eye itself. gpu: None takes a context of its own, which
     is kept. What was found of a pose is kept until another is asked for, so that further eyes take less.
     Raises InputError, NoOpenGLError.
@@ -266,12 +274,14 @@ def visible_points(
     if not len(cloud):
         return np.empty(0, np.uint32)
     found = calibrated(cloud, eye, radius)
-    search = chosen_search(found, sectors, steps)
+    search = _compared(chosen_search(found, sectors, steps), mode)
     gpu.activate()
     gpu.collect()
     asked = gpu.cached(_Asked)
     pose = asked.pose_of(cloud)
-    rows = (asked.hull(pose, search) if mode == HULL else asked.uncovered(pose, found)).visible_rows()
+    by_sectors = mode in _BY_SECTORS
+    seen = asked.hull(pose, search) if by_sectors else asked.uncovered(pose, found)
+    rows = seen.visible_rows()
     return rows if cloud.ids is None else cloud.ids[rows]
 
 

@@ -1,4 +1,5 @@
-"""Spacings: how far apart the points of a pose lie, around each of them."""
+"""What a search for visible points reads of the points of a pose, whatever the eye: how far apart they lie,
+and where they lie without noise."""
 
 from __future__ import annotations
 
@@ -6,22 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..gpu import gl
-from ..gpu.bindings import Storage, Texture
-from ..gpu.bins import Bins
-from ..gpu.compact import IndexList
-from ..gpu.context import Program
 from ..gpu.pose import GpuPose
-from ..gpu.scatter import Visits
-from ..scan.noise import Noise, noise_of, steadied
+from ..scan.noise import noise_of, steadied
 from ..scan.points import NOTHING, PointCloud
 from ..scan.spacing import typical_spacing
+from ..task import checkpoint
 from .calibration import body_of, copies
 
 NEAREST, FEWEST = 10, 8  # the nearest points that give the spacing are the eighth to the tenth
 _BALL = 2.5  # first radius of the search, in usual distances; it is doubled where it finds too few points
 _LEVELS = 6
+_MOST_CELLS = 1 << 20  # to each side of the origin; what lies farther off counts as in the last one
 _NET_STEPS = 4095  # along an axis of an octahedron's net
-_PER_CELL = 4  # points, in the table of voxels
 
 
 def copies_in(pose: GpuPose) -> gl.BufferTexture | None:
@@ -41,13 +38,58 @@ def steady_points(pose: GpuPose) -> gl.BufferTexture:
     as hpr/steady.glsl reads it."""
     if not is_steadied(pose):
         return pose.array("positions")
-    return pose.packed(_steady_texels, noise_of(pose.stored), texel_format=gl.RGBA32F)
+    return pose.packed(_steady_texels, pose.stored, texel_format=gl.RGBA32F)
 
 
-def _steady_texels(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
-    """Positions with less noise and normals, (N, 4): a whole number with 12 bits for each axis of an
-    octahedron's net, and 1 more; 0: no normal."""
-    steady = steadied(cloud, noise)
+def spacing_texels(pose: GpuPose) -> gl.BufferTexture:
+    """`local_spacings` of a pose, R32F, a texel a row."""
+    return pose.packed(local_spacings, of=pose.stored)
+
+
+def local_spacings(cloud: PointCloud) -> NDArray[np.float32]:
+    """The distance between neighbours around each point of a cloud, without noise, (N,), scan units.
+
+    The `FEWEST`-th to the `NEAREST`-th nearest point each tell a spacing, and the largest counts, so that
+    splats beside a gap reach across it. Other parts of the scan do not change it. Copies do not count. Found
+    once.
+    """
+    return cloud.remember(_local_spacings)
+
+
+def _local_spacings(cloud: PointCloud) -> NDArray[np.float32]:
+    from .spacing_kernels import note_spacings
+
+    points = cloud.positions
+    if noise_of(cloud).stands_out:
+        points = points + cloud.remember(_steadying)[:, :3]
+    distinct = slice(None) if body_of(cloud).count == len(cloud) else np.flatnonzero(copies(cloud) == NOTHING)
+    spacings = np.full(len(cloud), np.nan, np.float32)
+    for level in range(_LEVELS):
+        todo = np.flatnonzero(np.isnan(spacings))
+        if not len(todo):
+            break
+        checkpoint()
+        reach = _BALL * cloud.remember(_usual) * 2**level
+        cells = _cells(points, reach)
+        others, theirs = points[distinct], cells[distinct]
+        order, own_order = (codes.argsort(kind="stable") for codes in (theirs, cells[todo]))
+        todo, found = todo[own_order], np.empty(len(todo), np.float32)
+        counts = FEWEST, NEAREST, NEAREST if level < _LEVELS - 1 else 0
+        note_spacings(others[order], theirs[order], points[todo], cells[todo], reach, counts, found)
+        spacings[todo] = found
+    return spacings
+
+
+def _cells(points: NDArray[np.float32], edge: float) -> NDArray[np.int64]:
+    """Numbers of the cells of an edge that points lie in, (N,), as `note_spacings` has them."""
+    at = np.clip(np.floor(points / edge), 2 - _MOST_CELLS, _MOST_CELLS - 2).astype(np.int64) + _MOST_CELLS
+    return (at[:, 0] << 42) + (at[:, 1] << 21) + at[:, 2]
+
+
+def _steadying(cloud: PointCloud) -> NDArray[np.float32]:
+    """The moves that take noise from points, scan units, and their normals, (N, 4): a whole number with 12
+    bits for each axis of an octahedron's net, and 1 more; 0: no normal."""
+    steady = steadied(cloud, noise_of(cloud))
     normals = steady.normals
     size = np.abs(normals).sum(axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -56,7 +98,15 @@ def _steady_texels(cloud: PointCloud, noise: Noise) -> NDArray[np.float32]:
     net = np.where(normals[:, 2:] < 0, turned, net)
     steps = np.rint((np.nan_to_num(net) + 1) * (0.5 * _NET_STEPS))
     word = np.where(size > 0, steps[:, 0] + (_NET_STEPS + 1) * steps[:, 1] + 1, 0)
-    return np.concatenate([steady.positions, word[:, None]], axis=1).astype(np.float32)
+    return np.concatenate([steady.positions - cloud.positions, word[:, None]], axis=1).astype(np.float32)
+
+
+def _steady_texels(cloud: PointCloud, stored: PointCloud) -> NDArray[np.float32]:
+    """The steadied positions of a cloud, relative to its origin, and their normals. stored: the same cloud,
+    as the scan has it."""
+    texels = stored.remember(_steadying).copy()
+    texels[:, :3] += cloud.positions
+    return texels
 
 
 def _usual(cloud: PointCloud) -> float:
@@ -69,66 +119,7 @@ def _usual(cloud: PointCloud) -> float:
 
 
 def foresee_spacing(cloud: PointCloud) -> None:
-    """Find the facts that the search for visible points reads, on any thread (`Backend.foresee`)."""
-    noise_of(cloud)
-    body_of(cloud)
-    cloud.remember(_usual)
-
-
-class Spacings:
-    """The distance between neighbours around each point of a pose, without noise.
-
-    The `FEWEST`-th to the `NEAREST`-th nearest point each tell a spacing, and the largest counts, so that
-    splats beside a gap reach across it. Other parts of the scan do not change it.
-
-    texels: R32F, a texel a row, scan units. They lie in space, so that they are the same for all eyes; kept
-    with the pose (`GpuPose.cached`).
-    """
-
-    def __init__(self, pose: GpuPose) -> None:
-        self.texels = gl.BufferTexture(pose.gpu.buffer(reserve=4 * max(len(pose.cloud), 1)), gl.R32F)
-        with pose.gpu.timers.measure("spacings"):
-            self._find(pose)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes held on the GPU."""
-        return self.texels.buffer.size
-
-    def _find(self, pose: GpuPose) -> None:
-        gpu, count, repeated = pose.gpu, len(pose.cloud), copies_in(pose)
-        cells = 1 << max(count // _PER_CELL, 1).bit_length()
-        bins, todo, sparse = Bins(gpu, cells), IndexList(gpu, count), IndexList(gpu, count)
-        todo.write(np.arange(count, dtype=np.uint32))
-        edge = 2 * _BALL * pose.stored.remember(_usual)
-        for level in range(_LEVELS):
-            if not len(todo):
-                break
-
-            def bind(program: Program, per_voxel: float = 1 / (edge * 2**level)) -> None:
-                gpu.set(program, per_voxel=per_voxel, table_mask=cells - 1)
-                steady_points(pose).bind(Texture.POSITIONS)
-                if repeated is not None:
-                    repeated.bind(Texture.COPIES)
-
-            defines = {"COPIES": int(repeated is not None)}
-            visits = Visits("hpr/voxel_items.glsl", count, bind, defines)
-            bins.count(visits)
-            bins.fill(visits, count)
-            last = level == _LEVELS - 1
-            counts = {"NEAREST": NEAREST, "FEWEST": FEWEST}
-            program = gpu.compute("hpr/spacing.comp", {"LAST": int(last), **counts})
-            bind(program)
-            bins.starts.bind(Texture.STARTS)
-            bins.items.bind(Texture.LISTED)
-            self.texels.buffer.bind_to_storage_buffer(Storage.SPACINGS)
-            sparse.clear()
-            sparse.bind(Storage.NEXT_LIST, Storage.NEXT_DISPATCH)
-            todo.run(program)
-            todo, sparse = sparse, todo
-        for each in (bins, todo, sparse):
-            each.release()
-
-    def release(self) -> None:
-        """Delete it."""
-        self.texels.release()
+    """Find the facts that the search for visible points reads of a cloud with points, on any thread."""
+    if noise_of(cloud).stands_out:
+        cloud.remember(_steadying)
+    local_spacings(cloud)

@@ -19,7 +19,7 @@ from viewer.drawing.renderer import Renderer
 from viewer.look import Look
 from viewer.picture.surface import Surface
 from viewer.scan.points import PointCloud
-from viewer.visibility.spacing import Spacings
+from viewer.visibility.spacing import local_spacings
 
 Draw = Callable[..., Surface]
 RING = ((-1, -1), (0, -1), (1, -1), (1, 0), (1, 1), (0, 1), (-1, 1), (-1, 0))
@@ -120,7 +120,7 @@ def test_normals_and_sizes_are_those_of_the_plain_version(renderer: Renderer, na
     size = reach + 0.5 * widths_of(scene, eye)
     leaning = size / np.maximum(cosine, 0.5)
     size = np.minimum(np.maximum(leaning, np.minimum(spacings, 3 * size)), 1.5 * spacings)
-    apart = np.frombuffer(scene.pose.cached(Spacings).texels.buffer.read(), np.float32)
+    apart = local_spacings(scene.pose.stored)
     apart = np.maximum(apart, widths_of(scene, eye))
     is_clear = seen & (np.abs(reach + 0.5 * widths_of(scene, eye) - 1.4 * apart) > 0.02 * apart)
     at_outline = reach + 0.5 * widths_of(scene, eye) > 1.4 * apart

@@ -14,16 +14,18 @@ from scenes import rarely, sphere
 from viewer.backends.hpr import Params
 from viewer.camera import Camera
 from viewer.drawing.frame import draw_plan
-from viewer.drawing.plan import make_plan
+from viewer.drawing.jobs import Stage
+from viewer.drawing.plan import Effort, Waiting, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
 from viewer.look import Look
 from viewer.picture.surface import Surface
+from viewer.scan.noise import noise_of
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
-from viewer.visibility.exact import exact_visible_points
-from viewer.visibility.search import HULL, MODES, calibrated, visible_points
+from viewer.visibility.exact import exact_visible_points, katz_radius
+from viewer.visibility.search import EXACT, HULL, MODES, PAPER, calibrated, visible_points
 
 EYE = np.array([0.0, 0.0, 4.0])
 SIZE = (64, 48)
@@ -133,6 +135,91 @@ def test_an_eye_far_away_sees_what_it_sees_from_less_far(seen: Seen, distance: f
     points = bumpy(3000)
     near, far = seen(points, [0, 0, 1e3]), seen(points, [0, 0, distance])
     assert len(np.setxor1d(near, far)) < 0.01 * len(near)
+
+
+def test_for_the_paper_the_candidates_alone_are_visible(seen: Seen, renderer: Renderer) -> None:
+    """As the plain twin finds them, and fewer than after points were compared with them."""
+    points, sectors = bumpy(), calibrated(bumpy(), EYE).sectors
+    at = sectors.sector_positions(points)
+    every = np.arange(sectors.count, dtype=np.uint32)
+    home = sectors.sector_of(at)
+    best, rows = np.full(sectors.count, np.inf), np.full(sectors.count, -1)
+    for row, (sector, key) in enumerate(zip(home, sectors.keys(at, home), strict=True)):
+        if key < best[sector]:
+            best[sector], rows[sector] = key, row
+    assert len(every[rows >= 0]) > 1000
+    found = seen(points, mode=PAPER, sectors=sectors.count, steps=0)
+    assert len(np.setxor1d(found, rows[rows >= 0])) <= 3
+    steps = seen(points, mode=PAPER, sectors=sectors.count)
+    assert len(steps) < len(found)
+    assert np.isin(steps, found).all(), "propagation only removes candidates"
+    compared = seen(points, sectors=sectors.count)
+    assert len(compared) > 1.05 * len(steps)
+    assert np.isin(steps, compared).mean() > 0.99
+
+
+@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
+def test_a_picture_shows_the_points_of_the_exact_operator(renderer: Renderer, projection: str) -> None:
+    drawn, camera = DrawnMarks(renderer, EXACT), Camera((0.0, 0, 4), projection=projection, height=3.0)
+    stats = drawn.draw(camera).stats
+    counts, points = stats.counted["points"](), bumpy()
+    if projection == "perspective":
+        assert counts["visible"] == len(exact_visible_points(points, EYE, float(stats.chosen["radius"])))
+    drawn.params = Params(mode=HULL)
+    hull = drawn.draw(camera).stats.counted["points"]()
+    assert counts["in"] == hull["in"] == len(points)
+    assert abs(counts["visible"] - hull["visible"]) < 0.05 * counts["visible"]
+    drawn.params = Params(mode=EXACT)
+    drawn.check(camera, skipped=False)
+    drawn.check(camera, skipped=True)
+
+
+def test_the_exact_operator_sees_nothing_before_the_near_plane(renderer: Renderer) -> None:
+    drawn = DrawnMarks(renderer, EXACT)
+    cut = drawn.draw(Camera((0.0, 0, 4), near=4.0))
+    shown = np.unique(cut.row[cut.row != 0xFFFFFFFF])
+    assert len(shown) > 200
+    assert (bumpy()[shown, 2] <= 0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", [HULL, EXACT])
+def test_the_radius_may_be_searched_for(renderer: Renderer, mode: str) -> None:
+    drawn, camera = DrawnMarks(renderer), Camera((0.0, 0, 4))
+    drawn.params = Params(mode=mode, radius_by="search")
+    told = float(drawn.draw(camera).stats.chosen["radius"])
+    assert told == pytest.approx(katz_radius(bumpy(), EYE), rel=1e-3)
+    with pytest.raises(InputError, match="needs a perspective camera"):
+        drawn.draw(replace(camera, projection="orthographic"))
+
+
+def test_a_map_of_directions_is_made_where_the_output_needs_it(renderer: Renderer) -> None:
+    drawn, camera = DrawnMarks(renderer), Camera((0.0, 0, 4))
+    drawn.params = Params(output="points")
+    bare = drawn.draw(camera).stats
+    assert "splats" in bare.skipped
+    lit = drawn.draw(camera, look=Look(light="head")).stats
+    assert "splats" not in lit.skipped
+    drawn.params = Params(output="faces")
+    assert "splats" not in drawn.draw(Camera((0.0, 0, 4.1))).stats.skipped
+
+
+def test_what_pictures_read_of_points_is_found_before_they_are_drawn(renderer: Renderer) -> None:
+    """On a thread: a window shows plain points until then, and the picture itself finds nothing more."""
+    drawn = DrawnMarks(renderer)
+    rng = np.random.default_rng(0)
+    noisy = bumpy(20_000) * rng.normal(1, 0.01, (20_000, 1))
+    drawn.pose = Pose(0, 0.0, "", PointCloud.from_arrays(noisy))
+    request = Request(drawn.pose, Camera((0.0, 0, 4)), "hpr", drawn.params, Look())
+    waiting = make_plan(renderer, request, SIZE, Effort.NONE)
+    assert isinstance(waiting, Waiting)
+    assert waiting.stage is Stage.FORESEE
+    renderer.work.prepare(request)
+    cloud = drawn.pose.cloud
+    known = set(cloud._facts)
+    assert noise_of(cloud).stands_out
+    drawn.draw(request.camera)
+    assert set(cloud._facts) == known
 
 
 def test_ids_are_those_of_the_file(seen: Seen) -> None:

@@ -18,6 +18,8 @@ from experiments.machado_2014.verdicts import (
     HULL_AT_4M,
     KATZ,
     MOST_PER_POINT,
+    OF_PAPER,
+    OF_PAPER_AT_4M,
     SCENES,
     JudgedView,
     Verdicts,
@@ -80,11 +82,12 @@ def judged(gpu: Gpu, view: JudgedView) -> Iterator[tuple[str, str, Row]]:
 def _on_gpu(gpu: Gpu, view: JudgedView, radius: float) -> Iterator[tuple[str, NDArray[np.uint32]]]:
     """Yield what the operator by sectors calls visible, in each mode, and with the paper's sectors."""
     pose = Pose(0, 0.0, "", view.cloud)
-    for mode in MODES:
-        yield mode, visible_points(pose, view.eye, radius=radius, mode=mode, gpu=gpu)
+    half_filled = calibrated(pose, view.eye, radius).sectors.count  # eq. 5
+    wanted = {mode: (mode, half_filled if mode == OF_PAPER else None) for mode in MODES}
     if MOST_PER_POINT * len(view.cloud) >= PAPER_SECTORS:
-        many = visible_points(pose, view.eye, radius=radius, sectors=PAPER_SECTORS, mode=HULL, gpu=gpu)
-        yield HULL_AT_4M, many
+        wanted |= {HULL_AT_4M: (HULL, PAPER_SECTORS), OF_PAPER_AT_4M: (OF_PAPER, PAPER_SECTORS)}
+    for method, (mode, sectors) in wanted.items():
+        yield method, visible_points(pose, view.eye, radius=radius, sectors=sectors, mode=mode, gpu=gpu)
 
 
 def best_radius(view: JudgedView, kernel: Callable[[float], Kernel]) -> float:

@@ -24,7 +24,8 @@ from viewer.visibility.exact import Kernel, SeenPoints, hull_rows
 PAPER = figures("machado_2014")  # counts and Table 1
 SCENES = ("armadillo", "igea", "dragon")
 BEST, AUTOMATIC, KATZ = "best", "automatic", "Katz's search"  # radii
-EXACT, HULL, HULL_AT_4M, COMBINED = "exact", "hull", "hull, k = 4e6", "combined"
+EXACT, HULL, COMBINED, OF_PAPER = "exact", "hull", "combined", "paper"
+HULL_AT_4M, OF_PAPER_AT_4M = "hull, k = 4e6", "paper, k = 4e6"
 
 MOST_PER_POINT = 1000  # sectors: with more, propagation takes too many steps
 _AZIMUTH, _ELEVATION = 30.0, 10.0  # of the first view, degrees

@@ -10,25 +10,44 @@ and the number of steps follow section 6 of the paper.
 sectors have about the same size up to 45 degrees from the middle. Around an eye near the scan, `hpr` uses six
 grids of sectors, like the faces of a cube. Second, `hpr` compares each point with the points that the sectors
 around it store. In `hpr`, several points of one sector can therefore be visible, so fewer sectors are enough.
+With `mode=paper`, only the points that sectors store are visible. With `mode=exact`, the CPU computes the
+hull of all flipped points with Qhull, for each view.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
+from typing import Any
 
+from ...gpu.context import Gpu
 from ...gpu.pose import GpuPose
 from ...params import param, radius_scale_param
 from ...picture.surface import Surface
 from ...scan.points import PointCloud
+from ...scan.pose import Pose
 from ...splatting.local import surface_param
+from ...view import View
 from ...visibility.candidates import UNLIMITED
-from ...visibility.search import DEPTH, HULL, MODES, MOST_SECTORS, QUALITY, SearchSettings, SeenPicture
+from ...visibility.exact_search import ExactlySeen, FoundOnCpu, find_on_cpu
+from ...visibility.search import (
+    DEPTH,
+    EXACT,
+    HULL,
+    MODES,
+    MOST_SECTORS,
+    PAPER,
+    QUALITY,
+    SearchSettings,
+    SeenPicture,
+)
 from ...visibility.spacing import foresee_spacing
-from .. import AROUND_ALL, NO_DETAIL, Backend, FrameView, Limit
+from .. import AROUND_ALL, NO_DETAIL, Backend, Derives, FrameView, Limit
 from .outputs import OUTPUTS, show_visible
 
 _SHOWN, _VISIBLE = "Shown", "Visibility"
-_OF_HULL = {"mode": (HULL,)}
+_BY_SECTORS, _FLIPPED = {"mode": (HULL, PAPER)}, {"mode": (HULL, PAPER, EXACT)}
+_BY = ("spacing", "search")  # what gives the radius
 
 
 @dataclass(frozen=True)
@@ -69,10 +88,11 @@ class Params:
     surface: str = surface_param("local", _SHOWN, when={"output": ("splats",)})
     mode: str = param(
         MODES[0],
-        "Test for visible points. hull: a point is visible if it lies on the convex hull of the flipped "
-        "points; combined: a point is visible if no disc around another point covers it. 'combined' "
-        "shows more points in folds, and hides more points behind gaps",
-        choices=MODES,
+        "Test for visible points. combined: a point is visible if no disc around another point covers it; "
+        "hull: a point is visible if it lies on the convex hull of the flipped points, which sectors "
+        "approximate; paper: only the points that sectors store are visible; exact: the exact hull, on the "
+        "CPU. 'combined' shows more points in folds, and hides more points behind gaps",
+        choices=(*MODES, EXACT),
         title="Visibility test",
         basic=True,
         group=_VISIBLE,
@@ -86,7 +106,7 @@ class Params:
         sweep=(0.25, 0.5, 1, 4),
         basic=True,
         group=_VISIBLE,
-        when=_OF_HULL,
+        when=_BY_SECTORS,
     )
     depth: float = param(
         DEPTH,
@@ -98,17 +118,26 @@ class Params:
         sweep=(1, 2, 4),
         basic=True,
         group=_VISIBLE,
-        when=_OF_HULL,
+        when=_FLIPPED,
     )
     radius: float | None = param(
         None,
         "Radius of the sphere that flips the points, as a multiple of the distance of the farthest "
-        "point; auto: computed from the depth and density of the points",
+        "point; auto: the radius that 'radius_by' gives",
         type=float,
         low=1,
         high=1e9,
         group=_VISIBLE,
-        when=_OF_HULL,
+        when=_FLIPPED,
+    )
+    radius_by: str = param(
+        _BY[0],
+        "What gives an automatic radius. spacing: the depth and density of the points; search: the radius "
+        "at which most points are visible from exactly one of two opposite eyes, which takes minutes",
+        choices=_BY,
+        title="Radius from",
+        group=_VISIBLE,
+        when=_FLIPPED,
     )
     sectors: int | None = param(
         None,
@@ -117,7 +146,7 @@ class Params:
         low=1,
         high=MOST_SECTORS,
         group=_VISIBLE,
-        when=_OF_HULL,
+        when=_BY_SECTORS,
     )
     steps: int | None = param(
         None,
@@ -127,8 +156,15 @@ class Params:
         low=0,
         high=UNLIMITED,
         group=_VISIBLE,
-        when=_OF_HULL,
+        when=_BY_SECTORS,
     )
+
+    @property
+    def is_on_cpu(self) -> bool:
+        """Whether the CPU finds something for each view."""
+        return self.mode == EXACT or (
+            self.mode in _FLIPPED["mode"] and self.radius is None and self.radius_by != _BY[0]
+        )
 
     @property
     def search(self) -> SearchSettings:
@@ -146,6 +182,8 @@ class VisiblePoints(Backend):
     blends = True
     fills = True
     finds_normals = True
+    derives = Derives.IN_PROCESS
+    derived_by_camera = True
     limits = {
         "rotated by 37 degrees": Limit(0.01, AROUND_ALL),
         "the near plane inside the scan": Limit(0.01, AROUND_ALL),
@@ -157,9 +195,30 @@ class VisiblePoints(Backend):
     }
 
     def foresee(self, cloud: PointCloud, params: Params) -> None:
-        """Estimate the noise and the spacing of points, which the search for visible points reads."""
+        """Estimate the noise and the spacing of points, and take the noise from them."""
         if len(cloud):
             foresee_spacing(cloud)
+
+    def awaits_facts(self, params: Params) -> bool:
+        """True: without these facts, no point is known to be visible."""
+        return True
+
+    def derive_key(self, params: Params) -> tuple[Any, ...] | None:
+        """The parameter values that the search on the CPU reads; None if the CPU searches nothing."""
+        key = params.mode == EXACT, params.depth, params.radius, params.radius_by
+        return key if params.is_on_cpu else None
+
+    def derive(self, pose: Pose, params: Params, view: View | None) -> FoundOnCpu | None:
+        """Find the radius, and the points that the exact operator calls visible; None without points."""
+        assert view is not None
+        if not len(pose.cloud):
+            return None
+        searched, exact = params.radius_by != _BY[0], params.mode == EXACT
+        return find_on_cpu(pose.cloud, view, params.depth, params.radius, searched=searched, exact=exact)
+
+    def upload(self, gpu: Gpu, arrays: FoundOnCpu | None) -> ExactlySeen:
+        """Mark the visible points on the GPU."""
+        return ExactlySeen(gpu, arrays or FoundOnCpu(math.inf, None))
 
     def draw(self, pose: GpuPose, frame: FrameView, surface: Surface) -> bool:
         """Find what the eye sees, unless that is known, and show it."""
@@ -167,6 +226,10 @@ class VisiblePoints(Backend):
             surface.clear()
             return False
         seen = surface.cached(SeenPicture)
-        candidates = seen.look(pose, frame, surface, frame.params.search)
+        settings, found = frame.params.search, frame.derived
+        if found is not None:
+            settings = replace(settings, radius=found.radius)
+        exact = found if settings.mode == EXACT else None
+        candidates = seen.look(pose, frame, surface, settings, exact)
         assert seen.calibration is not None
         return show_visible(pose, frame, surface, candidates, seen.calibration)

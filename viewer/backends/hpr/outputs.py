@@ -12,6 +12,7 @@ from ...splatting.squares import draw_squares
 from ...visibility.calibration import EyeCalibration
 from ...visibility.candidates import Candidates
 from ...visibility.covering import Covering
+from ...visibility.exact_search import ExactlySeen
 from ...visibility.spacing import is_steadied, steady_points
 from .. import FrameView
 from .faces import draw_faces
@@ -26,7 +27,7 @@ def show_visible(
     pose: GpuPose,
     frame: FrameView,
     surface: Surface,
-    seen: Candidates | Covering,
+    seen: Candidates | Covering | ExactlySeen,
     calibration: EyeCalibration,
 ) -> bool:
     """Show the visible points as the parameters say; True if a later call would show more of them.
@@ -36,6 +37,8 @@ def show_visible(
     params, splats = frame.params, surface.cached(SectorSplats)
     if params.output != "points" or wants_normals(surface.look):
         nearest = splats.of_visible(pose, seen, calibration, surface)
+    else:
+        surface.stats.skipped["splats"] = "points without light need no normals"
     if params.output == "faces":
         draw_faces(pose, surface, nearest, seen.visible, splats, params.longest)
     elif params.output == "splats":

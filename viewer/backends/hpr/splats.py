@@ -17,7 +17,8 @@ from ...picture.surface import Surface
 from ...visibility.calibration import EyeCalibration, body_of
 from ...visibility.candidates import Candidates
 from ...visibility.covering import Covering
-from ...visibility.spacing import Spacings, is_steadied, steady_points
+from ...visibility.exact_search import ExactlySeen
+from ...visibility.spacing import is_steadied, spacing_texels, steady_points
 
 _INFINITE = 1e12  # weight, from which on nearness alone counts but for ties
 _MOST_SECTORS = 1 << 22  # of which 24 bytes are kept
@@ -58,7 +59,7 @@ class SectorSplats:
     def of_visible(
         self,
         pose: GpuPose,
-        seen: Candidates | Covering,
+        seen: Candidates | Covering | ExactlySeen,
         calibration: EyeCalibration,
         surface: Surface,
     ) -> Candidates:
@@ -118,7 +119,7 @@ class SectorSplats:
             if has_colors:
                 pose.array("colors").bind(Texture.COLORS)
             texels.bind(Texture.SUMS)
-            pose.cached(Spacings).texels.bind(Texture.SPACINGS)
+            spacing_texels(pose).bind(Texture.SPACINGS)
             self["keys"].bind(Texture.KEYS)
             for name in ("splats", "looks", "spacings"):
                 self[name].buffer.bind_to_storage_buffer(storage(name))
