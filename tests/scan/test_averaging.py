@@ -228,6 +228,43 @@ def test_range_images_are_averaged_by_pixel() -> None:
     assert (counts[~before.mask] == 0).all()
 
 
+def steep_wall(frame: int, motion: float = 0.0) -> RangeView:
+    """A wall that faces the pod, and on the right one at 75 degrees to it, whose noise is four times as deep.
+    motion: of the right one, deviations of its noise in each frame."""
+    rng = np.random.default_rng((3, frame))
+    right = np.maximum(np.arange(SIDE) - SIDE // 2, 0)
+    sigma = np.where(right > 0, 0.04, 0.01)
+    depth = 100 + 0.466 * right + sigma * (rng.normal(size=(SIDE, SIDE)) - motion * frame)
+    return RangeView(
+        depth=depth.astype(np.float32), mask=np.ones((SIDE, SIDE), bool), fx=800, fy=800, cx=30, cy=30,
+        world_to_camera=np.eye(4),
+    )  # fmt: skip
+
+
+def test_deeper_noise_of_steep_surfaces_is_no_motion() -> None:
+    made = average([Pose.of(frame, 0.0, "", (steep_wall(frame),)) for frame in range(FRAMES)])
+    wall = slice(SIDE // 2 + 4, None)
+    assert made.average is not None
+    assert (made.average.counts.reshape(SIDE, SIDE)[:, wall] == FRAMES).mean() > 0.95
+    true = 100 + 0.466 * np.maximum(np.arange(SIDE) - SIDE // 2, 0)
+    assert (made.views[0].depth - true)[:, wall].std() == pytest.approx(0.04 / np.sqrt(FRAMES), rel=0.15)
+
+
+@pytest.mark.parametrize("motion", [2.0, 10.0, 50.0])
+def test_steep_surfaces_that_move_stay_as_scanned(motion: float) -> None:
+    poses = [Pose.of(frame, 0.0, "", (steep_wall(frame, motion),)) for frame in range(FRAMES)]
+    wall = slice(SIDE // 2 + 4, None)
+    assert np.array_equal(average(poses).views[0].depth[:, wall], poses[-1].views[0].depth[:, wall])
+
+
+@pytest.mark.parametrize("motion", [0.05, 0.2, 0.5, 1.0])
+def test_steep_surfaces_that_move_slowly_leave_no_ghost(motion: float) -> None:
+    poses = [Pose.of(frame, 0.0, "", (steep_wall(frame, motion),)) for frame in range(FRAMES)]
+    true = 100 + 0.466 * np.maximum(np.arange(SIDE) - SIDE // 2, 0) - 0.04 * motion * (FRAMES - 1)
+    error = (average(poses).views[0].depth - true)[:, SIDE // 2 + 4 :]
+    assert np.sqrt(np.square(error).mean()) < 1.3 * 0.04
+
+
 def test_a_moving_camera_ends_the_runs() -> None:
     moved = np.eye(4)
     moved[0, 3] = 1

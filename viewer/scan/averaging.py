@@ -7,7 +7,8 @@ is far smaller than the noise of one point.
 
 * Noise is how far points move against the mean of their cell from the frame before, so common motion does
   not count. Where that is far more than in most cells, neighbours move
-  differently, and the usual noise counts.
+  differently, and the usual noise counts. In range images, the usual noise grows as the surface turns away
+  from the pod.
 * A run ends at the frame in which a point lies too far from the mean of the run so far, or its cell does.
 * If a cell drifts steadily within its run, none of its points is averaged.
 
@@ -44,6 +45,7 @@ _BLOCK = 4  # pixels along each edge of a cell of a range image
 _ALONE, _TOGETHER = 4.0, 4.5  # deviations beyond which a point or the mean of a cell has moved
 _FEWEST = 4  # points of a cell whose mean counts
 _SHRUNK = 16.0  # points with the usual noise that count for the noise of each cell
+_STEEPEST = 10.0  # times the noise of a surface that faces the pod: 84 degrees, as in `Faults.deviation`
 _UNUSUAL = 2.5  # times the usual noise, beyond which points of a cell move differently
 _APART = 1.0  # spacings that rows of one place are apart at most, in most cells
 _CUT = 1.4  # times the points of a cell that a plane through its middle has
@@ -90,10 +92,16 @@ class _Made(NamedTuple):
 
 class _Runs:
     """The runs of N points, with three numbers each. labels: (N,) int32, the cell of each point, of so many
-    cells. rounding: how far equal values may lie apart; infinite: all values count as equal."""
+    cells. rounding: how far equal values may lie apart; infinite: all values count as equal. steepness: how
+    many times the usual noise is to be expected in each cell, (M,), or in all."""
 
     def __init__(
-        self, now: NDArray[np.float32], labels: NDArray[np.int32], cells: int, rounding: float
+        self,
+        now: NDArray[np.float32],
+        labels: NDArray[np.int32],
+        cells: int,
+        rounding: float,
+        steepness: NDArray[np.float64] | float = 1.0,
     ) -> None:
         from .averaging_kernels import RunSums
 
@@ -102,6 +110,7 @@ class _Runs:
         self.run = RunSums(
             np.zeros((count, 3), np.float32), np.ones(count, np.uint8), np.ones(count, np.bool_)
         )
+        self._squares = np.broadcast_to(np.square(steepness), cells)
         self.usual = 0.0  # variance of most cells: squared distances between two frames, by two
         self._variances: NDArray[np.float64] | None = None  # of each cell
         self._drifts = np.zeros((cells, 10))  # see `judge_cells`
@@ -135,10 +144,11 @@ class _Runs:
         count = np.maximum(cells[:, 0], 1)
         spread = cells[:, 1] / count - np.einsum("ij,ij->i", cells[:, 2:], cells[:, 2:]) / count**2
         variances = np.maximum(spread, 0) * count / np.maximum(count - 1, 1) / 2
-        known = variances[cells[:, 0] >= _FEWEST]
+        known = (variances / self._squares)[cells[:, 0] >= _FEWEST]
         self.usual = float(np.median(known)) if len(known) else 0.0
-        own = np.where(variances > _UNUSUAL**2 * self.usual, self.usual, variances)
-        return (count * own + _SHRUNK * self.usual) / (count + _SHRUNK) + self._rounding**2
+        usual = self.usual * self._squares
+        own = np.where(variances > _UNUSUAL**2 * usual, usual, variances)
+        return (count * own + _SHRUNK * usual) / (count + _SHRUNK) + self._rounding**2
 
     def _end_moving(self) -> None:
         """Let points have runs of one frame where motion ended the runs after a few frames, and where a cell
@@ -373,7 +383,7 @@ class _Image:
         cells = _Cells(labels, across * (int(rows[-1]) + 1), 1.0)
         numbers = _numbers(view, self._valid)
         largest = max(numbers.max(initial=0), -numbers.min(initial=0))
-        self.depths = _Runs(numbers, labels, cells.count, _ROUNDING * largest)
+        self.depths = _Runs(numbers, labels, cells.count, _ROUNDING * largest, _steepness(view))
         self.depths.run.is_open[:] = self._valid
         self._colors: _Runs | None = None
         if view.color is not None:
@@ -412,6 +422,31 @@ class _Image:
     def counts(self) -> NDArray[np.uint8]:
         """How many frames each pixel is the mean of, (H * W,); 0 where it sees no point."""
         return np.where(self._valid, self.depths.run.counts, np.uint8(0))
+
+
+def _steepness(view: RangeView) -> NDArray[np.float64]:
+    """How many times deeper the noise of each cell is than where the surface faces the pod, (M,): one over
+    the cosine of the incidence, by the mean depths of the cells around.
+
+    Of the two sides of a cell, the flatter one counts: at an outline, that is the cell's own surface.
+    """
+    edges = [(0, -size % _BLOCK) for size in view.depth.shape]
+    valid = np.pad(view.valid(), edges)
+    depth = np.where(valid, np.pad(view.depth, edges), 0)
+    shape = (valid.shape[0] // _BLOCK, _BLOCK, valid.shape[1] // _BLOCK, _BLOCK)
+    counts = valid.reshape(shape).sum(axis=(1, 3))
+    sums = depth.reshape(shape).sum(axis=(1, 3), dtype=np.float64)
+    means = np.divide(sums, counts, out=np.full(counts.shape, np.nan), where=counts > 0)
+    squares = np.zeros(means.shape)
+    with np.errstate(over="ignore", invalid="ignore"):  # of depths beyond all measure
+        for axis, focal in enumerate((view.fy, view.fx)):
+            apart = _BLOCK / focal * (1.0 if view.kind == "height" else means)
+            steps = np.abs(np.diff(means, axis=axis))
+            ends = [(int(axis == 0), 0), (int(axis == 1), 0)]
+            before = np.pad(steps, ends, constant_values=np.nan)
+            after = np.pad(steps, [end[::-1] for end in ends], constant_values=np.nan)
+            squares += np.nan_to_num(np.square(np.fmin(before, after) / apart), nan=0.0)
+    return np.minimum(np.sqrt(1 + squares), _STEEPEST).ravel()
 
 
 def _numbers(view: RangeView, valid: NDArray[np.bool_]) -> NDArray[np.float32]:
