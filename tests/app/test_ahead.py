@@ -18,16 +18,18 @@ from viewer.backends import backend
 from viewer.camera import Camera
 from viewer.document.document import Document
 from viewer.drawing.foresight import Foresight
+from viewer.drawing.frame import render_frame
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.drawing.work import BackgroundWork
+from viewer.picture.surface import Surface
 from viewer.rigid import STILL
 from viewer.scan.noise import known_noise
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 from viewer.scan.timeline import Timeline
 
-COUNT = 12
+COUNT, HELD = 12, 5  # frames, and how many of them fit where memory is short
 CAMERA = Camera.orbit(sphere(100).bounds())
 
 
@@ -299,3 +301,33 @@ def test_nothing_is_asked_for_before_there_is_a_camera(renderer: Noting, start: 
     ahead.advance(0.0)
     assert renderer.work.asked[-1] == []
     assert ahead.is_prepared(playback.pose)
+
+
+@pytest.mark.parametrize("reverse", [False, True], ids=["forwards", "backwards"])
+def test_a_loop_beyond_the_budget_uploads_a_part_of_the_poses_each_lap(
+    renderer: Noting, start: Callable, reverse: bool
+) -> None:
+    """The poses that fit stay from lap to lap, and pictures are the same to the bit."""
+    playback, ahead = start("points", reverse=reverse)
+    surface = Surface(renderer.gpu, (64, 48))
+    pictures: dict[int, bytes] = {}
+    playback.toggle(0.0)
+    laps = []
+    for lap in range(3):
+        uploads = 0
+        for frame in range(lap * COUNT, (lap + 1) * COUNT):
+            playback.advance(frame / 10 + 0.01)
+            ahead.advance(0.0)
+            pose = playback.pose
+            assert pose is not None
+            render_frame(renderer, playback.session.document.request(pose), surface)
+            renderer.budget_bytes = renderer.budget_bytes if frame else HELD * renderer.held_bytes
+            uploads += surface.stats.uploaded_bytes > 0
+            picture = surface.image().tobytes()
+            assert pictures.setdefault(pose.index, picture) == picture
+            assert renderer.held_bytes <= renderer.budget_bytes + renderer.bytes_of(pose)
+        laps.append(uploads)
+    surface.release()
+    assert len(pictures) == COUNT
+    assert laps[0] == COUNT
+    assert max(laps[1:]) <= COUNT - HELD + 1
