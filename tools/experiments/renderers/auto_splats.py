@@ -1,4 +1,6 @@
-"""Auto splats: normals by numbers of neighbours, uneven points, and two savings. It needs the data folder."""
+"""Auto splats: normals by numbers of neighbours, uneven points, a stream of scanners, and two savings.
+
+It needs the data folder; `stream` does not."""
 
 from __future__ import annotations
 
@@ -9,11 +11,13 @@ from itertools import product
 
 from experiments.pictures import draw, error_cells, errors_of, renderer, request, scene
 from experiments.preiner_2012.fits import fit_errors, noisy
+from experiments.preiner_2012.stream import Stream
 from experiments.script import Script
 from experiments.tables import Row, spaced
 from experiments.timing import CORES, by_turns
 from viewer.analysis.visible_normals import VisibleNormals, read_normals
 from viewer.backends.auto_splats.neighborhoods import Neighborhoods
+from viewer.bench.report.page import three_digits
 from viewer.bench.run import BenchSettings
 from viewer.bench.scenes.viewpoints import viewpoints
 from viewer.camera import Camera
@@ -23,6 +27,7 @@ from viewer.scan.pose import Pose
 BACKEND = "auto_splats"
 VIEWS, SIZE = 2, (880, 450)
 ROUNDS = 3
+AVERAGES = (0, 8, 16)  # frames
 
 
 def normals(_: Namespace) -> Iterator[Row]:
@@ -59,6 +64,22 @@ def uneven(_: Namespace) -> Iterator[Row]:
         yield {"scene": f"`{name}`, {spaced(len(subject.moment(0).pose.cloud))}", **error_cells(errors)}
 
 
+def stream(_: Namespace) -> Iterator[Row]:
+    """Holes and flicker of a stream of noisy scanners, by how many frames are averaged."""
+    for head in ("still", "moving"):
+        scanned = Stream(head == "moving", max(AVERAGES) - 1)
+        for noise in (0.1, 0.25, 0.5):
+            frames = scanned.frames(noise)
+            found = {average: scanned.judge(frames, average) for average in AVERAGES}
+            holes = max(each.holes for each in found.values())
+            row = {"head": head, "noise": str(noise), "holes": f"{three_digits(holes)} %"}
+            yield row | {_titled(average): f"{each.flicker:.2f}" for average, each in found.items()}
+
+
+def _titled(average: int) -> str:
+    return f"flicker, mean of {average}" if average else "flicker"
+
+
 def savings(_: Namespace) -> Iterator[Row]:
     """Errors and times with refinement and grid culling, and without."""
     settings = [{"refine": refine, "cull": cull} for refine, cull in product((False, True), repeat=2)]
@@ -82,4 +103,4 @@ def savings(_: Namespace) -> Iterator[Row]:
             yield {**named, **error_cells(errors), "time": f"{least[str(number)].busy / CORES:.0f} ms"}
 
 
-EXPERIMENT = Script([normals, uneven, savings], page="auto-splats.md")
+EXPERIMENT = Script([normals, uneven, stream, savings], page="auto-splats.md")
