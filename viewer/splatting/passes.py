@@ -129,8 +129,8 @@ def _farthest_first(points: Points, surface: Surface) -> Points:
 
 
 def splat_as_printed(points: Points, surface: Surface, feed: str, splats: Splats) -> None:
-    """Draw both passes as Slomp 2014 prints them (V-B): depths of whole quads alone; then enlarged splats over
-    one another, in the order in which they are fed, tested against these depths.
+    """Draw both passes as Slomp 2014 prints them (V-B): depths of whole quads alone; then enlarged splats
+    over one another, in the order in which they are fed, tested against these depths.
 
     Pixels have a colour, which the feed brings, and the depth of the nearest splat there; none shows a point.
     Depths of the first pass lie `epsilon` radii farther from the eye, as in the papers that Slomp 2014 cites

@@ -22,8 +22,11 @@ _FAR = 1e4  # radii of the scan, from where the operator sees almost parallel ra
 
 
 class FoundOnCpu(NamedTuple):
-    """Result of `find_on_cpu` for a view. radius: R, distances from the eye to the farthest point. visible: (N,)
-    uint32, 1 where a point is visible; None: nobody asked for it."""
+    """Result of `find_on_cpu` for a view.
+
+    radius: R, distances from the eye to the farthest point. visible: (N,) uint32, 1 where a point is visible;
+    None: nobody asked for it.
+    """
 
     radius: float
     visible: NDArray[np.uint32] | None
