@@ -16,23 +16,16 @@ from ..backends import backend
 from ..document.document import Document, KeptGoal
 from ..document.history import History
 from ..document.part import Part
-from ..document.saved_session import SavedSession
+from ..document.saved_session import SavedSession, known_as
 from ..document.schema import BackendName, ReadBy, is_object, usable
 from ..errors import InputError
-from ..files import absolute
 from ..geometry import UP
 from ..look import Look
-from ..scan.open import is_no_path
 from .laid import Laid
 from .part import WindowPart, chosen
 from .playing.player import Pace
 
 _MOST_LEFT = 50  # scans whose changes can still be undone
-
-
-def known_as(scan: str) -> str:
-    """The name that a scan is remembered by: its path from the root, wherever Scan4D was started."""
-    return scan if is_no_path(scan) else absolute(scan)
 
 
 def named_like(scan: str, folder: Path, suffix: str) -> Path:

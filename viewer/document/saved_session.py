@@ -139,6 +139,11 @@ def _named_from(folder: Path, scan: str) -> str:
 # --- those of all scans -----------------------------------------------------------------------
 
 
+def known_as(scan: str) -> str:
+    """The name that a scan is remembered by: its path from the root, wherever Scan4D was started."""
+    return scan if is_no_path(scan) else absolute(scan)
+
+
 def stored_file(scan: str) -> Path:
     """File of a scan's document. scan: its path from the root, or "demo"."""
     digest = hashlib.sha256(os.fsencode(scan)).hexdigest()[:32]

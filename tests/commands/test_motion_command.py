@@ -1,0 +1,104 @@
+"""`scan4d motion`: the table and the report, what it refuses, and that it goes on where it stopped."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Run
+from moving_hills import SIDE, hills
+from scipy.spatial.transform import Rotation
+
+from viewer.scan import formats
+from viewer.scan.points import PointCloud
+
+TURN = Rotation.from_rotvec([0.02, -0.03, 0.015])
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working directory: three frames of a patch that turns, and a region in its middle."""
+    monkeypatch.chdir(tmp_path)
+    Path("seq").mkdir()
+    for frame in range(3):
+        x, y = np.random.default_rng(frame).uniform(-SIDE / 2, SIDE / 2, (2, 2500))
+        points = (TURN**frame).apply(np.column_stack([x, y, hills(x, y)])) + np.array([0.5 * frame, 0, 0])
+        formats.write(f"seq/f{frame}.npz", PointCloud.from_arrays(points))
+    Path("region.json").write_text('{"spheres": [[0, 0, 0, 16]]}')
+    return tmp_path
+
+
+def test_the_table_and_the_report_are_written(run: Run) -> None:
+    done = run("motion", "seq", "--unit", "mm", "--region", "region.json", "--reference", "1", "-o", "out")
+    assert done.code == 0, done.err
+    assert done.out.endswith("out/transforms.csv\nout/report.json\nout/region.json\n")
+    with open("out/transforms.csv", newline="", encoding="utf-8") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["frame"] for row in rows] == ["1", "2", "3"]
+    assert [row["state"] for row in rows] == ["ok"] * 3
+    assert (rows[1]["qw"], rows[1]["tx"]) == ("1.0", "0.0")
+    turn = Rotation.from_quat([float(rows[2][name]) for name in ("qx", "qy", "qz", "qw")])
+    assert np.degrees((turn * TURN.inv()).magnitude()) < 0.1
+    shift = np.array([float(rows[2][name]) for name in ("tx", "ty", "tz")])
+    assert np.allclose(shift, [1, 0, 0] - TURN.apply([0.5, 0, 0]), atol=0.05)
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["reference"]["frame"] == 2
+    assert report["region"]["source"] == "region.json"
+    assert report["within_half_mm"]["mean"] > 0.99
+    assert report["states"] == {"ok": 3, "weak": 0, "gap": 0}
+    again = run("motion", "seq", "--unit", "mm", "--region", "out/region.json", "--reference", "1", "-o", "b")
+    assert again.code == 0, again.err
+    assert Path("b/transforms.csv").read_bytes() == Path("out/transforms.csv").read_bytes()
+    assert not Path("out/transforms.partial").exists()
+
+
+def test_a_scan_can_be_the_reference_of_another(run: Run) -> None:
+    done = run("motion", "seq", "--unit", "mm", "--reference", "seq/f1.npz", "-o", "out")
+    assert done.code == 0, done.err
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["reference"]["scan"] == "seq/f1.npz"
+    assert report["region"]["source"] == "found"
+    assert report["states"]["gap"] == 0
+
+
+def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    from viewer.analysis.motion import stabilise
+
+    words = ("motion", "seq", "--unit", "mm", "--region", "region.json", "-o")
+    assert run(*words, "whole").code == 0
+    right = stabilise.register_region
+    registered: list[object] = []
+
+    def interrupted(*args: object) -> object:
+        if len(registered) == 2:
+            raise KeyboardInterrupt
+        registered.append(args)
+        return right(*args)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(stabilise, "register_region", interrupted)
+        assert run(*words, "out").code != 0
+    assert len(Path("out/transforms.partial").read_text().splitlines()) == 3
+    assert not Path("out/transforms.csv").exists()
+    done = run(*words, "out")
+    assert done.code == 0
+    assert "2 of 3 frames are known" in done.out
+    assert Path("out/transforms.csv").read_bytes() == Path("whole/transforms.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("seq", "-o", "out"), "--unit mm"),
+        (("seq", "--unit", "mm", "--reference", "7", "-o", "out"), "no pose 7"),
+        (("seq", "--unit", "mm", "--region", "none.json", "-o", "out"), "none.json"),
+    ],
+)
+def test_mistakes_are_told(run: Run, words: tuple[str, ...], what: str) -> None:
+    done = run("motion", *words)
+    assert done.code == 2
+    assert what in done.err
+    assert not Path("out").exists()

@@ -1,0 +1,253 @@
+"""Find the rigid motion of a region, such as of the head, in all frames.
+
+DIR gets transforms.csv with the motion of each frame and how sure it is, report.json, and region.json with
+the points of the region. An interrupted command goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import __version__
+from ..analysis.motion.axes import anatomical_axes, weak_directions
+from ..analysis.motion.found import found_region
+from ..analysis.motion.partial import PartialMotions
+from ..analysis.motion.region import RigidRegion
+from ..analysis.motion.stabilise import FrameMotion, MotionReference, MotionState, WeakLimits, stabilise
+from ..csv_text import cell, save_rows
+from ..document.landmarks import Landmarks
+from ..document.recording import fingerprint
+from ..document.saved_session import known_as, stored
+from ..errors import InputError
+from ..files import output_folder, save_json
+from ..scan.inputs import scan_inputs
+from ..scan.pose import Pose
+from ..scan.timeline import Timeline
+from ..scan.times import frame_in_words
+from ..scan.units import conversion
+from ._console import progress, tell, warn
+from ._outputs import add_output_argument, claim
+from ._scans import SCAN_HELP, open_timeline, report
+
+_TABLE, _REPORT, _REGION, _PARTIAL = "transforms.csv", "report.json", "region.json", "transforms.partial"
+_COLUMNS = (
+    "frame", "time", "qw", "qx", "qy", "qz", "tx", "ty", "tz",
+    "sigma_rx", "sigma_ry", "sigma_rz", "sigma_tx", "sigma_ty", "sigma_tz", "state",
+)  # fmt: skip
+_CLOSE = 0.5  # mm
+_RIGID = 0.95  # of distances: a region of which fewer are close changes its shape
+_WORLD = np.eye(3)
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d motion`."""
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
+    parser.add_argument(
+        "--region", type=Path, metavar="FILE",
+        help="region that counts as rigid (JSON: spheres, points or landmarks); default: Scan4D finds it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--reference", type=_reference, default=0, metavar="I|SCAN",
+        help="reference: a frame of SCAN, counted from 0, or the first frame of another scan; default 0",
+    )  # fmt: skip
+    add_output_argument(parser, "folder for the results", "DIR")
+
+
+def run(args: Namespace) -> int:
+    """Write the motions of all frames."""
+    table, facts, region_file = (args.out / name for name in (_TABLE, _REPORT, _REGION))
+    with open_timeline(args, args.scan) as timeline:
+        claim([table, facts, region_file], _inputs(args, timeline), args.force)
+        limits = WeakLimits(_millimetres(timeline, _CLOSE))
+        region = RigidRegion.read(args.region) if args.region else None
+        pose, frame = _reference_pose(args, timeline)
+        if region is None:
+            tell("Scan4D looks for a region that stays rigid in all frames")
+            rows = found_region(timeline, pose, frame)
+        else:
+            rows = region.rows(pose.cloud, _places(args, region, frame))
+        output_folder(args.out)
+        reference = MotionReference.of(pose, rows, frame)
+        partial = PartialMotions(args.out / _PARTIAL, _key(args, timeline, pose, rows))
+        known = partial.read()
+        if known:
+            tell(f"Scan4D continues: {len(known)} of {len(timeline)} frames are known")
+        partial.begin(known)
+        with progress(len(timeline) - len(known)) as tick:
+            for index in stabilise(timeline, reference, limits.shift, known):
+                partial.add(index, known[index])
+                tick()
+        report(timeline, 0)
+        axes = _axes(args, pose)
+        states = {index: found.state(axes, limits) for index, found in known.items()}
+        rows_of_table = (_row(timeline, index, known[index], states[index]) for index in sorted(known))
+        save_rows(table, [_COLUMNS, *rows_of_table])
+        ids = rows if pose.cloud.ids is None else pose.cloud.ids[rows].astype(np.int64)
+        save_json(region_file, RigidRegion(np.empty((0, 4)), ids).to_json())
+        found = {
+            "version": __version__,
+            "scan": timeline.name,
+            "unit": timeline.unit,
+            "reference": _facts_of_reference(args, pose),
+            "region": _facts_of_region(args, pose, rows),
+            **_facts_of_motions(known, states, limits),
+            "weak_directions": [
+                {**asdict(one), "words": one.in_words(timeline.unit)}
+                for one in weak_directions(known, axes, limits)
+            ],
+        }
+        save_json(facts, found)
+        partial.end()
+        _tell(found, timeline)
+    for path in (table, facts, region_file):
+        tell(path)
+    return 0
+
+
+def _reference(text: str) -> int | str:
+    if not text:
+        raise ArgumentTypeError("'' is neither a number of a frame nor a scan")
+    return int(text) if text.isdecimal() else text
+
+
+def _inputs(args: Namespace, timeline: Timeline) -> list[Path]:
+    return [*scan_inputs(timeline), *([args.region] if args.region else [])]
+
+
+def _millimetres(timeline: Timeline, length: float) -> float:
+    """A length in mm in the unit of a scan. Raises InputError where that is no known length."""
+    factor = conversion("mm", timeline.unit)
+    if factor is None:
+        what = f"has the unit '{timeline.unit}', but ±{_CLOSE} mm needs a known length"
+        raise InputError(what, timeline.name, "MotionState the unit of the scan, such as --unit mm")
+    return length * factor
+
+
+def _reference_pose(args: Namespace, timeline: Timeline) -> tuple[Pose, int | None]:
+    """The pose that motions begin in, and its frame; None: it is of another scan."""
+    if isinstance(args.reference, int):
+        timeline.label(args.reference)  # raises where there is none
+        return timeline.pose(args.reference), args.reference
+    with open_timeline(args, args.reference) as other:
+        if conversion(other.unit, timeline.unit) != 1.0:
+            what = f"has the unit '{other.unit}', but the scan has '{timeline.unit}'"
+            raise InputError(what, other.name, "Use a reference in the unit of the scan")
+        return other.pose(0), None
+
+
+def _places(args: Namespace, region: RigidRegion, frame: int | None) -> dict[str, NDArray[np.float64]]:
+    """The positions of landmarks in the reference frame, for a region that names some. Raises InputError."""
+    if not region.landmarks:
+        return {}
+    if frame is None:
+        raise InputError("names landmarks, but the reference is another scan", args.region)
+    session = stored(known_as(args.scan))
+    if session is None:
+        hint = "Open the scan in the window and place landmarks"
+        raise InputError("names landmarks, but the scan has no saved session", args.region, hint)
+    placed = {one.name: one.key_at(frame) for one in session.document.part(Landmarks).all}
+    return {name: np.array(key.position) for name, key in placed.items() if key is not None}
+
+
+def _key(args: Namespace, timeline: Timeline, pose: Pose, rows: NDArray[np.int64]) -> dict[str, Any]:
+    """The scan, region and reference that partial motions must be of, to be used again."""
+    return {
+        "version": __version__,
+        "scan": known_as(args.scan),
+        "hash": fingerprint(timeline.files),
+        "times": len(timeline),
+        "reference": str(args.reference),
+        "label": pose.label,
+        "region": hashlib.sha256(rows.tobytes()).hexdigest(),
+    }
+
+
+def _row(timeline: Timeline, index: int, found: FrameMotion, state: MotionState) -> list[object]:
+    """The row of a frame."""
+    from scipy.spatial.transform import Rotation
+
+    if found.motion is None:
+        numbers: list[float | None] = [None] * 13
+    else:
+        x, y, z, w = Rotation.from_matrix(found.motion.rotation).as_quat(canonical=True)
+        sigmas = found.spread(_WORLD) / 1.96
+        numbers = [cell(value) for value in (w, x, y, z, *found.motion.matrix[:3, 3], *sigmas)]
+    return [index + 1, float(timeline.times[index]), *numbers, state.value]
+
+
+def _axes(args: Namespace, pose: Pose) -> NDArray[np.float64]:
+    """The anatomical axes of the subject in the reference frame."""
+    if args.up:
+        return anatomical_axes(args.up)
+    return anatomical_axes(pose.upright.up, pose.upright.front)
+
+
+def _facts_of_reference(args: Namespace, pose: Pose) -> dict[str, Any]:
+    """The facts of the reference, for the report."""
+    is_frame = isinstance(args.reference, int)
+    return {
+        "scan": None if is_frame else args.reference,
+        "frame": args.reference + 1 if is_frame else 1,
+        "label": pose.label,
+    }
+
+
+def _facts_of_region(args: Namespace, pose: Pose, rows: NDArray[np.int64]) -> dict[str, Any]:
+    """The facts of the region, for the report."""
+    return {
+        "source": "found" if args.region is None else str(args.region),
+        "points": len(rows),
+        "share_of_points": len(rows) / max(pose.count, 1),
+        "middle": pose.cloud.world()[rows].mean(axis=0).tolist(),
+    }
+
+
+def _facts_of_motions(
+    known: Mapping[int, FrameMotion], states: Mapping[int, MotionState], limits: WeakLimits
+) -> dict[str, Any]:
+    """The facts of the motions, for the report."""
+    shares = {index: found.within for index, found in known.items() if found.motion is not None}
+    least = min(shares, key=lambda index: shares[index]) if shares else None
+    return {
+        "within_half_mm": {
+            "mean": float(np.mean(list(shares.values()))) if shares else None,
+            "least": None if least is None else shares[least],
+            "least_in_frame": None if least is None else least + 1,
+        },
+        "states": {state.value: sum(one is state for one in states.values()) for state in MotionState},
+        "limits": {"degrees": limits.degrees, "length": limits.shift},
+        "gaps": {str(i + 1): known[i].reason for i in sorted(known) if known[i].motion is None},
+    }
+
+
+def _tell(found: Mapping[str, Any], timeline: Timeline) -> None:
+    """The report in words."""
+    region, within = found["region"], found["within_half_mm"]
+    tell(
+        f"The region has {region['points']:,} points, {region['share_of_points']:.0%} of the reference frame"
+    )
+    if within["mean"] is not None:
+        tell(f"{within['mean']:.1%} of the distances of the region from the frames are within ±{_CLOSE} mm")
+    for one in found["weak_directions"]:
+        warn(f"{one['words']} (in {one['frames']} of {len(timeline)} frames)")
+    if found["gaps"]:
+        number, reason = next(iter(found["gaps"].items()))
+        warn(f"{len(found['gaps'])} motions are gaps, such as that of {_frame(number)}: {reason}")
+    if within["least"] is not None and within["least"] < _RIGID:
+        warn(
+            f"The region does not stay rigid: only {within['least']:.1%} of its distances from "
+            f"{_frame(within['least_in_frame'])} are within ±{_CLOSE} mm. Choose another region"
+        )
+
+
+def _frame(number: int | str) -> str:
+    """The words for a frame, of its number in the report."""
+    return frame_in_words(int(number) - 1)
