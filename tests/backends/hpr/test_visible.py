@@ -15,7 +15,7 @@ from viewer.backends.hpr import Params
 from viewer.camera import Camera
 from viewer.drawing.frame import draw_plan
 from viewer.drawing.jobs import Stage
-from viewer.drawing.plan import Effort, Waiting, make_plan
+from viewer.drawing.plan import Effort, Failed, Waiting, make_plan
 from viewer.drawing.renderer import Renderer
 from viewer.drawing.request import Request
 from viewer.errors import InputError
@@ -189,8 +189,10 @@ def test_the_radius_may_be_searched_for(renderer: Renderer, mode: str) -> None:
     drawn.params = Params(mode=mode, radius_by="search")
     told = float(drawn.draw(camera).stats.chosen["radius"])
     assert told == pytest.approx(katz_radius(bumpy(), EYE), rel=1e-3)
-    with pytest.raises(InputError, match="needs a perspective camera"):
-        drawn.draw(replace(camera, projection="orthographic"))
+    parallel = Request(drawn.pose, replace(camera, projection="orthographic"), "hpr", drawn.params, Look())
+    refused = make_plan(renderer, parallel, SIZE)
+    assert isinstance(refused, Failed)
+    assert "needs a perspective camera" in str(refused.error)
 
 
 def test_a_map_of_directions_is_made_where_the_output_needs_it(renderer: Renderer) -> None:
