@@ -65,17 +65,18 @@ vec2 splat_axes(Point point, vec3 n, float depth, out precise vec3 u, out precis
 
 #if HAS_CELLS
 const float LEAST_SHARE = 0.15;  // of a splat's width that a neighbour's plane leaves
+const float GRAZING = 0.2;  // cosine between a normal and the line of sight, below which a plane is seen from the side
 
 // Move the middle of a splat from its point to that of its cell, and draw the splat in where the plane of a neighbour ends
-// the surface: where one of both planes faces the eye and the other does not, the splat would stick out of the outline. The side
-// towards the neighbour moves to the plane, and the opposite side stays. All in view space. n: normal of the splat; u, v: half-axes,
-// conjugate ones afterwards.
+// the surface: where the neighbour's plane is seen from the side, or shows the other side than the splat, the splat would stick out
+// of the outline. The side towards the neighbour moves to the plane, and the opposite side stays. All in view space. n: normal of
+// the splat; u, v: half-axes, conjugate ones afterwards.
 void fit_to_cell(Point point, vec3 n, inout precise vec3 center, inout precise vec3 u, inout precise vec3 v) {
     precise vec3 from = center;
     float depth = -center.z, least = least_radius / scale_at(max(depth, view_near));
     float longer = max(length(u), length(v));
     precise vec3 along = normalize(u), across = normalize(v);
-    bool faces = dot(n, towards_eye(from)) > 0.0;
+    float shown = dot(n, towards_eye(from)) > 0.0 ? 1.0 : -1.0;
     vec2 offset = cell_offset(point.cell.x);
     center += offset.x * u + offset.y * v;
     for (int k = 0; k < CELL_PLANES; ++k) {
@@ -84,7 +85,7 @@ void fit_to_cell(Point point, vec3 n, inout precise vec3 center, inout precise v
         precise vec3 to = cos(plane.x) * along + sin(plane.x) * across;
         precise float end = plane.z * longer;
         vec3 neighbor = cos(plane.y) * n + sin(plane.y) * to;
-        bool ends = code > 0.0 && (dot(neighbor, towards_eye(from + end * to)) > 0.0) != faces;
+        bool ends = code > 0.0 && shown * dot(neighbor, normalize(towards_eye(from + end * to))) < GRAZING;
         precise vec2 parts = vec2(dot(u, to), dot(v, to));
         precise float half_width = max(length(parts), 1e-30);
         precise float share = (end - dot(center - from, to)) / (2.0 * half_width) + 0.5;

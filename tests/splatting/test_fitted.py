@@ -94,7 +94,11 @@ def plain(positions: NDArray[np.float64], normals: NDArray[np.float64], row: int
     lengths = np.array([rough.lengths[0], max(rough.lengths[1], rough.lengths[0] / 16)])
     along, across = (np.cos(a) * u + np.sin(a) * v for a in (rough.turn, rough.turn + np.pi / 2))
     reach = reaches(np.stack([d @ along, d @ across], axis=1) * lengths / squares[:, None], directions(16))
-    found = ellipse_round(1.25 * np.where(reach > 1.5, 1.2, reach)[:, None] * lengths * directions(16), 4)
+    sides, near = lengths * directions(16), np.sqrt(squares) <= 2.5 * radius
+    spread = np.maximum((np.stack([d @ along, d @ across], axis=1)[near] @ sides.T).max(axis=0), 0.0)
+    width = np.linalg.norm(sides, axis=1)
+    reach = np.minimum(1.25 * np.where(reach > 1.5, 1.2, reach), spread / width**2 + 0.3 * radius / width)
+    found = ellipse_round(reach[:, None] * sides, 4)
     farthest = np.linalg.norm(found.middle) + found.lengths[0]
     is_round = found.lengths.prod() > 0.75 * radius**2 and farthest < 1.2 * radius
     first = np.cos(found.turn) * along + np.sin(found.turn) * across
@@ -118,7 +122,7 @@ def plain(positions: NDArray[np.float64], normals: NDArray[np.float64], row: int
         reach_to = turned(rough.middle, rough.turn) @ parts / slope + 1.25 * np.linalg.norm(
             lengths * parts / slope
         )
-        room = height + 0.1 * radius
+        room = height + 0.13 * radius
         if slope * reach_to - room > 0.05 * radius:
             cuts.append((slope * reach_to - room, *normal, room / slope))
     planes = np.array(sorted(cuts, reverse=True)[:3]).reshape(-1, 5)[:, 1:]
@@ -259,3 +263,23 @@ def test_they_spill_less_than_discs_and_close_as_well(renderer: Renderer, draw: 
     spill = [np.count_nonzero(drawn & (off > outline)) for drawn in (fitted, discs)]
     assert spill[0] < 0.8 * spill[1], spill
     assert np.count_nonzero(~fitted & (off < outline - 1)) < 0.01 * np.count_nonzero(off < outline)
+
+
+def ridge() -> PointCloud:
+    """Two faces, 200 points each: z = 0, which ends at y = 0, and y = 0 behind it."""
+    across, along = (np.random.default_rng(5).random((400, 2)) * [2, 1] - [1, 0]).T
+    front, zero = np.arange(400) < 200, np.zeros(400)
+    places = np.stack([across, np.where(front, along, zero), np.where(front, zero, -along)], axis=1)
+    return PointCloud.from_arrays(places, normals=np.where(front[:, None], [0.0, 0, 1], [0.0, -1, 0]))
+
+
+def test_they_end_at_a_ridge(renderer: Renderer, draw: Draw) -> None:
+    """The camera looks along z, and sees the second face from the side."""
+    cloud, camera = ridge(), Camera((0.0, -0.4, 4.0), target=(0.0, -0.4, 0.0))
+    pixel = 8 * math.tan(math.radians(camera.fov_y) / 2) / SIZE[1]
+    x = (np.arange(SIZE[0]) + 0.5 - SIZE[0] / 2) * pixel
+    y = (SIZE[1] / 2 - np.arange(SIZE[1])[:, None] - 0.5) * pixel - 0.4
+    past = (y < 0) & (np.abs(x) < 0.9)
+    fitted = draw(cloud, camera, SIZE, "surfels").id < 200
+    discs = draw(with_discs(renderer, cloud), camera, SIZE, "surfels", params={"radius": "own"}).id < 200
+    assert np.count_nonzero(fitted & past) < 0.2 * np.count_nonzero(discs & past)

@@ -53,9 +53,10 @@ _FIT = {
     "ROUND_FAR": 1.2,  # radii that the ellipse reaches at most
     "ROW": 2.0,  # times as long as wide: cells of points in rows
     "SPARE": _SPARE,
-    "NEAR": 2.5,  # radii: how far neighbours are whose planes count
+    "NEAR": 2.5,  # radii: how far neighbours are that end a splat
+    "MARGIN": 0.3,  # radii that a splat reaches beyond all of these
     "BELOW": 0.06,  # sine of the angle by which these lie below the splat's plane at least
-    "SLACK": 0.1,  # radii that a splat may rise over their planes
+    "SLACK": 0.13,  # radii that a splat may rise over their planes
     "LEAST_CUT": 0.05,  # radii that it would rise higher
 }
 _ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out

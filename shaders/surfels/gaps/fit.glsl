@@ -48,6 +48,8 @@ vec2 turned_by(float angle) { return vec2(cos(angle), sin(angle)); }
 
 // One over twice how far the cell reaches, against and along each of some directions, as in common/cell_reach.glsl.
 vec4 corner_back[CORNER_PARTS], corner_forth[CORNER_PARTS];
+// How far the neighbours around lie, against and along these: where none lies beyond, the surface bends away or ends.
+vec4 spread_back[CORNER_PARTS], spread_forth[CORNER_PARTS];
 
 // The corners of a cell that reaches so far forth and back in each of eight directions.
 void corners_of(vec4 forth, vec4 back, out vec2 corners[CORNERS]) {
@@ -88,7 +90,10 @@ void begin_fit(vec4 forth, vec4 back, float radius, vec3 u, vec3 v) {
         guess_to[k] = -2.0;
         guess_at[k] = 0;
     }
-    for (int part = 0; part < CORNER_PARTS; ++part) corner_back[part] = corner_forth[part] = vec4(0.0);
+    for (int part = 0; part < CORNER_PARTS; ++part) {
+        corner_back[part] = corner_forth[part] = vec4(0.0);
+        spread_back[part] = spread_forth[part] = vec4(0.0);
+    }
 }
 
 // A neighbour at d, in any order. at: its slot.
@@ -128,12 +133,15 @@ void find_cuts(vec3 place, vec3 n) {
 }
 
 void take_corner(vec3 d, float squared) {
-    vec2 at = vec2(dot(d, rough_u), dot(d, rough_v)) * rough.lengths / max(squared, 1e-30);
+    vec2 at = vec2(dot(d, rough_u), dot(d, rough_v)) * rough.lengths;
+    float inverse = 1.0 / max(squared, 1e-30), is_near = squared <= NEAR * NEAR * fit_radius * fit_radius ? 1.0 : 0.0;
     for (int part = 0; part < CORNER_PARTS; ++part) {
         vec4 angle = (vec4(0.0, 1.0, 2.0, 3.0) + float(4 * part)) * (TURN / float(CORNERS));
         vec4 along = at.x * cos(angle) + at.y * sin(angle);
-        corner_back[part] = min(corner_back[part], along);
-        corner_forth[part] = max(corner_forth[part], along);
+        corner_back[part] = min(corner_back[part], inverse * along);
+        corner_forth[part] = max(corner_forth[part], inverse * along);
+        spread_back[part] = min(spread_back[part], is_near * along);
+        spread_forth[part] = max(spread_forth[part], is_near * along);
     }
 }
 
@@ -172,8 +180,9 @@ void store_fit(uint row, vec3 place, vec3 n) {
         for (int k = 0; k < 4; ++k) {
             int i = 4 * part + k;
             vec2 to = rough.lengths * turned_by(TURN / float(CORNERS) * float(i));
-            corners[i] = forth[k] * to;
-            corners[i + CORNERS / 2] = -back[k] * to;
+            vec2 most = vec2(spread_forth[part][k], -spread_back[part][k]) / dot(to, to) + MARGIN * fit_radius / length(to);
+            corners[i] = min(forth[k], most.x) * to;
+            corners[i + CORNERS / 2] = -min(back[k], most.y) * to;
         }
     }
     Ellipse found = ellipse_round(corners, ROUNDS);
