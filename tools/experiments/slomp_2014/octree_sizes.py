@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from experiments.slomp_2014.scans import scans
 from viewer.bench.scenes import catalog
-from viewer.scan.octree import coding
 from viewer.scan.octree.build import Stop, build
-from viewer.scan.octree.coding import MaskCoder
 from viewer.scan.octree.cube import Cube
+from viewer.scan.octree.occupancy import OccupancyCoder
 from viewer.scan.octree.octree import Octree
 from viewer.scan.octree.storage import from_bytes, to_bytes
 from viewer.scan.open import DEMO, open_scan
@@ -139,11 +138,12 @@ def _sizes(scene: str, before: PointCloud, pose: PointCloud, name: str, stop: St
 
 def _masks(octree: Octree, previous: Octree | None) -> int:
     """Bytes of all masks, told by another tree on every level."""
-    coder = MaskCoder(1, previous.masks if previous else ())
+    coder = OccupancyCoder(previous.masks if previous else ())
     size = 0
     for masks in octree.masks:
-        size += len(coding.pack(coder.sort(masks, predicted=True)))
-        coder.descend(masks)
+        stored, learnt = coder.encode(masks, predicted=True)
+        size += len(stored)
+        coder.descend(masks, learnt)
     return size
 
 

@@ -1,10 +1,6 @@
-"""What the nodes of a tree hold as few bytes: ordered so that equal bytes come together, then LZMA.
+"""What the nodes of a tree show as few bytes: differences, then LZMA.
 
-Whoever reads a level knows all levels above it and, of a sequence, the whole tree of the pose before. For
-masks that tells two things of each node: the mask that the same octant has in the tree before, and which of
-the octants beside its six faces are there. Nodes of which the same is known have similar masks; they are
-stored together, each mask XOR the one before. Attributes are stored as differences from the parent's, or from
-those of the same octant in the tree before.
+Attributes are stored as differences from the parent's, or from those of the same octant in the tree before.
 """
 
 from __future__ import annotations
@@ -17,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from .neighbors import Bytes, Children, Neighbors, Nodes
+from .children import Bytes, Nodes
 
 MOST_RATIO = 64  # of unpacked to packed: what packs better stays as it is, so that a file cannot promise more
 _LZMA = {
@@ -50,47 +46,6 @@ def unpack(block: bytes, size: int, most: int = MOST_RATIO) -> Bytes:
     if len(plain) != size:
         raise InputError(f"a level has {len(plain)} bytes instead of {size}")
     return np.frombuffer(plain, np.uint8)
-
-
-class MaskCoder:
-    """Puts the masks of a level into the order in which they are stored, and back; it begins at the root."""
-
-    def __init__(self, root: int, before: tuple[Bytes, ...] = ()) -> None:
-        """root: how many nodes level 0 has. before: the masks of the tree before, on the same cube."""
-        self._neighbors = Neighbors(root)
-        self._before = before
-        self.counterparts = np.zeros(root, np.int32)  # the same octants in the tree before, -1: there is none
-
-    def sort(self, masks: Bytes, predicted: bool) -> Bytes:
-        """Order the masks of this level as they are stored, (n,). predicted: by the tree before."""
-        known, order = self._known(predicted)
-        return (masks ^ known)[order]
-
-    def restore(self, stored: Bytes, predicted: bool) -> Bytes:
-        """The masks of this level, (n,), from what is stored of it."""
-        known, order = self._known(predicted)
-        masks = np.empty_like(stored)
-        masks[order] = stored
-        return masks ^ known
-
-    def _known(self, predicted: bool) -> tuple[Bytes, NDArray[np.intp]]:
-        """The masks of the same octants in the tree before, 0 for none; the order of what is stored."""
-        known = np.zeros(len(self.counterparts), np.uint8)
-        if predicted and self._before:
-            known = np.append(self._before[0], np.uint8(0))[self.counterparts]
-        key = known.astype(np.uint16) << np.uint16(6) | self._neighbors.around()
-        return known, np.argsort(key, kind="stable")
-
-    def descend(self, masks: Bytes, deepest: bool = False) -> None:
-        """Go on to the level below the one that has these masks. deepest: which has no masks of its own, so
-        that `counterparts` are all that is asked of it."""
-        children = Children(masks) if deepest else self._neighbors.descend(masks)
-        if self._before:
-            above = self.counterparts[children.parents]
-            self.counterparts = Children(self._before[0]).find(above, children.octants)
-            self._before = self._before[1:]
-        else:
-            self.counterparts = np.full(len(children.parents), -1, np.int32)
 
 
 # --- attributes -------------------------------------------------------------------------

@@ -45,11 +45,12 @@ from .stored import StoredOctree, with_discs
 _MOST_POSES = 1 << 17  # an hour at 30 a second
 _LONGEST = 8  # octrees read for one pose
 _MARGIN = 1 / 8  # around the poses that a cube is made for, of its edge
-_NODE_BYTES = 68  # that decoding takes for a node of the largest level, beside attributes
+_NODE_BYTES = 36  # that decoding takes for a node of the largest level, beside attributes
+_AROUND_BYTES = 108  # the nodes around one, of two levels above those whose masks are decoded
 _HELD_BYTES = 17  # of a node, its mask, colour and normal
 _STRAY_BYTES = 200  # that reading a point outside takes
 _LEAF_BYTES = 60  # that points take for a leaf
-_MOST_RATIO = 100  # of memory to the file: leaves of surfaces take 6 bits and more each
+_MOST_RATIO = 200  # of memory to the file: leaves of surfaces take 5 bits and more each
 _TOO_LARGE = 2.5  # a cube, for a pose whose own is smaller by this factor
 _FIRST_SHOWN = 512  # nodes of the first level that is shown before all are there
 _FEW = 1 / 1024  # of a pose's points: what may be outside a cube that fits
@@ -242,7 +243,8 @@ class OctreeExtent(NamedTuple):
         # Twice: with the tree of the pose before.
         held = 2 * (_HELD_BYTES if self.header.width else 1) * sum(nodes)
         outside = _STRAY_BYTES * self.header.strays.nodes
-        return max(nodes) * (_NODE_BYTES + 4 * self.header.width) + held + outside
+        around = _AROUND_BYTES * sum(sorted(nodes[:-2])[-2:])
+        return max(nodes) * (_NODE_BYTES + 4 * self.header.width) + around + held + outside
 
 
 def _extents(path: Path) -> list[OctreeExtent]:

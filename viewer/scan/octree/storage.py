@@ -18,29 +18,25 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..points import UNKNOWN_UNIT, PointCloud
 from . import coding
-from .coding import Bytes, Counterparts, MaskCoder
-from .neighbors import Nodes
+from .children import Bytes, Nodes
+from .coding import Counterparts
+from .occupancy import OccupancyCoder
 from .octree import DEEPEST, Attributes, Octree
 
 MAGIC = b"\x8dSVO"
-VERSION = 2
-_VERSIONS = (
-    1,
-    VERSION,
-)  # that can be read: the first has no strays, and attributes are predicted from parents alone
+VERSION = 3
 _FREE = 1 << 22  # nodes of any tree: some 300 MB as points
 MOST_BEFORE = 255  # trees that have to be read before one
 
 _PACKED, _COLORS, _NORMALS = 1, 2, 4  # bits of `Header.flags`
-_FIXED = struct.Struct("<4s6BI5d2Q")  # magic, version, flags, before, depth, size of the unit, 0; numbers
+_FIXED = struct.Struct("<4s6BI5d2Q5I")  # magic, version, flags, before, depth, size of the unit, 0; numbers
 _LEVEL = struct.Struct("<4I")  # see `Level`
-_SECOND = struct.Struct("<5I")  # what version 2 adds: `predicted_attributes`, and the strays as a `Level`
 _CHECK = struct.Struct("<I")  # CRC-32 of the header before it
 _MOST_UNIT = 255  # bytes
 _WORTH = 31 / 32  # of the bytes of masks that stand alone: what takes more is not predicted from another tree
 _OF_ATTRIBUTES = 1 << 12  # of unpacked to packed: how many nodes there are is bounded by their masks
 _LARGEST = 1e18  # coordinates that a cloud may have
-LARGEST_HEADER = _FIXED.size + _SECOND.size + _MOST_UNIT + (DEEPEST + 1) * _LEVEL.size + _CHECK.size  # bytes
+LARGEST_HEADER = _FIXED.size + _MOST_UNIT + (DEEPEST + 1) * _LEVEL.size + _CHECK.size  # bytes
 
 
 @dataclass(frozen=True)
@@ -126,9 +122,9 @@ class Header:
         unit = self.unit.encode()
         kind = (MAGIC, VERSION, self.flags, self.before, len(self.levels) - 1, len(unit), 0)
         place = (self.predicted, self.time, *self.low.tolist(), self.edge, self.points, self.distinct)
-        second = _SECOND.pack(self.predicted_attributes, *astuple(self.strays))
+        others = self.predicted_attributes, *astuple(self.strays)
         levels = (_LEVEL.pack(*astuple(each)) for each in self.levels)
-        data = _FIXED.pack(*kind, *place) + second + unit + b"".join(levels)
+        data = _FIXED.pack(*kind, *place, *others) + unit + b"".join(levels)
         return data + _CHECK.pack(zlib.crc32(data))
 
 
@@ -223,15 +219,13 @@ def read_levels(
     if header.before and (previous is None or not _can_tell(header, previous, attributes)):
         raise InputError("this octree depends on the octree before it, which is missing")
     before = previous if header.before else None
-    coder = MaskCoder(header.levels[0].nodes, before.masks if before else ())
+    coder = OccupancyCoder(before.masks if before else ())
     masks: list[Bytes] = []
     found: list[Attributes] = []
     values: Bytes | None = None
     for number, (above, own) in enumerate(_whole_levels(header, read)):
         if number:
             masks.append(_read_masks(above, header, coder, len(masks)))
-            if header.flags & _PACKED:
-                coder.descend(masks[-1], deepest=number == len(header.levels) - 1)
         if attributes and header.width:
             predicted = before is not None and header.predicted_attributes >> number & 1
             known = _counterparts(before, coder.counterparts, number) if before and predicted else None
@@ -264,25 +258,23 @@ def read_header(data: bytes) -> tuple[Header, int]:
     """The header at the beginning of the bytes, and its size. Raises InputError where it is none."""
     if not data.startswith(MAGIC):
         raise InputError("no octree begins where the file should contain one")
-    if len(data) < _FIXED.size + _SECOND.size:
+    if len(data) < _FIXED.size:
         raise CutShort("ends within the header of an octree")
     _, version, flags, before, depth, unit_size, _, *place = _FIXED.unpack_from(data)
-    if version not in _VERSIONS:
+    if version != VERSION:
         raise InputError(
             f"contains octrees of format version {version}",
-            hint=f"This version of Scan4D reads format versions up to {VERSION}",
+            hint=f"This version of Scan4D reads format version {VERSION}",
         )
-    predicted_attributes, *strays = _SECOND.unpack_from(data, _FIXED.size) if version > 1 else [0] * 5
-    named = _FIXED.size + (_SECOND.size if version > 1 else 0)
-    start = named + unit_size
+    start = _FIXED.size + unit_size
     end = start + (depth + 1) * _LEVEL.size
     if len(data) < end + _CHECK.size:
         raise CutShort("ends within the header of an octree")
     if _CHECK.unpack_from(data, end)[0] != zlib.crc32(data[:end]):
         raise InputError("the header of an octree is damaged")
     levels = tuple(Level(*values) for values in _LEVEL.iter_unpack(data[start:end]))
-    predicted, time, x, y, z, edge, points, distinct = place
-    unit = data[named:start].decode(errors="replace")
+    predicted, time, x, y, z, edge, points, distinct, predicted_attributes, *strays = place
+    unit = data[_FIXED.size : start].decode(errors="replace")
     low = np.array([x, y, z])
     kind = flags, before, predicted
     header = Header(
@@ -374,24 +366,43 @@ def _store(octree: Octree, previous: Octree | None, packed: bool) -> _Blocks:
     """Blocks of each level; the shorter ones are predicted from the tree before, if that is worth it."""
     if not packed:
         return _Blocks([b"", *(masks.tobytes() for masks in octree.masks)], _store_attributes(octree))
-    coder = MaskCoder(int(octree.counts[0]), previous.masks if previous else ())
-    alone, predicted, places = [b""], [b""], [coder.counterparts]
-    for number, masks in enumerate(octree.masks, 1):
-        alone.append(coding.pack(coder.sort(masks, predicted=False)))
-        predicted.append(coding.pack(coder.sort(masks, predicted=True)) if previous else alone[-1])
-        coder.descend(masks, deepest=number == octree.depth)
-        places.append(coder.counterparts)
-    by_itself = _Blocks(alone, _store_attributes(octree))
+    by_itself = _Blocks(_store_masks(octree).blocks, _store_attributes(octree))
     if previous is None:
         return by_itself
-    of_masks, of_attributes = predicted, _store_attributes(octree, previous, places)
+    masks = _store_masks(octree, previous)
+    of_attributes = _store_attributes(octree, previous, masks.places)
     shorter = _Blocks(
-        [min(pair, key=len) for pair in zip(by_itself.masks, of_masks, strict=True)],
+        masks.blocks,
         [min(pair, key=len) for pair in zip(by_itself.attributes, of_attributes, strict=True)],
-        _shorter(of_masks[1:], by_itself.masks[1:]),
+        masks.predicted,
         _shorter(of_attributes, by_itself.attributes),
     )
     return shorter if shorter.size <= _WORTH * by_itself.size else by_itself
+
+
+class _Masks(NamedTuple):
+    """Stored masks. predicted: as in a `Header`. places: of each level the counterparts of its nodes."""
+
+    blocks: list[bytes]
+    predicted: int
+    places: list[Nodes]
+
+
+def _store_masks(octree: Octree, previous: Octree | None = None) -> _Masks:
+    """Masks of each level; the shorter ones are predicted from the tree before."""
+    coder = OccupancyCoder(previous.masks if previous else ())
+    blocks, predicted, places = [b""], 0, [coder.counterparts]
+    for level, masks in enumerate(octree.masks):
+        data, learnt = coder.encode(masks)
+        if previous is not None:
+            other = coder.encode(masks, predicted=True)
+            if len(other[0]) < len(data):
+                predicted |= 1 << level
+                data, learnt = other
+        blocks.append(data)
+        coder.descend(masks, learnt)
+        places.append(coder.counterparts)
+    return _Masks(blocks, predicted, places)
 
 
 def _shorter(predicted: list[bytes], alone: list[bytes]) -> int:
@@ -400,15 +411,20 @@ def _shorter(predicted: list[bytes], alone: list[bytes]) -> int:
     return sum(1 << level for level, yes in enumerate(is_shorter) if yes)
 
 
-def _read_masks(stored: bytes, header: Header, coder: MaskCoder, level: int) -> Bytes:
-    """The masks of a level, whose nodes below are as many as the header says."""
-    masks = coding.unpack(stored, header.levels[level].nodes)
+def _read_masks(stored: bytes, header: Header, coder: OccupancyCoder, level: int) -> Bytes:
+    """The masks of a level, whose nodes below are as many as the header says; the coder goes on below."""
     if header.flags & _PACKED:
-        masks = coder.restore(masks, predicted=bool(header.predicted >> level & 1))
+        masks, learnt = coder.decode(stored, predicted=bool(header.predicted >> level & 1))
+    elif len(stored) == header.levels[level].nodes:
+        masks = np.frombuffer(stored, np.uint8)
+    else:
+        raise InputError(f"level {level + 1} of an octree has a different number of masks than nodes above")
     if np.bitwise_count(masks).sum(dtype=np.int64) != header.levels[level + 1].nodes:
         raise InputError(
             f"level {level + 1} of an octree has a different number of nodes than the header states"
         )
+    if header.flags & _PACKED:
+        coder.descend(masks, learnt)
     return masks
 
 
