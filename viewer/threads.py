@@ -11,7 +11,7 @@ from contextvars import copy_context
 import numpy as np
 from numpy.typing import NDArray
 
-_SHARE = 100_000  # points that pay for the start of a thread
+_SHARE = 25_000  # points that pay for the start of a thread
 
 
 _GIVE_WAY = 0.0005  # seconds that a thread works in Python while another waits
