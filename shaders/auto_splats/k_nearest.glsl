@@ -26,11 +26,13 @@ void take_squared(float squared, uint row) {
     near_rows[0] = before ? row : near_rows[0];
 }
 
-void take(vec3 offset, uint row) {
+float squared_length(vec3 offset) {
     precise float squared = offset.x * offset.x + offset.y * offset.y;
     squared = squared + offset.z * offset.z;
-    take_squared(squared, row);
+    return squared;
 }
+
+void take(vec3 offset, uint row) { take_squared(squared_length(offset), row); }
 
 // A neighborhood, as far as it is known. count: its participants, the point among them; squared: of its
 // radius; search: how far others could belong to it that are not known yet, 0 where none could.

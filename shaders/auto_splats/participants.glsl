@@ -9,6 +9,7 @@ layout(binding = TEXTURE_DRAWN_ROWS) uniform usamplerBuffer drawn_rows;
 #endif
 #if HIDDEN_NEIGHBORS
 layout(binding = TEXTURE_FARTHEST) uniform samplerBuffer farthest;
+layout(std430, binding = STORAGE_COPIED) writeonly buffer Copied { uint copied[]; };  // by coarse cell: 1 if one is left out
 #endif
 
 void scatter(uint i) {
@@ -22,7 +23,10 @@ void scatter(uint i) {
     if (shown != i) {
 #if HIDDEN_NEIGHBORS
         if (-view.z > texelFetch(farthest, coarse_cell(pixel)).r) return;
-        if (shown != NOTHING && texelFetch(positions, int(shown)).xyz == place) return;
+        if (shown != NOTHING && texelFetch(positions, int(shown)).xyz == place) {
+            copied[coarse_cell(pixel)] = 1u;
+            return;
+        }
 #else
         return;
 #endif

@@ -19,6 +19,10 @@ layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of tho
 layout(std430, binding = STORAGE_NEXT) buffer Next { float next[]; };
 layout(binding = TEXTURE_USUAL) uniform samplerBuffer usual;  // radius in each coarse cell, pixels
 
+#if KEEPS
+#include "auto_splats/kept.glsl"
+#endif
+
 #if LANES > 1
 shared float lanes_squared[LANES * K];
 shared uint lanes_rows[LANES * K];
@@ -37,6 +41,8 @@ void merge_lanes(int lane) {
 }
 #endif
 
+float known;  // distance within which the last search took all participants, in the scan's size
+
 // The extent of the neighborhood as far as one search tells. radius: of the ball, scan units.
 Extent search(vec3 place, float radius, float usual_radius, int lane) {
     ivec4 cells = cells_of(radius);
@@ -45,8 +51,9 @@ Extent search(vec3 place, float radius, float usual_radius, int lane) {
 #if LANES > 1
     merge_lanes(lane);
 #endif
-    float known = known_within(cells);
-    return extent_of(known < UNKNOWN ? known * unit : UNKNOWN, usual_radius * unit);
+    float within = known_within(cells);
+    known = within < UNKNOWN ? within * unit : UNKNOWN;
+    return extent_of(known, usual_radius * unit);
 }
 
 // The radius that is searched next, 0: none. A little wider: what it touches is within.
@@ -80,7 +87,15 @@ void main() {
     center = to_view(texelFetch(positions, int(row)).xyz);
     float usual_radius = texelFetch(usual, coarse_cell(to_pixel(center))).r / scale_at(-center.z);
 #if LANES == 1
+#if FROM_KEPT
+    if (!take_kept(row, place)) {
+        next[n] = max(first_ball(row, usual_radius), LEAST);
+        return;
+    }
+    Extent extent = extent_of(UNKNOWN, usual_radius * unit);
+#else
     Extent extent = search(place, again ? next[n] : first_ball(row, usual_radius), usual_radius, 0);
+#endif
 #else
     int lane = int(gl_LocalInvocationIndex);
     float radius = next[n];
@@ -90,6 +105,9 @@ void main() {
         radius = wider(extent);
     } while (extent.search > 0.0);
     if (lane > 0) return;
+#endif
+#if KEEPS && !FROM_KEPT
+    keep(row, known);
 #endif
     float across = fit(n, row, place, usual_radius, extent);
     next[n] = extent.search > 0.0 ? wider(extent) : -across;

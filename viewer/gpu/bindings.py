@@ -118,6 +118,8 @@ class Texture(IntEnum):
     NODE_CELLS = VISIBLE
     NODE_OFFSETS = COPIES  # of the surface in their cells
     NODE_COLORS = LIMITS
+    # Coarse cells in which a copy of a point takes no part; no program reads these and hidden points.
+    COPIED = HOMES
     # What fillings of lists counted, beside points; no program reads this and hidden points.
     FILLED = HOMES
     # Cells of points, to which splats are fitted, beside a pose; no program reads these and targets.
@@ -206,6 +208,8 @@ class Storage(IntEnum):
     EXTENTS = 4
     COUNTS = 5
     NEXT = 5
+    COPIED = 4
+    KEPT = 7
     # Splats that become smaller, beside the forms of tiles.
     RADII = 4
     DISCS = 5

@@ -75,7 +75,7 @@ SCENES = (
 
 def rounds_of(surface: Surface) -> list[int]:
     """How many points were left before each round of the search for a surface's last picture."""
-    known = list(surface.stats.counted["neighbourhoods by searches"]().values())
+    _, *known = surface.stats.counted["neighbourhoods by searches"]().values()  # none is kept
     return [sum(known[number:]) for number in range(len(known))]
 
 
@@ -144,11 +144,13 @@ def _pictures(
     elsewhere, aside = camera.orbited(_ELSEWHERE, 0), camera.orbited(_STEP, 0)
     taken: dict[str, dict[str, float]] = {}
     rounds: list[int] = []
-    untimed = [("", camera), ("", elsewhere)]
-    for name, seen_from in (*untimed, ("first", camera), ("later", aside), ("still", aside)):
+    other = {**params, "k": params["k"] - 1}  # whose picture keeps no neighbors for the next one
+    untimed = [("", camera, params), ("", elsewhere, other)]
+    timed = [("first", camera, params), ("later", aside, params), ("still", aside, params)]
+    for name, seen_from, asked in (*untimed, *timed):
         timers.enabled = bool(name)
         try:
-            request = Request(pose, seen_from, BACKEND, backend(BACKEND).params(params), LOOK)
+            request = Request(pose, seen_from, BACKEND, backend(BACKEND).params(asked), LOOK)
             draw(bench.renderer, request, surface)
         finally:
             timers.enabled = False

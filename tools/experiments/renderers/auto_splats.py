@@ -4,10 +4,13 @@ It needs the data folder; `stream` does not."""
 
 from __future__ import annotations
 
+import time
 from argparse import Namespace
 from collections.abc import Iterator
 from functools import partial
 from itertools import product
+
+import numpy as np
 
 from experiments.pictures import draw, error_cells, errors_of, renderer, request, scene
 from experiments.preiner_2012.fits import fit_errors, noisy
@@ -22,12 +25,15 @@ from viewer.bench.run import BenchSettings
 from viewer.bench.scenes.viewpoints import viewpoints
 from viewer.camera import Camera
 from viewer.picture.surface import Surface
+from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
 
 BACKEND = "auto_splats"
 VIEWS, SIZE = 2, (880, 450)
 ROUNDS = 3
 AVERAGES = (0, 8, 16)  # frames
+# Azimuths of pictures, one after the other, degrees.
+_EYES = {"first": 30, "1° beside": 31, "30° beside": 61, "back": 30, "30° again": 61}
 
 
 def normals(_: Namespace) -> Iterator[Row]:
@@ -80,6 +86,33 @@ def _titled(average: int) -> str:
     return f"flicker, mean of {average}" if average else "flicker"
 
 
+def moved(_: Namespace) -> Iterator[Row]:
+    """Times of the first picture of a pose, and of later ones from other eyes, which reuse its neighbours."""
+    cloud = scene("demo").moment(0).pose.cloud
+    rows = np.random.default_rng(0).permutation(len(cloud))
+    for count in (20_000, len(cloud)):
+        positions = cloud.world()[np.sort(rows[:count])]
+        taken: dict[str, list[float]] = {}
+        surface = Surface(renderer().gpu, SIZE)
+        for number in range(ROUNDS + 1):
+            pose = Pose(number, 0.0, "moved", PointCloud.from_arrays(positions))
+            for name, azimuth in _EYES.items():
+                camera = Camera.orbit(pose.bounds, azimuth, 20, aspect=SIZE[0] / SIZE[1])
+                start = time.process_time()
+                draw(request(pose, camera, BACKEND, {}), surface)
+                renderer().gpu.ctx.finish()
+                if number:
+                    taken.setdefault(name, []).append(time.process_time() - start)
+        first = min(taken["first"])
+        kept = surface.stats.counted["neighbourhoods by searches"]()
+        yield {
+            "points": spaced(count),
+            "first picture": f"{1e3 * first / CORES:.0f} ms",
+            **{name: f"{min(seconds) / first:.2f}" for name, seconds in taken.items() if name != "first"},
+            "kept in the last": f"{100 * kept['kept'] / sum(kept.values()):.1f} %",
+        }
+
+
 def savings(_: Namespace) -> Iterator[Row]:
     """Errors and times with refinement and grid culling, and without."""
     settings = [{"refine": refine, "cull": cull} for refine, cull in product((False, True), repeat=2)]
@@ -90,9 +123,9 @@ def savings(_: Namespace) -> Iterator[Row]:
         surface = Surface(renderer().gpu, SIZE)
         works = {}
         for number, params in enumerate(settings):
-            # From elsewhere in between, so that nothing of the picture before helps.
+            # From elsewhere, with another k, in between, so that nothing of the pictures before helps.
             works[f"elsewhere {number}"] = partial(
-                draw, request(pose, camera.orbited(90, 0), BACKEND, params), surface
+                draw, request(pose, camera.orbited(90, 0), BACKEND, {**params, "k": 9}), surface
             )
             works[f"{number}"] = partial(draw, request(pose, camera, BACKEND, params), surface)
         least = by_turns(works, ROUNDS, renderer().gpu.ctx.finish, of="least")
@@ -103,4 +136,4 @@ def savings(_: Namespace) -> Iterator[Row]:
             yield {**named, **error_cells(errors), "time": f"{least[str(number)].busy / CORES:.0f} ms"}
 
 
-EXPERIMENT = Script([normals, uneven, stream, savings], page="auto-splats.md")
+EXPERIMENT = Script([normals, uneven, stream, savings, moved], page="auto-splats.md")

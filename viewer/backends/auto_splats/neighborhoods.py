@@ -35,6 +35,7 @@ from ...scan.range_points import RangePoints
 from ...scan.spacing import spacing_quantile
 from ...view import View
 from .grids import COARSEST, FINEST_COARSE, Grids, foresee_border
+from .kept import KeptNeighbors
 
 # Bytes of a pose's row, of a participant, of a point that is seen.
 _SPLAT, _LOOK, _PLACE, _SLOT, _FOUND = 12, 8, 12, 16, 16
@@ -106,11 +107,13 @@ class Neighborhoods:
         self._view = BlockBuffer(gpu.ctx, ViewBlock, UniformBlock.VIEW)
         self._texels: dict[str, gl.BufferTexture] = {}
         self._totals = gpu.buffer(reserve=8)
+        self._has_hidden = False  # whether points that others hide take part
         self._bins = Bins(gpu, 1)
         self._grids = Grids.of(size, FINEST_COARSE, Search())
         self.participants = 0
         self.count = 0  # of those searched
         self.is_whole = False  # whether none that is seen is left to be searched
+        self.kept = KeptNeighbors(gpu)
         self._made_of: tuple[object, ...] | None = None
         self._pose: weakref.ref[GpuPose] | None = None
 
@@ -130,11 +133,13 @@ class Neighborhoods:
     def nbytes(self) -> int:
         """Bytes held on the GPU."""
         texels = sum(texels.buffer.size for texels in self._texels.values())
-        return sum(each.nbytes for each in self._lists) + self._bins.nbytes + texels
+        return sum(each.nbytes for each in self._lists) + self._bins.nbytes + self.kept.nbytes + texels
 
     def release(self) -> None:
         """Delete everything."""
-        self._gpu.discard(*self._lists, self._bins, self._totals, self._view, *self._texels.values())
+        self._gpu.discard(
+            *self._lists, self._bins, self.kept, self._totals, self._view, *self._texels.values()
+        )
 
     def __getitem__(self, name: str) -> gl.BufferTexture:
         return self._texels[name]
@@ -211,6 +216,7 @@ class Neighborhoods:
             ):
                 self._reserve(name, nbytes * visible, texel)
             self._gather(pose, surface, search, sample)
+            self.kept.begin(pose, search.k, self._has_hidden and share == 1)
             self._search(pose, search)
 
     @contextmanager
@@ -250,6 +256,7 @@ class Neighborhoods:
             if params is self._grids:
                 self["rows"].bind(Texture.ROWS)
                 self["farthest"].bind(Texture.FARTHEST)
+                self._bind_storage(copied=Storage.COPIED)
 
         return Visits(cells, count, bind, {"SAMPLED": int(rows is not None), **defines}, params)
 
@@ -295,6 +302,8 @@ class Neighborhoods:
         if self._bins.cells != grids.fine_cells:
             self._gpu.discard(self._bins)
             self._bins = Bins(self._gpu, grids.fine_cells)
+        self._reserve("copied", 4 * grids.coarse_cells, gl.R32UI)
+        self._gpu.clear(self["copied"].buffer, 0)
         for hidden in (True, False) if search.hidden_neighbors else (False,):
             defines = {"HIDDEN_NEIGHBORS": int(hidden)}
             visits = self._visits("auto_splats/participants.glsl", pose, sample, defines, grids)
@@ -306,6 +315,7 @@ class Neighborhoods:
             self._arrange(pose)
             if self._find_usual(search) <= _LARGEST_CROWD:
                 break
+        self._has_hidden = hidden
         if search.hidden_neighbors and not hidden:
             surface.stats.skipped["hidden neighbours"] = "the search for neighbours would use too many points"
         if self.participants < search.k:  # an outlier is far from others, of which there are none
@@ -360,33 +370,41 @@ class Neighborhoods:
         first, self.count = self.count, len(self._searched)
         if self.count == first:
             return
-        for number, listed in enumerate((None, self._pixels, self._rest)):
+        if self.kept.is_filled:
+            self._run_search(pose, search, first, None, from_kept=True)
+        for listed in (self._pixels if self.kept.is_filled else None, self._pixels, self._rest):
             if listed is not None:
                 with self._gpu.timers.measure("unknown"):
                     list_flagged(self._gpu, "auto_splats/unknown.glsl", self.count, listed, self._bind_next)
-            self._run_search(pose, search, number, first, listed)
+            self._run_search(pose, search, first, listed)
         if search.widening > 1:
             self._steady_normals(pose, search, first)
         self._join_lines(pose, search)
 
     def read_rounds(self) -> dict[str, int]:
-        """How many neighborhoods were known after one search, two, and more, in the last picture."""
-        after_one, after_two = len(self._pixels), len(self._rest) // GROUP
-        return {"one": self.count - after_one, "two": after_one - after_two, "more": after_two}
+        """How many neighborhoods were kept from an earlier picture, and how many were known after one search,
+        two, and more, in the last picture."""
+        kept, after_one, after_two = self.kept.read_count(), len(self._pixels), len(self._rest) // GROUP
+        one = self.count - kept - after_one
+        return {"kept": kept, "one": one, "two": after_one - after_two, "more": after_two}
 
     def _run_search(
-        self, pose: GpuPose, search: Search, number: int, first: int, listed: IndexList | None
+        self, pose: GpuPose, search: Search, first: int, listed: IndexList | None, from_kept: bool = False
     ) -> None:
         """Search with a ball that most neighborhoods are within; one that nearly all others are within; as
-        far as it takes. listed: those not known yet, but at first."""
+        far as it takes. listed: those not known yet, but at first. from_kept: take those that are kept, in
+        place of a search."""
+        together = listed is self._rest
         defines = {
             "K": search.k,
             "FIRST_BALL": _FIRST_BALL,
-            "LANES": _LANES if number == 2 else 1,
+            "LANES": _LANES if together else 1,
             "HAS_COLORS": int(pose.cloud.colors is not None),
             "ADAPTIVE": int(search.adaptive and search.widening <= 1),
             "ELLIPTICAL": str(search.elliptical).lower(),
             "DIRECTIONS": _DIRECTIONS,
+            "KEEPS": int(self.kept.is_open),
+            "FROM_KEPT": int(from_kept),
         }
         with self._gpu.timers.measure("search"):
             program = self._searching("auto_splats/search.comp", pose, search, defines)
@@ -394,7 +412,12 @@ class Neighborhoods:
                 pose.array("colors").bind(Texture.COLORS)
             self["usual"].bind(Texture.USUAL)
             self._bind_storage(found=Storage.FOUND)
-            if number < 2:
+            if self.kept.is_open:
+                self["rows"].bind(Texture.ROWS)
+                self["farthest"].bind(Texture.FARTHEST)
+                self["copied"].bind(Texture.COPIED)
+                self.kept.bind(program)
+            if not together:
                 self._gpu.set(program, first=first, again=listed is not None)
             if listed is None:
                 self._pixels.bind()  # which the program declares
