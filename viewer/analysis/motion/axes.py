@@ -51,11 +51,10 @@ def weak_directions(
     spreads = np.array([found.spread(axes) for found in motions.values() if found.motion is not None])
     if not len(spreads):
         return []
-    most = np.repeat([limits.degrees, limits.shift], 3)
-    found = {}
-    for number in np.flatnonzero((spreads > most).any(axis=0)):
-        is_weak = spreads[:, number] > most[number]
+    found, exceeded = {}, limits.exceeded(spreads)
+    for number in np.flatnonzero((exceeded > 1).any(axis=0)):
+        is_weak = exceeded[:, number] > 1
         amount = float(np.median(spreads[is_weak, number]))
         one = WeakDirection(NAMES[number % 3], bool(number < 3), amount, int(is_weak.sum()))
-        found[one] = amount / most[number]
+        found[one] = float(np.median(exceeded[is_weak, number]))
     return sorted(found, key=lambda one: -found[one])

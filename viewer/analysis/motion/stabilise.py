@@ -25,6 +25,7 @@ from .registration import LEVELS, RegionSurface, RegisteredRegion, distances, re
 Float = NDArray[np.float64]
 
 _LEAST_MATCHED = 0.35  # of a region, by weights
+_TOLD, _SURE = 1.96, 3.0  # standard deviations: of what is told, and that errors hardly ever exceed
 _BACK = 3.0  # standard deviations, and
 _BACK_SPACINGS = 0.5  # spacings that the way back may miss where it began
 FEW = "too few points of the region match the surface"
@@ -41,10 +42,14 @@ class MotionState(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class WeakLimits:
-    """The ± (1.96 standard deviations) from which on a direction counts as weak. shift: scan units."""
+    """The lengths, scan units, and angles from which on three standard deviations count as weak."""
 
     shift: float
     degrees: float = 0.5
+
+    def exceeded(self, spreads: Float) -> Float:
+        """How many times spreads (..., 6), see `FrameMotion.spread`, exceed the limits."""
+        return _SURE / _TOLD * spreads / np.repeat([self.degrees, self.shift], 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +75,13 @@ class FrameMotion:
         """The ± along and about axes (3, 3), by row: (6,), of turns, degrees, then of shifts, scan units."""
         shift, turn = self.covariance[:3, :3], self.covariance[3:, 3:]
         variances = [np.einsum("ai,ij,aj->a", axes, block, axes) for block in (turn, shift)]
-        return 1.96 * np.sqrt(np.concatenate(variances)) * np.repeat([np.degrees(1.0), 1.0], 3)
+        return _TOLD * np.sqrt(np.concatenate(variances)) * np.repeat([np.degrees(1.0), 1.0], 3)
 
     def state(self, axes: Float, limits: WeakLimits) -> MotionState:
         """Whether it is known well along and about axes (3, 3)."""
         if self.motion is None:
             return MotionState.GAP
-        most = np.repeat([limits.degrees, limits.shift], 3)
-        return MotionState.WEAK if (self.spread(axes) > most).any() else MotionState.OK
+        return MotionState.WEAK if (limits.exceeded(self.spread(axes)) > 1).any() else MotionState.OK
 
 
 @dataclass(eq=False)
