@@ -75,20 +75,28 @@ vec2 surface_beyond(Window window, vec2 around, float depth, int level) {
     return span;
 }
 
-// How far samples lie to each of eight sides of a pixel.
+// How far samples lie to each of eight sides of a pixel; and how much farther to that side than beside it.
 struct Sides {
     vec4 low, high;
+    vec4 low_ahead, high_ahead;
 };
 
-const Sides NO_SIDES = Sides(vec4(1e9), vec4(-1e9));
+const Sides NO_SIDES = Sides(vec4(1e9), vec4(-1e9), vec4(1e9), vec4(-1e9));
 
 void extend(inout Sides sides, vec2 offset) {
-    vec4 along = vec4(offset, sqrt(0.5) * vec2(offset.x + offset.y, offset.x - offset.y));
+    vec4 along = vec4(offset, sqrt(0.5) * vec2(offset.x + offset.y, offset.x - offset.y)), beside = abs(along.yxwz);
     sides.low = min(sides.low, along);
     sides.high = max(sides.high, along);
+    sides.low_ahead = min(sides.low_ahead, along + beside);
+    sides.high_ahead = max(sides.high_ahead, along - beside);
 }
 
 // Whether they lie on all sides. outside: how far the pixel may be beside them, in cells.
 bool encloses(Sides sides, float outside) {
     return all(lessThanEqual(sides.low, vec4(outside))) && all(greaterThanEqual(sides.high, vec4(-outside)));
+}
+
+// Whether they lie ahead, within a right angle, on all sides. outside: as above.
+bool is_ahead(Sides sides, float outside) {
+    return all(lessThanEqual(sides.low_ahead, vec4(outside))) && all(greaterThanEqual(sides.high_ahead, vec4(-outside)));
 }

@@ -12,7 +12,8 @@
 layout(binding = TEXTURE_SHOWN) uniform usamplerBuffer shown;  // by the targets' samples
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed_cells;
 
-const int ON_GRID = POLYGONS + FRAMED;  // the next level's cells lie between samples of a grid too
+const float SLANTED = 1.5;  // times as far apart samples of a grid may lie where a surface is seen aslant
+const float AHEAD = 0.65;   // how far beside a pixel on an outline the nearest sample may lie, in sample spacings
 const float LEAST = 1e-3;  // weight of samples beyond a kernel's reach, before distance
 
 float kernel(float x) {
@@ -45,13 +46,15 @@ bool is_hole(Window window, int level) {
 }
 
 #if FRAMED
-// What the picture's frame cuts off goes on beyond it, as far as the next sample. apart: samples, in cells.
-void extend_to_frame(inout Sides sides, Window window, float apart) {
+// What the picture's frame cuts off goes on beyond it as its mirror image. apart: samples, in cells.
+void extend_beyond_frame(inout Sides sides, vec2 offset, Window window, float apart) {
     vec2 before = window.pixel, after = vec2(view_size) * window.scale - window.pixel;
-    if (before.x < apart) extend(sides, vec2(-before.x, 0.0));
-    if (before.y < apart) extend(sides, vec2(0.0, -before.y));
-    if (after.x < apart) extend(sides, vec2(after.x, 0.0));
-    if (after.y < apart) extend(sides, vec2(0.0, after.y));
+    vec2 frame = vec2(before.x < after.x ? -before.x : after.x, before.y < after.y ? -before.y : after.y);
+    vec2 mirrored = 2.0 * frame - offset;
+    bvec2 near = lessThan(abs(frame), vec2(apart));
+    if (near.x) extend(sides, vec2(mirrored.x, offset.y));
+    if (near.y) extend(sides, vec2(offset.x, mirrored.y));
+    if (all(near)) extend(sides, mirrored);
 }
 #endif
 
@@ -95,8 +98,18 @@ bool fill(int i, ivec2 pixel, int level) {
     vec2 around = depths_around(window), span = vec2(0.0), nearest = span;
     if (isinf(around.x)) return false;
     float apart = spacing / cell_width(level, around.x), least = 1e9;  // samples, in cells
-    float farthest = ON_GRID == 0 && !hole ? reach * max(apart, window.scale) : 1e9;
+    float farthest = POLYGONS == 0 && !hole ? (FRAMED != 0 ? SLANTED : 1.0) * reach * max(apart, window.scale) : 1e9;
     Sides all_around = NO_SIDES;
+#if FRAMED
+    EACH_CELL(window, cell) {
+        vec2 offset = offset_to(window, cell);
+        if (isinf(depth_of(cell)) || dot(offset, offset) > farthest * farthest) continue;
+        extend(all_around, offset);
+        if (gap) extend_beyond_frame(all_around, offset, window, apart);
+    }
+    float ahead = margin * apart + (gap ? AHEAD * apart : max(AHEAD * apart, 1.0));  // a cell shows one sample
+    if (!is_ahead(all_around, ahead)) return false;
+#endif
     for (int n = 0; n < SURFACES; ++n) {
         span = surface_beyond(window, around, span.y, level);
         if (isinf(span.x)) break;
@@ -107,18 +120,21 @@ bool fill(int i, ivec2 pixel, int level) {
             vec2 offset = offset_to(window, cell);
             if (dot(offset, offset) > farthest * farthest) continue;
             extend(sides, offset);
+#if FRAMED
+            if (gap) extend_beyond_frame(sides, offset, window, apart);
+#endif
             extend(all_around, offset);
             if (dot(offset, offset) < least) nearest = span;
             least = min(least, dot(offset, offset));
         }
-#if FRAMED
-        if (level <= density) extend_to_frame(sides, window, apart);
-#endif
         if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
+#if FRAMED
+        if (!gap && !is_ahead(sides, ahead)) continue;
+#endif
         blend(i, pixel, level, span);
         return true;
     }
-#if POLYGONS
+#if POLYGONS || FRAMED
     // Between the outline of one surface and what was measured beside it behind: the one that is nearer in the picture.
     if (gap && encloses(all_around, margin * apart)) {
         blend(i, pixel, level, nearest);

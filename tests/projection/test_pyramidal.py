@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from range_scenes import heights, looking_at, shape_view, straight_above
 from scenes import NOTHING, rarely
-from scipy.ndimage import maximum_filter, minimum_filter
+from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
 from scipy.spatial import ConvexHull
 
 from viewer.bench.rounding import Rounding
@@ -235,6 +235,23 @@ def test_gaps_and_outlines_stay(draw: Draw, primitive: str, upsampling: str, bes
         view = heights(np.full(mask.shape, -500), mask)
         surface = seen_from_above(draw, view, primitive=primitive, upsampling=upsampling)
         np.testing.assert_array_equal(np.isfinite(surface.depth), mask)
+
+
+def wave(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """A region whose outline has bays, eight samples deep and sixteen from one to the next."""
+    return y > 4 * np.sin(0.4 * x) + x / 4
+
+
+def test_points_do_not_spill_into_bays(draw: Draw) -> None:
+    """Samples four pixels apart, cut off by the picture's frame."""
+    y, x = np.mgrid[:96, :96] - 47.5
+    view = heights(np.full(x.shape, -500), wave(x, y))
+    camera, size = straight_above((64, 64), 4.0)
+    surface = draw((view,), camera, size, "pyramidal", params={"primitive": "points"})
+    row, column = np.mgrid[: size[1], : size[0]]
+    true, drawn = wave((column + 0.5) / 4 - 32, (row + 0.5) / 4 - 32), np.isfinite(surface.depth)
+    assert np.quantile(distance_transform_edt(~true)[drawn & ~true], 0.95) <= 3
+    assert drawn[distance_transform_edt(true) > 4].all(), "no holes but along the outline"
 
 
 y, x = np.mgrid[:64, :64] - 31.5
