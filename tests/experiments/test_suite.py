@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from experiments.command import experiment, found, main
 from experiments.script import Script, described_text
+from experiments.stale import commit, stale
 from experiments.suite import DOCS, ROOT, Suite, stored_runs, write_run
 from tables_of import tables_of
 
@@ -119,6 +120,25 @@ def test_wrong_words_are_one_message(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "no experiment is called speed" in capsys.readouterr().err
     assert main(["feeds", "--scene", "sphere", "-o", str(tmp_path)]) == 2
     assert "its own scenes" in capsys.readouterr().err
+
+
+def test_stored_runs_say_how_old_they_are(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = sorted((DOCS / "data").glob("*.json"))
+    assert main(["--stale"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == [path.name for path in files]
+    (tmp_path / "data").mkdir()
+    run = {"date": "2026-01-31", "commit": "0" * 12}
+    (tmp_path / "data" / "known-card.json").write_text(json.dumps(run))
+    monkeypatch.setattr("experiments.stale.DOCS", tmp_path)
+    assert list(stale()) == [f"known-card.json  2026-01-31  {'0' * 12}  its commit is not in this checkout"]
+    head = commit()
+    if head is None:
+        pytest.skip("this is no git checkout")
+    (tmp_path / "data" / "known-card.json").write_text(json.dumps(run | {"commit": head}))
+    assert list(stale()) == [f"known-card.json  2026-01-31  {head}  0 commits since"]
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from experiments.script import Failed, Script
+from experiments.stale import commit, stale
 from experiments.suite import Suite, write_run
 from experiments.tables import Row, shown
 from viewer.bench.report.page import PAGE, write_report
@@ -67,6 +68,10 @@ def main(words: Sequence[str]) -> int:
         for name, path in found().items():
             print(f"{path.parent.name:14} {name:16} {_about(path).partition(chr(10))[0]}")
         return 0
+    if words[0] == "--stale":
+        for line in stale():
+            print(line)
+        return 0
     try:
         declared = experiment(words[0])
         parser = ArgumentParser(
@@ -114,11 +119,13 @@ def _run_suite(name: str, suite: Suite, args: Namespace) -> int:
     reports = [args.out / f"{name}.json", args.out / suite.page]
     if suite.groups is not None:
         reports += [args.out / PAGE, *sorted((args.out / "plots").glob("*.png"))]
-    if args.scene and suite.scenes is None:
+    if args.scene and suite.scenes is None and suite.groups is None:
         raise InputError("defines its own scenes", name, "Leave out --scene")
     settings = settings_of(args, _usual(suite, args.quick))
     bench = Bench(Renderer(), settings, args.out)
-    report = partial(_report, name, suite, bench)
+    stored = args.out / f"{name}.json"
+    measured = suite.read_run(stored).get("commit") if args.report and stored.exists() else commit()
+    report = partial(_report, name, suite, bench, measured)
     if args.report:
         claim(reports, [], args.force)
         report()
@@ -146,23 +153,30 @@ def _plan(suite: Suite, args: Namespace, settings: BenchSettings) -> MeasuringPl
     groups = suite.groups(settings, scenes) if suite.groups else []
     lacking = {group.scene: missing[group.scene] for group in groups if group.scene in missing}
     lacking |= {name: missing[name] for name in suite.scenes or () if name in missing and not args.scene}
-    looked_at = args.scene or (suite.quick[0] if args.quick and suite.quick else suite.scenes)
-    given = {} if suite.scenes is None else {"scenes": looked_at}
+    chosen = args.scene or (suite.quick[0] if args.quick and suite.quick else ())
+    given = {} if suite.scenes is None else {"scenes": chosen or suite.scenes}
+    own = suite.scenes is None and bool(chosen)  # then only groups: other parts have their own scenes
     others = {
         f"{name}.jsonl": RowSource(partial(part.measure, **given))
         for name, part in suite.parts.items()
-        if part.measure is not None
+        if part.measure is not None and not own
     }
+    if own:
+        known = list(dict.fromkeys(group.scene for group in groups))
+        groups = [group for group in groups if group.scene in chosen]
+        if not groups:
+            raise InputError(f"defines its own scenes: {', '.join(known)}", "--scene", "Name some of these")
     groups = [group for group in groups if group.scene not in lacking]
     return MeasuringPlan(groups, others, left_out(lacking))
 
 
-def _report(name: str, suite: Suite, bench: Bench) -> None:
-    """Make the report, the stored run, its pictures and the page of the rows in a folder."""
+def _report(name: str, suite: Suite, bench: Bench, measured: str | None) -> None:
+    """Make the report, the stored run, its pictures and the page of the rows in a folder. measured: the
+    commit that was measured, None: unknown."""
     assert bench.folder is not None
     if suite.groups is not None:
         tell(write_report(bench.folder))
-    run = suite.read(bench.folder)
+    run = suite.read(bench.folder) | ({} if measured is None else {"commit": measured})
     write_run(bench.folder / f"{name}.json", run)
     for draw in suite.pictures.values():
         if draw is not None:

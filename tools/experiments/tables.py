@@ -158,7 +158,8 @@ def _machine(run: StoredRun, backend: str) -> str:
         sentences.append(f"Pictures have {'x'.join(map(str, run['size']))} pixels, and each scan has {count}")
     params = (f"{name}={str(value).lower()}" for name, value in run["params"].items())
     used = f", with `{backend}` and the parameters `{' '.join(params)}`" if backend else ""
-    sentences.append(f"We measured version {run['version']} of Scan4D on {run['date']}{used}")
+    of = f" (commit {run['commit']})" if "commit" in run else ""
+    sentences.append(f"We measured version {run['version']} of Scan4D{of} on {run['date']}{used}")
     return " ".join(f"{sentence.rstrip('.')}." for sentence in [*sentences, *filter(None, [run["note"]])])
 
 

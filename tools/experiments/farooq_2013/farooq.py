@@ -224,4 +224,5 @@ EXPERIMENT = Suite(
     groups=lambda *_: groups(),
     own=BACKEND,
     usual=BenchSettings(size=(640, 480), views=8, frames=0),
+    quick=(_SCENES[:1], 1),
 )  # fmt: skip
