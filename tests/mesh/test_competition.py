@@ -13,6 +13,7 @@ from range_scenes import shape_view, sphere_view
 from viewer.errors import InputError
 from viewer.mesh.merging.competition import Rules, compete, competition_weights
 from viewer.mesh.merging.surfaces import RangeSurface
+from viewer.mesh.range_mesh import triangulated
 from viewer.mesh.triangles import Mesh
 from viewer.scan.open import open_scan
 from viewer.scan.range_view import RangeView
@@ -122,7 +123,7 @@ def test_four_pods_all_round_at_full_size(ball: Mesh) -> None:
 
 @pytest.mark.slow
 @pytest.mark.xfail(
-    strict=True, reason="3.3 % here: triangles around each lost pixel come from the other view"
+    strict=True, reason="3.9 % here: triangles around each lost pixel come from the other view"
 )
 def test_lost_pixels_are_filled_without_overlap(ball: Mesh) -> None:
     views = scanned(ball, (640, 480), *[Faults(dropouts=0.02)] * 2)
@@ -130,13 +131,19 @@ def test_lost_pixels_are_filled_without_overlap(ball: Mesh) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="10 %: half at seams, half where one view sees the rim of another, but not the reverse",
+@pytest.mark.parametrize(
+    ("name", "shared", "lost"),
+    [("stanford_bunny_scans", 0.025, 0.0015), ("stanford_dragon_stand_scans", 0.07, 0.0015)],
+    ids=["bunny", "dragon"],
 )
-def test_ten_scans_of_the_bunny_overlap_little(data_dir: Path) -> None:
-    with open_scan(data_dir / "range" / "stanford_bunny_scans") as timeline:
-        assert compete(timeline.pose(0).views).overlap[1] <= 0.01
+def test_scans_overlap_little_and_lose_little(data_dir: Path, name: str, shared: float, lost: float) -> None:
+    with open_scan(data_dir / "range" / name) as timeline:
+        views = timeline.pose(0).views
+    found = compete(views)
+    assert found.overlap[1] <= shared
+    places = places_on(triangulated(views))
+    before, after = (times_covered(each, places, 0.002) for each in (views, found.views))
+    assert np.count_nonzero(before.astype(bool) & (after == 0)) <= lost * np.count_nonzero(before)
 
 
 def test_what_lies_behind_is_no_overlap() -> None:

@@ -65,11 +65,24 @@ def was_scanned(views: Sequence[RangeView], points: Rays) -> NDArray[np.bool_]:
 
 def triangles_of(view: RangeView) -> Triangles:
     """The triangles of one view: rows of its valid pixels, counterclockwise as its pod sees them."""
+    return _triangles(view, [(0, 1, 2), (0, 2, 3)])
+
+
+def replacements_of(view: RangeView) -> tuple[Triangles, NDArray[np.uint32]]:
+    """The triangles that one view gains when pixels are masked: each takes the place of what had the pixel as
+    a corner, between the three neighbours that stay. Faces (F, 3), and the masked pixels (F,), rows of its
+    valid pixels."""
+    corners = _triangles(view, [(1, 2, 3, 0), (3, 0, 1, 2)])
+    return corners[:, :3], corners[:, 3]
+
+
+def _triangles(view: RangeView, triangles: Sequence[tuple[int, ...]]) -> Triangles:
+    """Corners of all quads of a view, picked by number, where the first three are of one surface and all are
+    valid. Corners run around a quad counterclockwise; its triangles share those of number 0 and 2."""
     valid = view.valid()
     number = (np.cumsum(valid) - 1).reshape(valid.shape).astype(np.uint32)
     depth = np.where(valid, view.depth, np.float32(np.nan)).astype(np.float64)
 
-    # The corners of each quad in the order in which they run around it, counterclockwise.
     quad = [(slice(0, -1), slice(0, -1)), (slice(1, None), slice(0, -1)),
             (slice(1, None), slice(1, None)), (slice(0, -1), slice(1, None))]  # fmt: skip
     corners = np.stack([number[at].ravel() for at in quad])
@@ -79,8 +92,10 @@ def triangles_of(view: RangeView) -> Triangles:
     turned = np.flatnonzero(np.isnan(change[0]) | (change[1] < change[0]))
     corners[:, turned], depths[:, turned] = (np.roll(rows[:, turned], -1, 0) for rows in (corners, depths))
 
-    triangles = [(0, 1, 2), (0, 2, 3)]
-    found = [corners[list(each)].T[_on_one_surface(depths[list(each)], view)] for each in triangles]
+    found = []
+    for each in triangles:
+        whole = ~np.isnan(depths[list(each)]).any(axis=0)
+        found.append(corners[list(each)].T[whole & _on_one_surface(depths[list(each[:3])], view)])
     return np.concatenate(found)
 
 

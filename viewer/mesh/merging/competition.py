@@ -3,12 +3,13 @@ best, and the others' pixels are masked (Ju et al. 2004; Farooq and Siebert 2009
 
 Pixels compete by S C V (`competition_weights`). What is masked are pixels, and what is seen are the triangles
 between them: at a seam, the triangles between a pixel that has won and one that has not would be lost from
-both views. So in the end a view keeps, one after another, the triangles that the others do not cover wholly.
+both views. So pixels are masked, the worst first, if what stays covers all that their triangles do
+(`TriangleCover`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,16 +20,13 @@ from ...errors import InputError
 from ...scan.faces import Triangles
 from ...scan.range_view import RangeView
 from ...task import checkpoint
-from ..scene import Rays
+from .covering import TriangleCover
 from .surfaces import Meeting, RangeSurface, meet
 
 SCATTER = 4.0  # deviations within which two measures are of one surface
 _REACH = 0.1  # of the subject's radius: no farther apart are measures compared
 _SAME_SIDE = 0.5  # least cosine between normals of one surface
 _NORMAL_DEVIATION = 1.4826  # times the median of absolute values
-_FACES_AT_ONCE = 1 << 17
-_FINEST = 6  # parts of an edge in which what covers a triangle is looked at, at most
-_INSET = 0.7  # of a triangle, in which that is: a sliver along its edge brings back none
 
 
 @dataclass(frozen=True)
@@ -99,7 +97,7 @@ def compete(views: Sequence[RangeView], rules: Rules | None = None) -> Competiti
 
 
 class _Contest:
-    """The surfaces of all views, their weights, and how far any two may be apart."""
+    """The surfaces of all views, their weights, and how far each scatters about the others."""
 
     def __init__(self, surfaces: Sequence[RangeSurface], rules: Rules) -> None:
         self.surfaces, self.rules = surfaces, rules
@@ -108,107 +106,59 @@ class _Contest:
         self.weights = [
             surface.smoothed(competition_weights(surface, confident), rules.smoothing) for surface in surfaces
         ]
-        count = len(surfaces)
-        self.tolerances = np.zeros((count, count))
-        self.agreements: list[list[Agreement | None]] = [[None] * count for _ in surfaces]
+        self.scatter = np.zeros(len(surfaces))
+        self.agreements: list[tuple[Agreement | None, ...]] = []
 
     def result(self) -> Competition:
         """Hold it."""
-        best = [self._best_of_others(number) for number in range(len(self.surfaces))]
-        checkpoint(0.5)
-        faces = [surface.faces for surface in self.surfaces]
-        before = self._areas([np.ones(len(of), bool) for of in faces])
-        won = [other <= own + self.rules.ties for own, other in zip(self.weights, best, strict=True)]
-        tied = [
-            _corners_all(np.abs(own - other) <= self.rules.ties, of)
-            for own, other, of in zip(self.weights, best, faces, strict=True)
-        ]
-        shown = [_corners_all(points, of) for points, of in zip(won, faces, strict=True)]
-        for number, seen in enumerate(self.surfaces):
-            checkpoint(0.6 + 0.3 * number / len(faces))
-            needed = tied[number] | self._uncovered(number, shown)
-            kept = np.zeros(len(seen.points), bool)
-            kept[seen.faces[needed].ravel()] = True
-            shown[number] = _corners_all(kept, seen.faces)
-        after = self._areas(shown)
-        ties = self._areas([some & of for some, of in zip(shown, tied, strict=True)])
+        best = np.concatenate([self._best_of_others(number) for number in range(len(self.surfaces))])
+        own = np.concatenate(self.weights)
+        if self.rules.tolerance is None:
+            covering = TriangleCover(self.surfaces, self.scatter, self.reach)
+        else:
+            stated = np.full(len(self.surfaces), self.rules.tolerance)
+            covering = TriangleCover(self.surfaces, stated, self.rules.tolerance, spaced=False)
+        checkpoint(0.8)
+        before = covering.shared_area(covering.shown)
+        tied = _corners_all(np.abs(own - best) <= self.rules.ties, covering.faces)
+        of_tied, alone = np.zeros(len(own), bool), np.ones(len(own), bool)
+        of_tied[covering.faces[covering.shown & tied].ravel()] = True
+        alone[covering.faces[covering.shown].ravel()] = False
+        covering.mask(own, of_tied | alone)
+        checkpoint(0.95)
+        kept = covering.kept & ~(alone & (best > own + self.rules.ties))
         return Competition(
-            views=tuple(map(self._masked, range(len(won)), won, shown)),
-            agreements=tuple(map(tuple, self.agreements)),
-            area=float(before[0]),
-            overlap=(float(before[1] / before[0]), float(after[1] / before[0])),
-            ties=float(ties[1] / before[0]),
+            views=tuple(
+                replace(surface.view, mask=surface.on_grid(kept[rows]))
+                for surface, rows in zip(self.surfaces, covering.own, strict=True)
+            ),
+            agreements=tuple(self.agreements),
+            area=covering.area,
+            overlap=(before / covering.area, covering.shared_area(covering.shown) / covering.area),
+            ties=covering.shared_area(covering.shown & tied) / covering.area,
         )
-
-    def _others(self, number: int) -> Iterator[int]:
-        return (other for other in range(len(self.surfaces)) if other != number)
 
     def _best_of_others(self, number: int) -> NDArray[np.float64]:
         """The highest weight that another view has at each point of a view, (N,); -inf: none sees it."""
-        seen = self.surfaces[number]
-        best = np.full(len(seen.points), -np.inf)
-        for other in self._others(number):
+        seen, weights = self.surfaces[number], self.weights
+        meetings = {}
+        for other, surface in enumerate(self.surfaces):
             checkpoint()
-            met = meet(seen, seen.points, self.surfaces[other], self.weights[other])
-            self.agreements[number][other] = agreement = agreement_of(seen, met, self.reach)
-            self.tolerances[number, other] = agreement.deviation
-            same = self._is_same(met, number, other)
+            if other != number:
+                meetings[other] = meet(seen, seen.points, surface, weights[other])
+        found = {other: agreement_of(seen, met, self.reach) for other, met in meetings.items()}
+        self.agreements.append(tuple(found.get(other) for other in range(len(weights))))
+        self.scatter[number] = SCATTER * _typical_deviation(list(found.values()))
+        within = self.rules.tolerance
+        if within is None:
+            spacing = seen.spacing(seen.points, seen.normals)
+            within = np.minimum(self.scatter[number] + spacing, self.reach)
+        best = np.full(len(seen.points), -np.inf)
+        for met in meetings.values():
+            with np.errstate(invalid="ignore"):
+                same = met.distance <= within
             best[same] = np.maximum(best[same], met.weight[same])
         return best
-
-    def _is_same(self, met: Meeting, number: int, other: int) -> NDArray[np.bool_]:
-        """Whether positions of a view are of the surface that they meet, (Q,)."""
-        if self.rules.tolerance is not None:
-            return met.distance <= self.rules.tolerance
-        deviation = self.tolerances[number, other]
-        with np.errstate(invalid="ignore"):
-            return met.distance <= np.minimum(SCATTER * deviation + met.spacing, self.reach)
-
-    def _uncovered(self, number: int, shown: Sequence[NDArray[np.bool_]]) -> NDArray[np.bool_]:
-        """Tell which faces of a view have a part that no other view shows, (F,)."""
-        seen, shares = self.surfaces[number], _shares(self._parts(number))
-        uncovered = np.zeros(len(seen.faces), bool)
-        for start in range(0, len(seen.faces), _FACES_AT_ONCE):
-            positions = (shares @ seen.points[seen.faces[start : start + _FACES_AT_ONCE]]).reshape(-1, 3)
-            lacking = np.arange(len(positions))
-            for other in self._others(number):
-                checkpoint()
-                met = meet(seen, positions[lacking], self.surfaces[other], faces=shown[other])
-                lacking = lacking[~self._is_same(met, number, other)]
-            uncovered[start + lacking // len(shares)] = True
-        return uncovered
-
-    def _parts(self, number: int) -> int:
-        """Number of parts in which edges of a view's triangles are looked at, by how fine the others are."""
-        own, *others = (
-            np.median(surface.spacing(surface.points, surface.normals))
-            for surface in [self.surfaces[number], *(self.surfaces[other] for other in self._others(number))]
-        )
-        return int(np.clip(np.ceil(2 * own / min(others)), 2, _FINEST))
-
-    def _areas(self, shown: Sequence[NDArray[np.bool_]]) -> tuple[float, float]:
-        """The area of faces (F,) of each view, each patch once, and that of patches of several views."""
-        whole = shared = 0.0
-        for number, seen in enumerate(self.surfaces):
-            rows = np.flatnonzero(shown[number])
-            centers = seen.points[seen.faces[rows]].mean(axis=1)
-            times = np.ones(len(rows))
-            for other in self._others(number):
-                checkpoint()
-                met = meet(seen, centers, self.surfaces[other], faces=shown[other])
-                times += self._is_same(met, number, other)
-            areas = seen.face_areas()[rows] / times
-            whole, shared = whole + float(areas.sum()), shared + float(areas[times > 1].sum())
-        return whole, shared
-
-    def _masked(self, number: int, won: NDArray[np.bool_], shown: NDArray[np.bool_]) -> RangeView:
-        """A view whose mask keeps the corners of the faces that are shown, and points of no face that won."""
-        surface = self.surfaces[number]
-        alone = np.ones(len(won), bool)
-        alone[surface.faces.ravel()] = False
-        stays = won & alone
-        stays[surface.faces[shown].ravel()] = True
-        return replace(surface.view, mask=surface.on_grid(stays))
 
 
 def reach(surfaces: Sequence[RangeSurface]) -> float:
@@ -241,6 +191,15 @@ def normal_deviation(distances: NDArray[np.float64]) -> float:
     return _NORMAL_DEVIATION * float(np.median(distances))
 
 
+def _typical_deviation(agreements: Sequence[Agreement]) -> float:
+    """The median of a view's deviations from others, by overlap: where two views hardly overlap, most of what
+    meets is of different surfaces. 0 where none overlaps."""
+    deviation, overlap = np.array([(each.deviation, each.overlap) for each in agreements]).T
+    order = np.argsort(deviation)  # NaN comes last, and has no overlap
+    shares = np.cumsum(overlap[order])
+    return float(deviation[order][np.searchsorted(shares, shares[-1] / 2)]) if shares[-1] > 0 else 0.0
+
+
 def competition_weights(surface: RangeSurface, confident: bool) -> NDArray[np.float64]:
     """The weights S C V of the points of a surface, (N,), 0 or more: S whether it is valid, C its
     confidence where the view has one, V the cosine between the normal and the direction to the pod, at least
@@ -259,9 +218,3 @@ def competition_weights(surface: RangeSurface, confident: bool) -> NDArray[np.fl
 def _corners_all(points: NDArray[np.bool_], faces: Triangles) -> NDArray[np.bool_]:
     """Tell which faces (F, 3) have all their corners among these points (N,), (F,)."""
     return np.asarray(points[faces].all(axis=1))
-
-
-def _shares(parts: int) -> Rays:
-    """The corners' shares in places spread over a triangle, (M, 3)."""
-    grid = [(a, b, parts - a - b) for a in range(parts + 1) for b in range(parts + 1 - a)]
-    return _INSET * np.array(grid) / parts + (1 - _INSET) / 3

@@ -111,14 +111,12 @@ def meet(
     positions: Rays,
     other: RangeSurface,
     weights: NDArray[np.floating] | None = None,
-    faces: NDArray[np.bool_] | None = None,
 ) -> Meeting:
     """Find where positions (Q, 3) near a view's surface meet another's along its rays.
 
     Triangles of the other that face away from the pod have no part: they are of the back of something. So
     nothing that lies behind or before the position counts as the same but by the caller's measure of
-    distance. weights: (N,), of the other's points, else 1. faces: (F,), which of the other's triangles take
-    part.
+    distance. weights: (N,), of the other's points, else 1.
     """
     from .layer_kernels import LayerHits, PositionsByPixel, nearest_layer
 
@@ -130,8 +128,6 @@ def meet(
     order = np.argsort(pixel, kind="stable")
     first = np.concatenate([[0], np.cumsum(np.bincount(pixel, minlength=width * height))])
     corners, takes_part = _in_picture(seen, other)
-    if faces is not None:
-        takes_part &= faces
     rows = np.flatnonzero(takes_part)
     hits = LayerHits(
         np.full(len(positions), np.inf),
