@@ -12,6 +12,11 @@ from command_line import Run
 from moving_hills import SIDE, hills
 from scipy.spatial.transform import Rotation
 
+from viewer.analysis.landmarks import Landmark
+from viewer.analysis.surface_point import SurfacePoint
+from viewer.document.document import Document
+from viewer.document.landmarks import Landmarks
+from viewer.document.saved_session import SavedSession, known_as, store
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
@@ -22,6 +27,7 @@ TURN = Rotation.from_rotvec([0.02, -0.03, 0.015])
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working directory: three frames of a patch that turns, and a region in its middle."""
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
     Path("seq").mkdir()
     for frame in range(3):
         x, y = np.random.default_rng(frame).uniform(-SIDE / 2, SIDE / 2, (2, 2500))
@@ -87,6 +93,22 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
     assert done.code == 0
     assert "2 of 3 frames are known" in done.out
     assert Path("out/transforms.csv").read_bytes() == Path("whole/transforms.csv").read_bytes()
+
+
+def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
+    key = SurfacePoint(frame=1, time=0.04, position=(0.5, 0.0, 1.0), id=None, spacing=None, level=0)
+    landmarks = Landmarks(all=(Landmark("nose", (key,)),))
+    store(SavedSession(known_as("seq"), None, 0, Document().with_part(landmarks)))
+    Path("nose.json").write_text('{"landmarks": ["nose"], "radius": 16}')
+    words = ("motion", "seq", "--unit", "mm", "--region", "nose.json", "-o", "out", "--reference")
+    done = run(*words, "1")
+    assert done.code == 0, done.err
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["states"]["ok"] == 3
+    assert np.allclose(report["region"]["middle"][:2], [0.5, 0.0], atol=1.5)
+    elsewhere = run(*words, "0", "--force")
+    assert elsewhere.code == 2
+    assert "nose" in elsewhere.err
 
 
 @pytest.mark.parametrize(
