@@ -1,7 +1,7 @@
 """Which triangles of several range views lie over each other, and which pixels can be masked so that no place
 that a view has measured loses its last triangle.
 
-As in zippered meshes (Turk and Levoy 1994, section 4.1), what is redundant goes until the rest just covers
+As in zippered meshes (Turk and Levoy 1994), what is redundant goes until the rest just covers
 the surface. Here it is pixels that go: a mask cannot cut triangles.
 """
 
