@@ -1,4 +1,4 @@
-"""Find the rigid motion of a region, such as a head, in all frames.
+"""Find the motion of a rigid region, such as the head, over time.
 
 DIR gets transforms.csv with the motion of each frame and how sure it is, report.json, and region.json with
 the points of the region. An interrupted command goes on where it stopped.
