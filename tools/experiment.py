@@ -2,6 +2,7 @@
 
 python tools/experiment.py                          list all experiments
 python tools/experiment.py NAME [OPTION ...]        run one; --help shows its options
+python tools/experiment.py SUITE --resume           go on with one that was stopped
 python tools/experiment.py NAME --against TREE      compare with another checkout, by turns
 """
 

@@ -8,8 +8,8 @@ import os
 import subprocess
 import sys
 from argparse import ArgumentParser, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from experiments.resuming import Journal, JournaledBench
 from experiments.script import Failed, Script
 from experiments.stale import commit, stale
-from experiments.suite import Suite, write_run
+from experiments.suite import Part, Suite, write_run
 from experiments.tables import Row, shown
 from viewer.bench.report.page import PAGE, write_report
 from viewer.bench.run import Bench, BenchSettings
@@ -81,6 +82,11 @@ def main(words: Sequence[str]) -> int:
         )
         if isinstance(declared, Suite):
             add_measuring_arguments(parser)
+            parser.add_argument(
+                "--resume",
+                action="store_true",
+                help="go on with the stopped run in DIR, with the same options and the same commit",
+            )
             return _run_suite(words[0], declared, parser.parse_args(words[1:]))
         declared.add_arguments(parser)
         parser.add_argument(
@@ -114,28 +120,55 @@ def _about(path: Path) -> str:
 
 
 def _run_suite(name: str, suite: Suite, args: Namespace) -> int:
-    """RowSource into the folder, or only report; 1 where Ctrl-C stopped it."""
+    """Measure rows into the folder, or only report; 1 where Ctrl-C stopped it."""
     require(*_LIBRARIES, *suite.libraries)
-    reports = [args.out / f"{name}.json", args.out / suite.page]
+    stored = args.out / f"{name}.json"
+    reports = [stored, args.out / suite.page]
     if suite.groups is not None:
         reports += [args.out / PAGE, *sorted((args.out / "plots").glob("*.png"))]
     if args.scene and suite.scenes is None and suite.groups is None:
         raise InputError("defines its own scenes", name, "Leave out --scene")
     settings = settings_of(args, _usual(suite, args.quick))
-    bench = Bench(Renderer(), settings, args.out)
-    stored = args.out / f"{name}.json"
-    measured = suite.read_run(stored).get("commit") if args.report and stored.exists() else commit()
-    report = partial(_report, name, suite, bench, measured)
     if args.report:
+        if args.resume:
+            raise InputError("--report measures nothing", "--resume", "Leave out one of them")
         claim(reports, [], args.force)
-        report()
+        _report(name, suite, Bench(Renderer(), settings, args.out), _provenance(args.out, suite, stored))
         return 0
     plan = _plan(suite, args, settings)._replace(
         reports=reports, pictures=[args.out / picture for picture in suite.pictures]
     )
-    plan.claim(args, settings)
-    plan.measure(bench, args.out, report)
+    options = _options(name, args, settings, plan)
+    if args.resume:
+        journal = Journal.resumed(args.out, options)
+    else:
+        plan.claim(args, settings)
+        journal = Journal.of_new(args.out, options)
+    bench = JournaledBench(Renderer(), settings, journal)
+    plan.measure(bench, args.out, partial(_report, name, suite, bench, journal.provenance))
+    bench.finish()
     return int(bench.stopped)
+
+
+def _options(name: str, args: Namespace, settings: BenchSettings, plan: MeasuringPlan) -> Row:
+    """What a run measures and how, in words: two runs with the same measure the same pieces."""
+    scenes = dict.fromkeys(group.scene for group in plan.groups)
+    return {
+        "experiment": name,
+        **{option: str(value) for option, value in asdict(settings).items()},
+        "--scene": " ".join(map(str, args.scene or ())) or "not given",
+        "--quick": "given" if args.quick else "not given",
+        "scenes with data": f"{' '.join(map(str, scenes))} in {len(plan.groups)} groups",
+    }
+
+
+def _provenance(out: Path, suite: Suite, stored: Path) -> Row:
+    """Which code measured the rows in a folder; of a run without a journal, as it is stored."""
+    journal = Journal.read(out)
+    if journal is not None:
+        return journal.provenance
+    measured = suite.read_run(stored).get("commit") if stored.exists() else commit()
+    return {} if measured is None else {"commit": measured}
 
 
 def _usual(suite: Suite, quick: bool) -> BenchSettings:
@@ -157,7 +190,7 @@ def _plan(suite: Suite, args: Namespace, settings: BenchSettings) -> MeasuringPl
     given = {} if suite.scenes is None else {"scenes": chosen or suite.scenes}
     own = suite.scenes is None and bool(chosen)  # then only groups: other parts have their own scenes
     others = {
-        f"{name}.jsonl": RowSource(partial(part.measure, **given))
+        f"{name}.jsonl": RowSource(partial(_rows, file=f"{name}.jsonl", part=part, given=given))
         for name, part in suite.parts.items()
         if part.measure is not None and not own
     }
@@ -170,13 +203,21 @@ def _plan(suite: Suite, args: Namespace, settings: BenchSettings) -> MeasuringPl
     return MeasuringPlan(groups, others, left_out(lacking))
 
 
-def _report(name: str, suite: Suite, bench: Bench, measured: str | None) -> None:
-    """Make the report, the stored run, its pictures and the page of the rows in a folder. measured: the
-    commit that was measured, None: unknown."""
+def _rows(bench: Bench, file: str, part: Part, given: Mapping[str, Sequence[str]]) -> Iterator[Row]:
+    """The rows of a part, piece by piece. given: the scenes, if the suite has any."""
+    assert isinstance(bench, JournaledBench) and part.measure is not None
+    pieces = [{"scenes": [scene]} for scene in given["scenes"]] if part.by_scene else [given]
+    for piece in pieces:
+        yield from bench.rows(file, partial(part.measure, **piece))
+
+
+def _report(name: str, suite: Suite, bench: Bench, provenance: Row) -> None:
+    """Make the report, the stored run, its pictures and the page of the rows in a folder. provenance: what
+    the stored run says of the code that measured them."""
     assert bench.folder is not None
     if suite.groups is not None:
         tell(write_report(bench.folder))
-    run = suite.read(bench.folder) | ({} if measured is None else {"commit": measured})
+    run = suite.read(bench.folder) | provenance
     write_run(bench.folder / f"{name}.json", run)
     for draw in suite.pictures.values():
         if draw is not None:

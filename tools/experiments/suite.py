@@ -33,11 +33,14 @@ class Part:
     they are those of the drawn pictures. sweeps: only rows with these; empty: all.
 
     stored: the keys of a row that a stored run has, or a function from all rows to those that it has.
+    by_scene: whether the rows of a scene are the same without the other scenes; then a stopped run goes on
+    with the scene that it was stopped at.
     """
 
     stored: Sequence[str] | Callable[[Sequence[Row]], Iterable[Row]]
     measure: Callable[..., Iterator[Row]] | None = None
     sweeps: Sequence[str] = ()
+    by_scene: bool = False
 
     def own(self, rows: Sequence[Row]) -> list[Row]:
         """The rows that are of this part."""

@@ -66,7 +66,7 @@ EXPERIMENT = Suite(
     page="laplacian.md",
     parts={
         "rows": Part(("scene", "merging", "by_view"), splines.measure_seams),
-        "alone": Part(("scene", "merging", "by_view"), splines.measure_alone),
+        "alone": Part(("scene", "merging", "by_view"), splines.measure_alone, by_scene=True),
         "sizes": Part(("scene", "merging", "zoom", "by_view"), splines.measure_sizes),
         "times": Part(("merging", "pods", "wall_ms", "busy_ms", "passes"), splines.measure_bands),
     },

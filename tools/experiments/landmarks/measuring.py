@@ -175,6 +175,7 @@ EXPERIMENT = Suite(
         "rows": Part(
             ("scene", "backend", "zoom", "pitch", "pairs", "untold", "covered", "uncertainty"),
             measure_distances,
+            by_scene=True,
         )
     },
     tables=[

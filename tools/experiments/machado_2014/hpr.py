@@ -133,7 +133,9 @@ EXPERIMENT = Suite(
             ("scene", "n", "noise", "method", "radius", "views", "by_view"), accuracy.measure_visibility
         ),
         "growth": Part(("scene", "n", "method", "visible", "error", *_GROWN), growth.measure_growth),
-        "speeds": Part(("scene", "n", "sectors", "visible", "busy_ms", "wall_ms"), speed.measure_speeds),
+        "speeds": Part(
+            ("scene", "n", "sectors", "visible", "busy_ms", "wall_ms"), speed.measure_speeds, by_scene=True
+        ),
     },
     tables=[
         Table(

@@ -30,13 +30,15 @@ def _times(runs: Sequence[StoredRun]) -> Iterator[Row]:
 EXPERIMENT = Suite(
     page="codeword.md",
     parts={
-        "times": Part(("scene", "n", "size", "busy_ms", "wall_ms"), words.measure_times),
+        "times": Part(("scene", "n", "size", "busy_ms", "wall_ms"), words.measure_times, by_scene=True),
         "pixels": Part(
             ("scene", "projection", "quality", "ids", "nearest", "covered", "depth", "normal"),
             words.measure_pixels,
+            by_scene=True,
         ),
         "truth": Part(
-            ("scene", "quality", "samples", "psnr", "psnr_edges", "normal"), words.measure_truth
+            ("scene", "quality", "samples", "psnr", "psnr_edges", "normal"), words.measure_truth,
+            by_scene=True,
         ),
         "tables": Part(
             ("steps", "sizes", "normals", "busy_ms", "nbytes", "bitmap_bytes"), words.measure_tables

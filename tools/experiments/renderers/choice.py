@@ -103,7 +103,7 @@ def _choices(runs: Sequence[StoredRun]) -> Iterator[Row]:
 
 EXPERIMENT = Suite(
     page="automatic.md",
-    parts={"rows": Part(_stored, measure_choices)},
+    parts={"rows": Part(_stored, measure_choices, by_scene=True)},
     tables=[
         Table(
             "choices",
