@@ -87,8 +87,22 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
     with monkeypatch.context() as patch:
         patch.setattr(stabilise, "register_region", interrupted)
         assert run(*words, "out").code != 0
-    assert len(Path("out/transforms.partial").read_text().splitlines()) == 3
+    partial = Path("out/transforms.partial")
+    whole = partial.read_text()
+    assert len(json.loads(whole)["frames"]) == 2
     assert not Path("out/transforms.csv").exists()
+    for damaged in (
+        whole[:-9],
+        "[]",
+        whole.replace("covariance", "spread"),
+        whole.replace("frames", "times"),
+    ):
+        partial.write_text(damaged)
+        refused = run(*words, "out")
+        assert refused.code == 2, refused.err
+        assert "does not hold motions" in refused.err
+        assert "Delete the file to begin anew" in refused.err
+    partial.write_text(whole)
     done = run(*words, "out")
     assert done.code == 0
     assert "2 of 3 frames are known" in done.out

@@ -80,10 +80,9 @@ def run(args: Namespace) -> int:
         known = partial.read()
         if known:
             tell(f"Scan4D continues: {len(known)} of {len(timeline)} frames are known")
-        partial.begin(known)
         with progress(len(timeline) - len(known)) as tick:
-            for index in stabilise(timeline, reference, limits.shift, known):
-                partial.add(index, known[index])
+            for _ in stabilise(timeline, reference, limits.shift, known):
+                partial.save(known)
                 tick()
         report(timeline, 0)
         axes = _axes(args, pose)

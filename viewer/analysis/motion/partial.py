@@ -1,5 +1,4 @@
-"""Motions of frames that are known so far, in a file that grows by a line a frame, so that work goes on where
-it was stopped."""
+"""Motions of frames that are known so far, in a file, so that work goes on where it was stopped."""
 
 from __future__ import annotations
 
@@ -10,67 +9,51 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, explained
-from ...files import open_plain
+from ...files import parsed_json, read_text, reading, save_json
 from ...rigid import Rigid
 from .stabilise import FrameMotion
 
+_MOST_BYTES = 1 << 28
+
 
 class PartialMotions:
-    """A file of motions. key: what they are of; motions of anything else are not read, but replaced."""
+    """A file of motions. key: what they are of, plain JSON; motions of anything else are not read."""
 
     def __init__(self, path: Path, key: Mapping[str, Any]) -> None:
         self.path = path
         self._key = json.dumps(key, sort_keys=True)
 
     def read(self) -> dict[int, FrameMotion]:
-        """The motions by frame; a line that was cut off ends them. Raises InputError."""
-        try:
-            with open_plain(self.path) as stream:
-                first, *lines = stream.read().decode("utf-8", "replace").splitlines()
-        except FileNotFoundError:
+        """The motions by frame, none without a file. Raises InputError where the file is damaged."""
+        if not self.path.exists():
             return {}
-        except (OSError, ValueError) as error:
-            what, hint = explained(error) if isinstance(error, OSError) else (str(error), None)
-            raise InputError(f"cannot be read: {what}", self.path, hint) from error
-        known: dict[int, FrameMotion] = {}
-        for line in lines if first == self._key else []:
+        with reading(self.path, "does not hold motions", "Delete the file to begin anew"):
             try:
-                said = json.loads(line)
-            except ValueError:
-                break
-            covariance = np.array(said["covariance"], np.float64).reshape(6, 6)
-            motion = None if said["motion"] is None else Rigid(np.array(said["motion"]))
-            known[said["frame"]] = FrameMotion(motion, covariance, said["reason"], said["within"])
-        return known
+                said = parsed_json(read_text(self.path, _MOST_BYTES))
+                frames = said["frames"] if said["key"] == self._key else {}
+                return {int(frame): _motion(values) for frame, values in frames.items()}
+            except (AttributeError, KeyError, TypeError) as error:
+                raise ValueError(f"{type(error).__name__}: {error}") from error
 
-    def begin(self, known: Mapping[int, FrameMotion]) -> None:
-        """Write anew what is known. Raises InputError."""
-        self._write("w", self._key, *(self._line(frame, motion) for frame, motion in known.items()))
-
-    def add(self, frame: int, motion: FrameMotion) -> None:
-        """Write one more frame. Raises InputError."""
-        self._write("a", self._line(frame, motion))
+    def save(self, known: Mapping[int, FrameMotion]) -> None:
+        """Write the motions by frame, in one step. Raises InputError."""
+        save_json(self.path, {"key": self._key, "frames": {n: _values(one) for n, one in known.items()}})
 
     def end(self) -> None:
         """Delete the file: all is written elsewhere."""
         self.path.unlink(missing_ok=True)
 
-    def _line(self, frame: int, found: FrameMotion) -> str:
-        return json.dumps(
-            {
-                "frame": frame,
-                "motion": None if found.motion is None else found.motion.matrix.tolist(),
-                "covariance": found.covariance.ravel().tolist(),
-                "reason": found.reason,
-                "within": found.within,
-            }
-        )
 
-    def _write(self, mode: str, *lines: str) -> None:
-        try:
-            with open(self.path, mode, encoding="utf-8") as stream:
-                stream.writelines(f"{line}\n" for line in lines)
-        except OSError as error:
-            what, hint = explained(error)
-            raise InputError(f"cannot be written: {what}", self.path, hint) from error
+def _values(found: FrameMotion) -> dict[str, Any]:
+    """A motion as plain JSON; a gap has its reason alone."""
+    if found.motion is None:
+        return {"gap": found.reason}
+    matrix, covariance = found.motion.matrix.tolist(), found.covariance.tolist()
+    return {"motion": matrix, "covariance": covariance, "within": found.within}
+
+
+def _motion(values: Mapping[str, Any]) -> FrameMotion:
+    if "gap" in values:
+        return FrameMotion.gap(values["gap"])
+    covariance = np.array(values["covariance"], np.float64).reshape(6, 6)
+    return FrameMotion(Rigid(np.array(values["motion"])), covariance, within=values["within"])
