@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from experiments.motion.heads import motion_error
 from rigid_hills import RigidHills, opened, truth, whole
-from scipy.spatial.transform import Rotation
 
 from viewer.analysis.motion.axes import anatomical_axes, weak_directions
 from viewer.analysis.motion.found import found_region
@@ -18,7 +18,6 @@ from viewer.analysis.motion.stabilise import (
     stabilise,
 )
 from viewer.errors import InputError
-from viewer.rigid import Rigid
 from viewer.scan.timeline import Timeline
 from viewer.task import Cancelled, Task
 
@@ -33,13 +32,6 @@ def motions(timeline: Timeline, reference: MotionReference) -> dict[int, FrameMo
     return known
 
 
-def error(found: Rigid, right: Rigid, reference: MotionReference) -> np.ndarray:
-    """How far a motion is off: (6,), turns in degrees, and the shift of the region's middle."""
-    middle = reference.region.patch.center + reference.origin
-    turn = Rotation.from_matrix(found.rotation @ right.rotation.T).as_rotvec(degrees=True)
-    return np.concatenate([turn, found.points(middle) - right.points(middle)])
-
-
 @pytest.mark.parametrize("reference", [0, 3])
 def test_frames_are_registered_from_the_reference_on(reference: int) -> None:
     timeline = opened(RigidHills(5))
@@ -51,7 +43,7 @@ def test_frames_are_registered_from_the_reference_on(reference: int) -> None:
     for frame in set(found) - {reference}:
         motion = found[frame].motion
         assert motion is not None
-        off, told = error(motion, truth(frame, reference), start), found[frame].spread(WORLD)
+        off, told = motion_error(motion, truth(frame, reference), start.middle), found[frame].spread(WORLD)
         assert (np.abs(off) < (0.1, 0.1, 0.1, 0.05, 0.05, 0.05)).all()
         assert (np.abs(off) < 2 * told).all()
         assert found[frame].state(WORLD, LIMITS) is MotionState.OK
@@ -64,7 +56,7 @@ def test_outliers_and_hidden_parts_do_no_harm(faults: dict[str, float]) -> None:
     start = whole(timeline)
     motion = motions(timeline, start)[2].motion
     assert motion is not None
-    assert np.abs(error(motion, truth(2, 0), start)).max() < 0.1
+    assert np.abs(motion_error(motion, truth(2, 0), start.middle)).max() < 0.1
 
 
 def test_a_frame_that_does_not_fit_is_a_gap_and_the_next_one_is_found() -> None:
@@ -76,7 +68,7 @@ def test_a_frame_that_does_not_fit_is_a_gap_and_the_next_one_is_found() -> None:
     assert found[2].state(WORLD, LIMITS) is MotionState.GAP
     motion = found[3].motion
     assert motion is not None
-    assert np.abs(error(motion, truth(3, 0), start)).max() < 0.1
+    assert np.abs(motion_error(motion, truth(3, 0), start.middle)).max() < 0.1
 
 
 def test_a_flat_region_leaves_directions_open_and_they_are_named() -> None:
@@ -101,7 +93,7 @@ def test_the_found_region_leaves_out_what_moves_otherwise() -> None:
     start = MotionReference.of(pose, rows, 0)
     motion = motions(timeline, start)[4].motion
     assert motion is not None
-    assert np.abs(error(motion, truth(4, 0), start)).max() < 0.1
+    assert np.abs(motion_error(motion, truth(4, 0), start.middle)).max() < 0.1
 
 
 def test_work_that_was_cancelled_goes_on_where_it_stopped() -> None:

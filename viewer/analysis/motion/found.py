@@ -41,7 +41,7 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
     from scipy.spatial import cKDTree
 
     origin = pose.cloud.origin
-    surface = moment_surface(pose, origin)
+    surface = moment_surface(pose.cloud, origin)
     every = np.arange(len(surface.held.points))
     whole = RegionSurface.of(surface, every)
     if whole is None:
@@ -91,7 +91,7 @@ def _moments(timeline: Timeline, origin: Float, frame: int | None) -> dict[int, 
         if index == frame:
             continue
         try:
-            moments[index] = moment_surface(timeline.pose(index), origin)
+            moments[index] = moment_surface(timeline.pose(index).cloud, origin)
         except InputError:
             continue
     return moments

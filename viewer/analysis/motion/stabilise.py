@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...rigid import STILL, Rigid
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
 from ...scan.timeline import Timeline
@@ -102,17 +103,22 @@ class MotionReference:
         """The reference of a pose. rows: of its points that count as rigid. Raises InputError where they are
         too few."""
         origin = pose.cloud.origin
-        surface = moment_surface(pose, origin)
+        surface = moment_surface(pose.cloud, origin)
         region = RegionSurface.of(surface, rows)
         if region is None:
             what = f"the region has {len(rows)} points in the reference frame, which is too few"
             raise InputError(what, pose.label, "Choose a larger region")
         return cls(surface, origin, region, frame)
 
+    @property
+    def middle(self) -> Float:
+        """The middle of the region, (3,), which covariances of motions are about, in the coordinates of the
+        scan."""
+        return self.origin + self.region.patch.center
 
-def moment_surface(pose: Pose, origin: Float) -> MomentSurface:
-    """The surface of a pose, relative to an origin, (3,)."""
-    cloud = pose.cloud
+
+def moment_surface(cloud: PointCloud, origin: Float) -> MomentSurface:
+    """The surface of a cloud, relative to an origin, (3,)."""
     return MomentSurface(
         cloud.positions + (cloud.origin - origin), typical_spacing(cloud), None, cloud.normals
     )
@@ -162,7 +168,7 @@ def _motion(
     if frame == reference.frame:
         return FrameMotion(STILL, np.zeros((6, 6)), within=1.0)
     try:
-        surface = moment_surface(timeline.pose(frame), reference.origin)
+        surface = moment_surface(timeline.pose(frame).cloud, reference.origin)
     except InputError as error:
         return FrameMotion.gap(error.what)
     found = register_region(reference.region, surface, start)
