@@ -102,6 +102,11 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
         assert refused.code == 2, refused.err
         assert "does not hold motions" in refused.err
         assert "Delete the file to begin anew" in refused.err
+    for folder, unit in (("same", "mm"), ("other", "cm")):
+        Path(folder).mkdir()
+        (Path(folder) / "transforms.partial").write_text(whole)
+        said = run("motion", "seq", "--unit", unit, "--region", "region.json", "-o", folder).out
+        assert ("are known" in said) == (folder == "same")
     partial.write_text(whole)
     done = run(*words, "out")
     assert done.code == 0
@@ -128,7 +133,7 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
 @pytest.mark.parametrize(
     ("words", "what"),
     [
-        (("seq", "-o", "out"), "--unit mm"),
+        (("seq", "-o", "out"), "State the unit of the scan, such as --unit mm"),
         (("seq", "--unit", "mm", "--reference", "7", "-o", "out"), "no pose 7"),
         (("seq", "--unit", "mm", "--region", "none.json", "-o", "out"), "none.json"),
     ],

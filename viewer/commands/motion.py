@@ -76,7 +76,7 @@ def run(args: Namespace) -> int:
             rows = region.rows(pose.cloud, _places(args, region, frame))
         output_folder(args.out)
         reference = MotionReference.of(pose, rows, frame)
-        partial = PartialMotions(args.out / _PARTIAL, _key(args, timeline, pose, rows))
+        partial = PartialMotions(args.out / _PARTIAL, _key(args, timeline, pose.cloud.world()[rows]))
         known = partial.read()
         if known:
             tell(f"Scan4D continues: {len(known)} of {len(timeline)} frames are known")
@@ -96,7 +96,7 @@ def run(args: Namespace) -> int:
             "scan": timeline.name,
             "unit": timeline.unit,
             "reference": _facts_of_reference(args, pose),
-            "region": _facts_of_region(args, pose, rows),
+            "region": _facts_of_region(args, pose, rows, reference),
             **_facts_of_motions(known, states, limits),
             "weak_directions": [
                 {**asdict(one), "words": one.in_words(timeline.unit)}
@@ -126,7 +126,7 @@ def _millimetres(timeline: Timeline, length: float) -> float:
     factor = conversion("mm", timeline.unit)
     if factor is None:
         what = f"has the unit '{timeline.unit}', but ±{_CLOSE} mm needs a known length"
-        raise InputError(what, timeline.name, "MotionState the unit of the scan, such as --unit mm")
+        raise InputError(what, timeline.name, "State the unit of the scan, such as --unit mm")
     return length * factor
 
 
@@ -156,16 +156,16 @@ def _places(args: Namespace, region: RigidRegion, frame: int | None) -> dict[str
     return {name: np.array(key.position) for name, key in placed.items() if key is not None}
 
 
-def _key(args: Namespace, timeline: Timeline, pose: Pose, rows: NDArray[np.int64]) -> dict[str, Any]:
-    """The scan, region and reference that partial motions must be of, to be used again."""
+def _key(args: Namespace, timeline: Timeline, region: NDArray[np.float64]) -> dict[str, Any]:
+    """The scan, region (P, 3) and reference that partial motions must be of, to be used again."""
     return {
         "version": __version__,
         "scan": known_as(args.scan),
         "hash": fingerprint(timeline.files),
         "times": len(timeline),
+        "unit": timeline.unit,
         "reference": str(args.reference),
-        "label": pose.label,
-        "region": hashlib.sha256(rows.tobytes()).hexdigest(),
+        "region": hashlib.sha256(region.tobytes()).hexdigest(),
     }
 
 
@@ -199,13 +199,15 @@ def _facts_of_reference(args: Namespace, pose: Pose) -> dict[str, Any]:
     }
 
 
-def _facts_of_region(args: Namespace, pose: Pose, rows: NDArray[np.int64]) -> dict[str, Any]:
+def _facts_of_region(
+    args: Namespace, pose: Pose, rows: NDArray[np.int64], reference: MotionReference
+) -> dict[str, Any]:
     """The facts of the region, for the report."""
     return {
         "source": "found" if args.region is None else str(args.region),
         "points": len(rows),
         "share_of_points": len(rows) / max(pose.count, 1),
-        "middle": pose.cloud.world()[rows].mean(axis=0).tolist(),
+        "middle": reference.middle.tolist(),
     }
 
 

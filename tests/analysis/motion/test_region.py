@@ -42,7 +42,7 @@ def test_a_region_is_all_that_its_parts_hold(data: dict[str, Any], rows: list[in
         ('{"spheres": [[0, 0, NaN, 1]]}', "'spheres' is not a list"),
         ('{"points": [1.5]}', "'points' is not a list"),
         ('{"points": [true]}', "'points' is not a list"),
-        ('{"landmarks": ["n"]}', "'radius' is not a length"),
+        ('{"landmarks": ["n"]}', "'radius' is not a length.*State the radius"),
         ('{"landmarks": [1], "radius": 2}', "'landmarks' is not a list"),
     ],
 )

@@ -50,14 +50,15 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
     moments = _moments(timeline, origin, frame)
     if not moments:
         raise InputError("no other frame can be read", timeline.name, "Name the region with --region")
-    starts: dict[int, Rigid] = {}
+    starts: dict[int | None, Rigid] = {}
     kept = np.ones(len(whole.rows), bool)
     for round_ in range(_ROUNDS):
         region = whole.only(kept)
-        off, seen, noises = np.zeros(len(kept)), np.zeros(len(kept)), [0.0]
+        off, seen = np.zeros((2, len(kept)))
+        noises: list[float] = []
         for number, (index, beside) in enumerate(outward(list(moments), frame or 0)):
             checkpoint((round_ + number / len(moments)) / _ROUNDS)
-            start = starts.get(index, STILL if beside is None else starts.get(beside, STILL))
+            start = starts.get(index, starts.get(beside, STILL))
             found = register_region(region, moments[index], start, LEVELS if round_ == 0 else LEVELS[1:])
             if found is None:
                 continue
@@ -70,7 +71,7 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
             seen += has
             noises.append(_DEVIATION * float(np.nanmedian(np.abs(away[:, 0] - mean))))
         is_measured = seen >= _SEEN * len(moments)
-        least = max(_NOISE * float(np.median(noises[1:] or noises)), _FLOOR * surface.spacing)
+        least = max(_NOISE * float(np.median(noises or [0.0])), _FLOOR * surface.spacing)
         before, rigid = kept, off[kept & is_measured]
         most = float(np.quantile(rigid, _KEPT)) if len(rigid) else 0.0
         kept = is_measured & (off <= max(least, most))

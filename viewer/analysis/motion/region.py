@@ -62,9 +62,7 @@ class RigidRegion:
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise InputError("'landmarks' is not a list of names", hint=_HINT)
         if names and not (_is_number(radius) and radius > 0):
-            raise InputError(
-                "'radius' is not a length above 0", hint="MotionState the radius around the landmarks"
-            )
+            raise InputError("'radius' is not a length above 0", hint="State the radius around the landmarks")
         return cls(_spheres(data.get("spheres", [])), _ids(data.get("points", [])), tuple(names), radius)
 
     def to_json(self) -> dict[str, Any]:
@@ -83,12 +81,11 @@ class RigidRegion:
 
         Raises InputError where a landmark is not among them, and where the cloud has no such points.
         """
-        is_in = np.zeros(len(cloud), bool)
         ids = np.arange(len(cloud)) if cloud.ids is None else cloud.ids
         missing = np.setdiff1d(self.points, ids)
         if len(missing):
             raise InputError(f"the reference frame has no point {missing[0]}", hint="Choose its own points")
-        is_in |= np.isin(ids, self.points)
+        is_in = np.isin(ids, self.points)
         for name in self.landmarks:
             if name not in places:
                 raise unknown_name("landmark", name, list(places))

@@ -134,19 +134,12 @@ class RegisteredRegion:
 
     motion: from the one to the other. covariance: (6, 6), of the shift of the region's middle, scan units,
     and of the turn about it, radians, both along the axes of the world. matched: the share of the region that
-    lies on the surface of the other moment. deviation: of its distances, scan units.
+    lies on the surface of the other moment.
     """
 
     motion: Rigid
     covariance: Float
     matched: float
-    deviation: float
-
-    @property
-    def deviations(self) -> Float:
-        """Standard deviations, (6,): of the turn about x, y, z, degrees, and of the shift of the middle."""
-        spread = np.sqrt(np.diagonal(self.covariance))
-        return np.concatenate([np.degrees(spread[3:]), spread[:3]])
 
 
 def register_region(
@@ -163,8 +156,7 @@ def register_region(
         placement = nearer
     turn = rotations(placement.turn)
     motion = Rigid(rigid_matrix(turn, placement.position - turn @ region.patch.center))
-    covariance = _covariance(region, surface, motion)
-    return RegisteredRegion(motion, covariance, placement.kept, placement.deviation)
+    return RegisteredRegion(motion, _covariance(region, surface, motion), placement.kept)
 
 
 def distances(region: RegionSurface, surface: MomentSurface, motion: Rigid) -> Float:
