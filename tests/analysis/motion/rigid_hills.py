@@ -62,13 +62,18 @@ class RigidHills:
     def times(self) -> NDArray[np.float64]:
         return np.arange(self._frames) / 25
 
+    def heights(self, index: int, x: NDArray, y: NDArray) -> NDArray[np.float64]:
+        """Of the surface in a frame, before the patch moves as one."""
+        rising = self._rise * index * np.clip((x - 8) / 6, 0, 1)
+        return rising + (0.0 if self._is_flat else hills(x, y))
+
     def load(self, index: int) -> PointCloud:
         chance = np.random.default_rng(index)
         if index in self._lacking:
             return PointCloud.from_arrays(chance.uniform(0, 9, (500, 3)) + 500.0)
         x, y = chance.uniform(-SIDE / 2, SIDE / 2, (2, POINTS))
-        z = np.zeros(POINTS) if self._is_flat else hills(x, y)
-        z += self._rise * index * np.clip((x - 8) / 6, 0, 1) + self._noise * chance.standard_normal(POINTS)
+        z = self.heights(index, x, y)
+        z += self._noise * chance.standard_normal(POINTS)
         points = np.column_stack([x, y, z])
         strays = chance.random(POINTS) < self._outliers
         points[strays] += chance.uniform(-5, 5, (int(strays.sum()), 3))
@@ -78,6 +83,14 @@ class RigidHills:
 
     def faces(self, index: int) -> Faces:
         raise InputError("has no faces")
+
+
+class RollingHills(RigidHills):
+    """Hills with other waves in each frame, so that nothing stays rigid."""
+
+    def heights(self, index: int, x: NDArray, y: NDArray) -> NDArray[np.float64]:
+        waves = 0.5 * np.sin(0.5 * x + 1.7 * index) * np.cos(0.4 * y - 2.3 * index)
+        return super().heights(index, x, y) + waves
 
 
 def opened(source: RigidHills) -> Timeline:

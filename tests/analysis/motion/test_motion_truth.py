@@ -1,9 +1,13 @@
-"""The motion of the demo's head, sampled anew in each frame with noise, against the exact one."""
+"""Motions of the demo's head and of animated meshes, sampled anew in each frame, against the exact ones."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from experiments.landmarks.known import KeptFrames
+from experiments.landmarks.resampled import ResampledMesh
 from experiments.motion.heads import (
     REGIONS,
     Heads,
@@ -13,6 +17,8 @@ from experiments.motion.heads import (
     strays,
     without_side,
 )
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from viewer.analysis.motion.found import found_region
 from viewer.analysis.motion.registration import RegionSurface, register_region
@@ -24,6 +30,9 @@ from viewer.analysis.motion.stabilise import (
     moment_surface,
     stabilise,
 )
+from viewer.errors import InputError
+from viewer.scan.open import find_source
+from viewer.scan.timeline import Timeline
 
 pytestmark = pytest.mark.slow
 
@@ -84,3 +93,32 @@ def test_regions_of_growing_difficulty_are_within_what_is_told() -> None:
     shares = {name: np.mean(np.array(values[name]) <= told[name]) for name in REGIONS}
     assert min(shares.values()) >= 0.8, shares
     assert 0.93 <= np.mean(list(shares.values())) <= 0.99, shares
+
+
+def sampled(folder: Path, frames: range) -> tuple[Timeline, list[NDArray]]:
+    """Some frames of meshes, sampled anew without faces, and their vertices (V, 3)."""
+    source = find_source(folder)
+    anew = ResampledMesh(source, 30_000)
+    times = np.arange(len(frames)) / 25
+    kept = KeptFrames(folder.name, [anew.load(frame) for frame in frames], times)
+    return Timeline(kept, times, "m"), [source.load(frame).world() for frame in frames]
+
+
+def test_the_trunk_of_a_galloping_horse_is_found(data_dir: Path) -> None:
+    timeline, vertices = sampled(data_dir / "sequences" / "horse_gallop_48", range(12))
+    pose = timeline.pose(0)
+    rows = found_region(timeline, pose, 0)
+    reference = MotionReference.of(pose, rows, 0)
+    trunk = np.unique(cKDTree(vertices[0]).query(pose.cloud.world()[rows])[1])
+    known: dict[int, FrameMotion] = {}
+    for frame in stabilise(timeline, reference, LIMITS.shift / 1000, known):
+        motion = known[frame].motion
+        assert motion is not None
+        off = np.linalg.norm(motion.points(vertices[0][trunk]) - vertices[frame][trunk], axis=1)
+        assert np.median(off) <= 0.5 * reference.surface.spacing
+
+
+def test_a_dancing_body_has_no_rigid_part(data_dir: Path) -> None:
+    timeline, _ = sampled(data_dir / "sequences" / "crane_175", range(0, 175, 8))
+    with pytest.raises(InputError, match="no region that stays rigid"):
+        found_region(timeline, timeline.pose(0), 0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from experiments.motion.heads import motion_error
-from rigid_hills import RigidHills, opened, truth, whole
+from rigid_hills import RigidHills, RollingHills, opened, truth, whole
 
 from viewer.analysis.motion.axes import anatomical_axes, weak_directions
 from viewer.analysis.motion.found import found_region
@@ -94,6 +94,12 @@ def test_the_found_region_leaves_out_what_moves_otherwise() -> None:
     motion = motions(timeline, start)[4].motion
     assert motion is not None
     assert np.abs(motion_error(motion, truth(4, 0), start.middle)).max() < 0.1
+
+
+def test_a_subject_without_a_rigid_part_has_no_region() -> None:
+    timeline = opened(RollingHills(6))
+    with pytest.raises(InputError, match="no region that stays rigid"):
+        found_region(timeline, timeline.pose(0), 0)
 
 
 def test_work_that_was_cancelled_goes_on_where_it_stopped() -> None:

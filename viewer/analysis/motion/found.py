@@ -3,7 +3,7 @@
 All points begin as the region. Each round registers some frames by the region and measures how far all
 points, averaged over their neighbourhoods, are off. The region of the next round is what noise explains, and
 what is off less than most of the region (trimmed: Chetverikov et al. 2002). Thus it settles on the largest
-part that moves as one.
+part that moves as one. Where nothing stays rigid it shrinks on and on.
 """
 
 from __future__ import annotations
@@ -73,14 +73,21 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
         is_measured = seen >= _SEEN * len(moments)
         least = max(_NOISE * float(np.median(noises or [0.0])), _FLOOR * surface.spacing)
         before, rigid = kept, off[kept & is_measured]
-        kept = is_measured & (off <= max(least, np.quantile(rigid, _KEPT) if len(rigid) else 0.0))
+        most = float(np.quantile(rigid, _KEPT)) if len(rigid) else 0.0
+        kept = is_measured & (off <= max(least, most))
         if np.count_nonzero(kept) < max(_LEAST * len(kept), FEWEST):
-            what = "Scan4D finds no region that stays rigid over all frames"
-            raise InputError(what, timeline.name, "Name the region with --region")
+            raise _none(timeline)
         if (kept == before).all():
             break
+    if most > least:  # the region still shrinks: it is no more than what is off least
+        raise _none(timeline)
     nearest = cKDTree(whole.patch.local).query(surface.held.points - whole.patch.center)[1]
     return np.flatnonzero(kept[nearest])
+
+
+def _none(timeline: Timeline) -> InputError:
+    what = "Scan4D finds no region that stays rigid over all frames"
+    return InputError(what, timeline.name, "Name the region with --region")
 
 
 def _moments(timeline: Timeline, origin: Float, frame: int | None) -> dict[int, MomentSurface]:
