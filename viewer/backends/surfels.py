@@ -152,7 +152,7 @@ class Surfels(Backend):
         "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
         "each point 1000 times, without radii": (
             Limit(0.56, _SEEN_THROUGH, _SORTED),
-            Limit(0.002, AT_EDGES, {"passes": _TWO}),  # lists of tiles have no room: these are rasterised
+            Limit(0.01, AT_EDGES, {"passes": _TWO}),  # lists of tiles have no room: these are rasterised
         ),
         "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
         "collinear points, viewed along their line, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
