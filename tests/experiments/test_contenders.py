@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from experiments.farooq_2013 import contenders
 from experiments.farooq_2013.deferred_blending import blended, groups_of
 from experiments.farooq_2013.pull_push import Floats, Reconstruction, differences, reconstructed
 
+from viewer.bench.run import Bench, BenchSettings
 from viewer.view import View
 
 if TYPE_CHECKING:
@@ -113,3 +115,27 @@ def test_differences_are_found() -> None:
     assert found["pixels"] == pytest.approx(2 * pixel)
     assert found["covered"] == pytest.approx(pixel)
     assert found["depth"] == pytest.approx(1 / 3)
+
+
+@pytest.mark.slow
+def test_all_contenders_draw_a_pair_of_views(renderer: Renderer) -> None:
+    bench = Bench(renderer, BenchSettings(size=(96, 72), views=1, repeat=1, frames=0))
+    (like, *_) = contenders.groups()
+    rows = bench.measure(replace(like, scene="torus-pair"))
+    assert not bench.notes
+    found = {row["backend"]: row["errors"] for row in rows}
+    assert len(rows) == len(like.contenders)
+    assert found["pull-push"] == pytest.approx(found["pull-push on the CPU"], rel=1e-3, nan_ok=True)
+    for name in ("pull-push", "deferred-blending"):
+        assert found[name]["hole_scanned_percent"] < 5
+        assert found[name]["psnr_scanned"] > 25
+
+
+@pytest.mark.slow
+def test_times_and_differences_of_both_are_found(renderer: Renderer) -> None:
+    bench = Bench(renderer, BenchSettings(size=(96, 72), views=1, repeat=1, frames=0))
+    rows = list(contenders.measure_twins(bench))
+    assert [row["zoom"] for row in rows] == list(contenders.ZOOMS)
+    for row in rows:
+        assert min(*row["busy_ms"].values(), *row["wall_ms"].values()) > 0
+        assert row["pixels"] < 1

@@ -19,7 +19,7 @@ ZOOMS = (0.25, 1.0, 2.0, 4.0, 8.0)
 HIDDEN_ZOOM = 4.0
 _SCENES = ("demo-pair", "armadillo-pair", "dragon-scans", "bunny-scans", "truedepth-head")
 _COVERED_SCENES = ("armadillo-pair", "hand-before-face-pair")  # which cover themselves
-_ERRORS = {
+ERRORS = {
     "hole_percent": "holes, %",
     "hole_scanned_percent": "of what was scanned, %",
     "through_percent": "through, %",
@@ -67,9 +67,9 @@ def levels_of(row: Row) -> int:
     return sum(params[f"level_{level}"] for level in range(MOST_LEVELS)) if params["fill"] else 1
 
 
-def _stored(rows: Sequence[Row]) -> Iterator[Row]:
+def stored_pictures(rows: Sequence[Row]) -> Iterator[Row]:
     """Of each picture its zoom, primitive, levels, time and errors."""
-    part = pictures(_ERRORS, {"primitive": "primitive", HIDE: HIDE})
+    part = pictures(ERRORS, {"primitive": "primitive", HIDE: HIDE})
     for row, stored in zip(rows, part.digest(rows), strict=True):
         yield {**stored, **({"levels": levels_of(row)} if row["backend"] == BACKEND else {})}
 
@@ -77,7 +77,7 @@ def _stored(rows: Sequence[Row]) -> Iterator[Row]:
 # --- tables ---------------------------------------------------------------------------
 
 
-def _drawn(row: Row) -> str:
+def drawn_as(row: Row) -> str:
     """How a row was drawn, in words."""
     if row["backend"] == RANGE_MESH:
         return f"`{RANGE_MESH}`"
@@ -88,7 +88,7 @@ def _drawn(row: Row) -> str:
 def _zoomed(runs: Sequence[StoredRun], hidden: bool = False) -> list[Row]:
     """The pictures of the first machine: of the suite's scenes, or those of hidden points."""
     rows = [row for each in runs[:1] for row in each["rows"]]
-    return [{**row, "drawn": _drawn(row)} for row in rows if (row["sweep"] == HIDE) == hidden]
+    return [{**row, "drawn": drawn_as(row)} for row in rows if (row["sweep"] == HIDE) == hidden]
 
 
 def _by_zoom(error: str) -> Table:
@@ -109,7 +109,7 @@ def _at_zoom(name: str, zoom: float) -> Table:
     ms = Column("ms", lambda row: float(np.median(row["gpu_ms"])))
     return Table(
         name,
-        [code("scene"), Column("drawn"), *columns("errors", _ERRORS), ms],
+        [code("scene"), Column("drawn"), *columns("errors", ERRORS), ms],
         lambda runs: [row for row in _zoomed(runs) if row["zoom"] == zoom],
         merged=1,
     )
@@ -160,7 +160,7 @@ def _seconds(name: str) -> Callable[[Row], float | None]:
 EXPERIMENT = Suite(
     page="farooq.md",
     parts={
-        "rows": Part(_stored, sweeps=["zoom", HIDE]),
+        "rows": Part(stored_pictures, sweeps=["zoom", HIDE]),
         "large": Part(
             ("scenario", "levels", "primitive", "samples", "measured", "zoom", "ms", "unskipped_ms",
             "covered",
