@@ -74,6 +74,7 @@ def test_a_stopped_suite_goes_on_with_the_piece_that_it_was_stopped_at(
     done = run_experiment(*words, "--resume")
     assert done.code == 0, done.err
     assert small.calls[0] == again
+    assert f"pieces that the run keeps: {SCENES.index(again.split()[0])}\n" in done.err + done.out
     whole = [{"scene": scene, "number": number} for scene in SCENES for number in range(2)]
     run = stored(tmp_path)
     assert run["rows"] == run["others"] == whole

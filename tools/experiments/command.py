@@ -145,6 +145,8 @@ def _run_suite(name: str, suite: Suite, args: Namespace) -> int:
         plan.claim(args, settings)
         journal = Journal.of_new(args.out, options)
     bench = JournaledBench(Renderer(), settings, journal)
+    if args.resume:
+        tell(f"Complete pieces that the run keeps: {bench.stored}")
     plan.measure(bench, args.out, partial(_report, name, suite, bench, journal.provenance))
     bench.finish()
     return int(bench.stopped)

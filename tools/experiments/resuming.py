@@ -117,6 +117,11 @@ class JournaledBench(Bench):
         self.notes += journal.notes
         self._begun, self._counts, self._before = 0, Counter[str](), 0
 
+    @property
+    def stored(self) -> int:
+        """How many pieces are complete from before."""
+        return len(self._stored)
+
     def measure(self, group: Group) -> list[Row]:
         """The rows of a group of pictures: those that are stored, or measured now."""
         return list(self.rows(RESULTS, partial(self._measured, group)))
