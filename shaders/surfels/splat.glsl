@@ -65,12 +65,12 @@ vec2 splat_axes(Point point, vec3 n, float depth, out precise vec3 u, out precis
 
 #if HAS_CELLS
 const float LEAST_SHARE = 0.15;  // of a splat's width that a neighbour's plane leaves
-const float GRAZING = 0.2;  // cosine between a normal and the line of sight, below which a plane is seen from the side
+const float GRAZING = 0.1;  // cosine between a normal and the line of sight; below, a plane is seen from the side
 
 // Move the middle of a splat from its point to that of its cell, and draw the splat in where the plane of a neighbour ends
-// the surface: where the neighbour's plane is seen from the side, or shows the other side than the splat, the splat would stick out
-// of the outline. The side towards the neighbour moves to the plane, and the opposite side stays. All in view space. n: normal of
-// the splat; u, v: half-axes, conjugate ones afterwards.
+// the surface: where it is seen from the side, or shows the other side than the splat, the splat would stick out of the
+// outline. The side towards the neighbour moves to the plane, and the opposite side stays. All in view space. n: normal
+// of the splat; u, v: half-axes, conjugate ones afterwards.
 void fit_to_cell(Point point, vec3 n, inout precise vec3 center, inout precise vec3 u, inout precise vec3 v) {
     precise vec3 from = center;
     float depth = -center.z, least = least_radius / scale_at(max(depth, view_near));
