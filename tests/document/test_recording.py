@@ -178,6 +178,16 @@ def test_the_recorder_notes_what_changes_and_when() -> None:
     assert [entry.at for entry in found.entries] == [0, 0.52, 2.0]
 
 
+def test_what_is_found_of_the_scan_while_a_picture_stays_makes_no_entry() -> None:
+    recorder = Recorder(0.0)
+    found = replace(FIRST, record={"decisions": {"orientation": {"value": "quick"}}})
+    for entry, now in [(FIRST, 0.0), (found, 0.5), (replace(SECOND, record=found.record), 1.0)]:
+        recorder.note(entry, now)
+    first, second = recorder.finish(2.0).entries
+    assert (first.at, second.at) == (0.0, 1.0)
+    assert first.record == second.record == found.record
+
+
 # --- its pace -----------------------------------------------------------------------------------
 
 

@@ -160,3 +160,12 @@ def test_fine_sides_of_moving_bodies_are_never_worse(data_dir: Path, folder: str
     mesh.compute_vertex_normals()
     truth = np.asarray(mesh.vertex_normals)
     assert flipped(points, truth, "fine") <= flipped(points, truth, "quick") - least
+
+
+def test_of_many_patches_the_largest_count() -> None:
+    """Pairs of all patches take memory and time by the square of their number."""
+    patch = np.repeat(np.arange(5, dtype=np.int32), [3, 1, 4, 1, 2])
+    np.testing.assert_array_equal(fine_sides._largest(patch, 5)[0], patch)
+    few, count = fine_sides._largest(patch, 3)
+    assert count == 3
+    np.testing.assert_array_equal(few, np.repeat([1, 3, 0, 3, 2], [3, 1, 4, 1, 2]))

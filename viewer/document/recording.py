@@ -367,8 +367,13 @@ class Recorder:
         Returns what has changed, as the recording's file will have it; None where nothing has.
         """
         before = self._entries[-1] if self._entries else None
-        if before is not None and entry == replace(before, hash=before.hash or entry.hash):
-            return None  # nothing, or the hash alone was found
+        if before is not None:
+            completed = replace(before, record=entry.record)
+            if entry == replace(completed, hash=before.hash or entry.hash):
+                self._entries[-1] = (
+                    completed  # nothing, or what is found while the picture stays: sides, the hash
+                )
+                return None
         self._entries.append(replace(entry, at=self._since(now)))
         return _change(self._entries[-1], before)
 

@@ -25,7 +25,8 @@ from .winding import clusters_of
 Vectors = NDArray[np.float64]  # (N, 3)
 
 _UNSURE = 0.001  # of the weights of links
-_PATCHES = 1000  # about so many: all pairs of them are looked at
+_PATCHES = 1000  # about so many
+_MOST_PATCHES = 2000  # all pairs of them are looked at; smaller ones beyond stay as they are
 _SMALLEST = 10  # points of a patch, at most, in a small cloud
 _TARGETS = 6000  # points at which the winding number is looked at, at most
 _WEIGHT = 2.0  # of the winding number, against that of a link
@@ -180,8 +181,10 @@ def _of_all_patches(field: _Field, bonds: Bonds) -> NDArray[np.int8]:
     links, weights, seen = bonds
     largest = max(len(seen) // _PATCHES, _SMALLEST)
     patch, agreeing = patches_of(links, weights, len(seen), tuple(sorted({_SMALLEST, largest})))
-    count = int(patch.max()) + 1
+    patch, count = _largest(patch, _MOST_PATCHES)
     fields = field.of_groups(patch, count, agreeing)
+    inside = (patch < count)[links].all(axis=1)
+    links, weights = links[inside], weights[inside]
     pairs, sums = summed(patch[links], weights * agreeing[links].prod(axis=1), count)
     strength = np.zeros(
         (count + 1, count + 1)
@@ -190,14 +193,26 @@ def _of_all_patches(field: _Field, bonds: Bonds) -> NDArray[np.int8]:
     strength += strength.T
     weight = _WEIGHT * field.scale
     strength[:count, :count] -= 2 * weight * (fields.T @ fields)
-    alone = np.bincount(patch, seen * agreeing) + weight * fields.sum(axis=0, dtype=np.float64)
+    alone = np.bincount(patch, seen * agreeing, count + 1)[:count]
+    alone += weight * fields.sum(axis=0, dtype=np.float64)
     strength[count, :count] = strength[:count, count] = alone
     np.fill_diagonal(strength, 0)
     checkpoint()
     signs = fine_kernels.contract(strength.copy())
     signs *= signs[count]
     fine_kernels.climb(strength, signs)
-    return (agreeing * signs[:count][patch]).astype(np.int8)
+    return np.where(patch < count, agreeing * signs[patch], 1).astype(np.int8)
+
+
+def _largest(patch: NDArray[np.int32], most: int) -> tuple[NDArray[np.int32], int]:
+    """The patches of points, (N,), and their number, where only so many count: those with the most points.
+    Points of the others have this number."""
+    sizes = np.bincount(patch)
+    if len(sizes) <= most:
+        return patch, len(sizes)
+    number = np.full(len(sizes), most, np.int32)
+    number[np.argsort(-sizes, kind="stable")[:most]] = np.arange(most)
+    return number[patch], most
 
 
 def _accepted(field: _Field, bonds: Bonds, signs: NDArray[np.int8]) -> NDArray[np.int8]:
