@@ -56,8 +56,8 @@ def test_what_has_not_changed_is_not_found_again(screen: Screen, tmp_path: Path)
         screen.do("key", "period")
         assert app.settle().frame == 1
         told = calls(app, start)
-        assert told.pop("are_seen") <= 6, (
-            "landmarks, ways and lines, each at once, before and with the picture"
+        assert told.pop("are_seen") <= 9, (
+            "landmarks, ways and lines, each at once, before, with a preview and with the picture"
         )
         assert told.pop("lines_of") <= MEASURES
         assert not told, "tracks, series, curves and ways are those of all frames"

@@ -9,6 +9,7 @@ import csv
 import io
 import math
 import re
+import time
 from pathlib import Path
 
 import numpy as np
@@ -259,6 +260,7 @@ def test_where_another_surface_may_be_meant_the_second_click_counts(screen: Scre
         app.see(clicking=None)
         screen.do("key", "k")
         app.see(clicking="landmarks")
+        time.sleep(0.5)  # else it is the second of a double click
         click(app, place)
         app.told("Click here again")
         assert not app.settle().landmarks
