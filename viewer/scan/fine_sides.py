@@ -33,10 +33,8 @@ _WEIGHT = 2.0  # of the winding number, against that of a link
 _SOFT = 0.5  # in distances between points: nearer points count as so near
 _AREA_OF = 12  # neighbours that tell the area of a point
 _SPACING_OF = 6  # neighbours that tell the distance between points
-_TWO_SHEETS = (
-    0.85,
-    0.95,
-)  # what two sheets explain: below the first, one is as good; from the second, two are sure
+# What two sheets explain: below the first, one is as good; from the second, two are sure.
+_TWO_SHEETS = 0.85, 0.95
 _TRUSTED = 2.0  # so that half of the trust decides a link
 _AT_ONCE = 1 << 8  # targets of one call of a compiled loop
 _ROWS = 1 << 13  # points of one
