@@ -214,11 +214,15 @@ def test_holes_stay_open_without_the_levels_that_close_them(draw: Draw, primitiv
     flat = heights(np.full(OPEN.shape, -500), OPEN)
     fine = seen_from_above(draw, flat, primitive=primitive, level_3=False, level_4=False)
     part = np.isinf(fine.depth[~OPEN]).mean()
-    assert 0.5 < part < 0.9
-    assert set(np.unique(fine.level)) == {0, 1, 255}
+    if primitive == "points":  # which lie on all sides of no hole, as far as the finer levels look
+        assert part == 1
+    else:
+        assert 0.5 < part < 0.9
+    finer = set() if primitive == "points" else {1}
+    assert set(np.unique(fine.level)) == {0, 255} | finer
     alone = seen_from_above(draw, flat, primitive=primitive, level_3=False)
     assert np.isfinite(alone.depth).all(), "a coarser level does instead"
-    assert set(np.unique(alone.level)) == {0, 1, 4}
+    assert set(np.unique(alone.level)) == {0, 4} | finer
     none = seen_from_above(draw, flat, primitive=primitive, fill=False)
     np.testing.assert_array_equal(np.isfinite(none.depth), OPEN)
 
