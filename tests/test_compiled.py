@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from viewer.compiled import _CacheFile
+
 NOWHERE = "import numba.core.caching as c; c.CacheImpl._locator_classes = []"  # no folder can be written
 KERNEL = """
 from viewer.compiled import compiled
@@ -101,6 +103,23 @@ def test_what_another_file_has_is_compiled_anew_where_that_changes(tmp_path: Pat
     assert [run(folder, cache) for _ in range(2)] == [(63, 0), (63, 1)]
     (folder / "other.py").write_text(f"ZERO = 5\n{other}")
     assert [run(folder, cache) for _ in range(2)] == [(47, 0), (47, 1)]
+
+
+def test_machine_code_of_another_source_or_signature_is_not_run(tmp_path: Path) -> None:
+    def file(stamp: str) -> _CacheFile:
+        return _CacheFile(str(tmp_path), "kernel", stamp)
+
+    file("old").save("int", "old code")
+    halfway = file("new")
+    halfway._save_index({"int": halfway._data_name(1)})  # stopped before it writes the machine code
+    assert file("new").load("int") is None
+    file("new").save("int", "new code")
+    assert file("new").load("int") == "new code"
+    assert file("old").load("int") is None
+
+    both = file("new")  # as two processes leave it that number a signature each at the same time
+    both._save_index({kind: both._data_name(1) for kind in ("int", "float")})
+    assert both.load("int") is None
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from numbers import Number
 from typing import Any, TypeVar, cast
 
 from numba import njit
-from numba.core.caching import FunctionCache, NullCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile, NullCache
 from numba.core.runtime import rtsys
 
 from .task import announce, over
@@ -65,7 +65,7 @@ class _DiskCache(FunctionCache):
             and value.__module__ != function.__module__
         }
         self.stamp = (self._impl.locator.get_source_stamp(), numbers, used)
-        self._cache_file._source_stamp = self.stamp
+        self._cache_file = _CacheFile(self._cache_path, self._impl.filename_base, self.stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -85,6 +85,23 @@ class _DiskCache(FunctionCache):
         over()  # numba asks to save each that was not found, once it is compiled
         with suppress(OSError):
             super().save_overload(*args)
+
+
+class _CacheFile(IndexDataCacheFile):
+    """Numba's files of a function: an index, and a file of machine code for each signature.
+
+    Numba writes the index first, and numbers the other files. So after a change of the source, a process can
+    find the new index beside the old machine code. Two processes can also give one number to two signatures.
+    Here each file of machine code says what it is for, and no process runs the code of something else.
+    """
+
+    def save(self, key: Any, data: Any) -> None:
+        super().save(key, (self._source_stamp, key, data))
+
+    def load(self, key: Any) -> Any:
+        """The machine code; None where there is none, or other code."""
+        stamp, own, data = super().load(key) or (None, None, None)
+        return data if (stamp, own) == (self._source_stamp, key) else None
 
 
 class _NoCache(NullCache):
