@@ -76,6 +76,16 @@ def own_folder(folder: Path) -> bool:
     return True
 
 
+def forget_oldest(folder: Path, most: int) -> None:
+    """Remove the files of a folder that were used longest ago, until the rest has at most so many bytes."""
+    with suppress(OSError):
+        files = sorted(((path.stat().st_mtime_ns, path) for path in folder.glob("*.json")), reverse=True)
+        for _, path in files:
+            most -= path.stat().st_size
+            if most < 0:
+                path.unlink()
+
+
 def _close(root: Path) -> None:
     """Take a folder, and all in it, from other users: earlier versions made them for everybody to read."""
     for path in _tree(root):

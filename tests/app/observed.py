@@ -223,6 +223,7 @@ def shown(app: App) -> dict[str, Any]:
             "frame": viewport.request.pose.index,
             "backend": surface.stats.backend,
             "color_range": surface.color_range,
+            "moved": viewport.request.layers.world_from_pose.matrix.tolist(),
             "shown_time": viewport.request.pose.time,
             "pixels": surface.size,
             "samples": surface.stats.samples,

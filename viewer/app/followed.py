@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from ..analysis.measures import Series
 from ..analysis.track import Track
+from ..rigid import Rigid
 
 
 class Followed:
@@ -16,12 +17,15 @@ class Followed:
     pending. Positions are those of the scan, whatever tools move it to. series: by measure; those that were
     computed. Either is another object where something has changed, and only then. is_following: whether
     more of the tracks is being found, or is about to be; is_measuring: likewise of measures of surfaces.
+    still: the motion of each frame to where the stabilised scan stands, None in a gap; None while the scan
+    is shown as recorded.
     """
 
     def __init__(self) -> None:
         self.tracks: Mapping[str, Track] = MappingProxyType({})
         self.series: Mapping[str, Series] = MappingProxyType({})
         self.is_following = self.is_measuring = False
+        self.still: tuple[Rigid | None, ...] | None = None
 
     @property
     def is_busy(self) -> bool:

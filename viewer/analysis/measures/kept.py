@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...extensions import package_of
 from ...files import parsed_json, read_text, whole_file
-from ...folders import cache_folder
+from ...folders import cache_folder, forget_oldest
 from . import Measure
 from .kinds import measure_kinds
 from .regions import Refused
@@ -91,20 +91,9 @@ class KeptValues:
         with suppress(InputError), whole_file(self.path) as temporary:
             temporary.write_text(text, encoding="utf-8")
         self._is_new = False
-        _forget_oldest(self.path.parent)
+        forget_oldest(self.path.parent, _MOST_IN_ALL)
 
 
 def measures_folder() -> Path:
     """The folder of kept values; it need not be there yet."""
     return cache_folder() / "measures"
-
-
-def _forget_oldest(folder: Path) -> None:
-    """Remove the files that were used longest ago, until the rest is within the bound."""
-    with suppress(OSError):
-        files = sorted(((path.stat().st_mtime_ns, path) for path in folder.glob("*.json")), reverse=True)
-        room = _MOST_IN_ALL
-        for _, path in files:
-            room -= path.stat().st_size
-            if room < 0:
-                path.unlink()

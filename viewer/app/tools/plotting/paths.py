@@ -43,7 +43,10 @@ class Paths:
         self._seen: tuple[object, NDArray[np.bool_]] = None, np.empty(0, bool)
 
     def still(self, choices: CurveChoices) -> Still | None:
-        """The motion of each frame that holds the scan still; None where the anchors do not tell one."""
+        """The motion of each frame that holds the scan still: that of the stabilised scan, else that of the
+        anchors; None where these do not tell one."""
+        if self._context.followed.still is not None:
+            return self._context.followed.still
         tracks, anchors = self._context.followed.tracks, self._anchors(choices)
         return self._cached.of(
             ("still", anchors), tuple(tracks[name] for name in anchors), lambda: self._found(tracks, anchors)
@@ -60,8 +63,10 @@ class Paths:
         return found
 
     def hold(self, settings: Settings, choices: CurveChoices) -> bool:
-        """Have the scan held still where that is chosen; whether that has changed something."""
-        still = self.still(choices) if settings.hold else None
+        """Have the scan held still where that is chosen and it is not stabilised; whether that has changed
+        something."""
+        holds = settings.hold and self._context.followed.still is None
+        still = self.still(choices) if holds else None
         wanted = None if still is None else (self._context.timeline, still)
         if wanted == self._laid:
             return False
@@ -69,10 +74,15 @@ class Paths:
         self._context.lay(motion=None if still is None else lambda index: still[index] or STILL)
         return True
 
+    def _still_of_paths(self, settings: Settings, choices: CurveChoices) -> Still | None:
+        """The motions that are removed from paths; None where these are as recorded."""
+        is_removed = settings.coordinates == ANCHORS or self._context.followed.still is not None
+        return self.still(choices) if is_removed else None
+
     def trajectories(self, settings: Settings, choices: CurveChoices) -> dict[str, Trajectory]:
         """The paths of the landmarks that are ticked, by name."""
         tracks, smoothing = self._context.followed.tracks, settings.smoothing
-        still = self.still(choices) if settings.coordinates == ANCHORS and choices.traced else None
+        still = self._still_of_paths(settings, choices) if choices.traced else None
         found = {}
         for name in choices.traced:
             if (track := tracks.get(name)) is not None and len(track.times) == len(self._context.timeline):
@@ -112,7 +122,7 @@ class Paths:
     def _held(self, settings: Settings, choices: CurveChoices, frame: int) -> Rigid | None:
         """The motion of paths to where they lie about a frame; None where nobody knows how the anchors lie in
         it."""
-        still = self.still(choices) if settings.coordinates == ANCHORS else None
+        still = self._still_of_paths(settings, choices)
         if still is None:
             return STILL
         now = still[frame] if frame < len(still) else None

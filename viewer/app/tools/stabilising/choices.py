@@ -1,0 +1,49 @@
+"""What the user chooses about stabilising, which is the scan's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....analysis.motion.region import RigidRegion
+from ....document.part import Part
+
+Sphere = tuple[float, float, float, float]  # middle and radius
+FOUND, PAINTED, LANDMARKS = "found", "painted", "landmarks"
+REGION_WORDS = {FOUND: "Found by Scan4D", PAINTED: "Painted", LANDMARKS: "Around landmarks"}
+
+
+@dataclass(frozen=True)
+class Stabilising(Part, name="stabilising"):
+    """is_shown: whether the scan is shown stabilised, not as recorded. reference: the frame that motions
+    begin in. region: how the region that counts as rigid is chosen. spheres: those that were painted in the
+    reference frame, scan units. landmarks: names, each the middle of a sphere of `radius`, scan units.
+    """
+
+    is_shown: bool = False
+    reference: int = 0
+    region: str = FOUND
+    spheres: tuple[Sphere, ...] = ()
+    landmarks: tuple[str, ...] = ()
+    radius: float = 0.0
+
+    @property
+    def of_motions(self) -> Stabilising:
+        """The choices that motions depend on; others have their defaults."""
+        chosen = Stabilising(reference=self.reference, region=self.region)
+        if self.region == PAINTED:
+            return replace(chosen, spheres=self.spheres)
+        if self.region == LANDMARKS:
+            return replace(chosen, landmarks=self.landmarks, radius=self.radius)
+        return chosen
+
+    @property
+    def rigid(self) -> RigidRegion | None:
+        """The region that the user has chosen; None: Scan4D finds it."""
+        if self.region == PAINTED:
+            spheres = np.array(self.spheres, np.float64).reshape(-1, 4)
+            return RigidRegion(spheres, np.empty(0, np.int64))
+        if self.region == LANDMARKS:
+            return RigidRegion(np.empty((0, 4)), np.empty(0, np.int64), self.landmarks, self.radius)
+        return None

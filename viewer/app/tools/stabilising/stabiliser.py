@@ -1,0 +1,203 @@
+"""Has the motions of the open scan found beside the window, and keeps them for the next time."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .... import __version__
+from ....analysis.motion.found import found_region
+from ....analysis.motion.partial import PartialMotions
+from ....analysis.motion.region import RigidRegion
+from ....analysis.motion.stabilise import FrameMotion, MotionReference, WeakLimits, stabilise
+from ....document.recording import fingerprint
+from ....errors import InputError
+from ....files import save_json
+from ....folders import cache_folder, forget_oldest
+from ....geometry import Vector
+from ....scan.pose import Pose
+from ....scan.timeline import Timeline
+from ....scan.units import conversion
+from ....task import Task, announce, over
+from ...tool_context import ToolContext
+from .choices import Stabilising
+
+CLOSE = 0.5  # mm
+_MOST_KEPT = 64 * 2**20  # bytes, of all motions that are kept
+_SAVING = 2.0  # seconds between two times that motions are kept
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Motions to find. choices: that motions depend on. places: landmarks of the
+    region in the reference frame, scan units."""
+
+    timeline: Timeline
+    unit: str
+    choices: Stabilising
+    places: tuple[tuple[str, Vector], ...]
+
+    @classmethod
+    def of(cls, timeline: Timeline, unit: str, choices: Stabilising, places: Mapping[str, Vector]) -> Asked:
+        """The motions to find for the choices of an open scan."""
+        return cls(timeline, unit, choices.of_motions, tuple(sorted(places.items())))
+
+    @property
+    def key(self) -> dict[str, Any]:
+        """Whatever the motions depend on, plain JSON: no path, and a name only where there are no files."""
+        hash = fingerprint(self.timeline.files)
+        return {
+            "version": __version__,
+            "scan": self.timeline.name if hash is None else hash,
+            "times": len(self.timeline),
+            "unit": self.unit,
+            "places": self.places,
+            **asdict(self.choices),
+        }
+
+
+@dataclass(eq=False)
+class Motions:
+    """Motions as far as a thread of its own has found them. reference: None before the region is known. rows:
+    of the region, in the reference's pose. known: by frame. problem: why there are none."""
+
+    asked: Asked
+    reference: MotionReference | None = None
+    pose: Pose | None = None
+    rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64))
+    limits: WeakLimits = field(default_factory=lambda: WeakLimits(0.0))
+    known: dict[int, FrameMotion] = field(default_factory=dict)
+    problem: str = ""
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all frames are known."""
+        return len(self.known) == len(self.asked.timeline)
+
+    def find(self) -> None:
+        """Find what is not known yet. Raises Cancelled, and InputError."""
+        try:
+            self._find()
+        except InputError as error:
+            self.problem = str(error)
+            raise
+
+    def _find(self) -> None:
+        timeline, frame = self.asked.timeline, self.asked.choices.reference
+        key = self.asked.key
+        digest = hashlib.blake2b(json.dumps(key, sort_keys=True).encode(), digest_size=16).hexdigest()
+        folder = motions_folder()
+        kept = PartialMotions(folder / f"{digest}.json", key)
+        if self.reference is None:
+            timeline.label(frame)  # raises where there is none
+            pose = timeline.pose(frame)
+            rows = self._rows(pose, folder / f"{digest}-region.json")
+            reference = MotionReference.of(pose, rows, frame)
+            self.rows, self.pose = rows, pose
+            self.limits = WeakLimits(close_distance(self.asked.unit, reference.surface.spacing))
+            with suppress(InputError):  # damaged: all is found again
+                self.known |= kept.read()
+            self.reference = reference
+        saved = time.monotonic()
+        try:
+            for _ in stabilise(timeline, self.reference, self.limits.shift, self.known):
+                if time.monotonic() - saved > _SAVING:
+                    kept.save(self.known)
+                    saved = time.monotonic()
+        finally:
+            with suppress(InputError):  # where it cannot be kept, it is found again next time
+                kept.save(self.known)
+            forget_oldest(folder, _MOST_KEPT)
+
+    def _rows(self, pose: Pose, file: Path) -> NDArray[np.int64]:
+        """The rows of the region; those that Scan4D finds are kept in a file."""
+        region = self.asked.choices.rigid
+        if region is not None:
+            return region.rows(pose.cloud, {name: np.array(place) for name, place in self.asked.places})
+        with suppress(InputError):
+            if file.exists():
+                return RigidRegion.read(file).rows(pose.cloud, {})
+        announce("Finding the rigid region")
+        try:
+            rows = found_region(self.asked.timeline, pose, self.asked.choices.reference)
+        except InputError as error:
+            raise InputError(error.what, error.where, "Choose the region in the section Stabilise") from None
+        finally:
+            over()
+        ids = rows if pose.cloud.ids is None else pose.cloud.ids[rows].astype(np.int64)
+        with suppress(InputError):
+            save_json(file, RigidRegion(np.empty((0, 4)), ids).to_json())
+        return rows
+
+
+class Stabiliser:
+    """Has the motions of the open scan found.
+
+    motions: that are being found, or were; None before the first. known: the motions of frames as far as the
+    window has taken them in; another object after each change. is_stopped: whether the user has cancelled it,
+    until something else is asked for or `resume` is called.
+    """
+
+    def __init__(self, context: ToolContext) -> None:
+        self._context = context
+        self.motions: Motions | None = None
+        self.known: Mapping[int, FrameMotion] = {}
+        self.is_stopped = False
+        self._task: Task | None = None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether motions are being found."""
+        return any(work.task is self._task for work in self._context.works)
+
+    def resume(self) -> None:
+        """Go on after the user has cancelled it."""
+        self.is_stopped = False
+
+    def advance(self, asked: Asked, is_wanted: bool) -> bool:
+        """Have found what is asked for, and take in what was; whether there is something new.
+
+        is_wanted: whether to begin, or to go on; what has begun goes on by itself.
+        """
+        motions = self.motions
+        if self._task is not None and not self.is_running:
+            self.is_stopped |= self._task.cancelled
+            self._task = None
+        if motions is not None and motions.asked != asked:
+            if self._task is not None:
+                self._task.cancel()
+            motions, self.is_stopped, self._task = None, False, None
+        if motions is None and is_wanted:
+            motions = Motions(asked)
+        has_changed = motions is not self.motions
+        self.motions = motions
+        known = {} if motions is None or motions.reference is None else dict(motions.known)
+        if len(known) != len(self.known) or has_changed:
+            self.known, has_changed = known, True
+        if motions is not None and is_wanted and self._task is None and not self._is_over(motions):
+            self._task = self._context.run("Stabilising", motions.find, lambda _: None)
+        return has_changed
+
+    def _is_over(self, motions: Motions) -> bool:
+        return motions.is_whole or self.is_stopped or bool(motions.problem)
+
+
+def close_distance(unit: str, spacing: float) -> float:
+    """The distance up to which a region is said to fit: half a millimetre, scan units; where the unit is no
+    known length, a point spacing."""
+    factor = conversion("mm", unit)
+    return spacing if factor is None else CLOSE * factor
+
+
+def motions_folder() -> Path:
+    """The folder of kept motions; it need not be there yet."""
+    return cache_folder() / "motions"
