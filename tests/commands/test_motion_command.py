@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import Run
+from disks import small_disk
 from moving_hills import SIDE, hills
 from scipy.spatial.transform import Rotation
 
@@ -114,6 +117,29 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
     assert Path("out/transforms.csv").read_bytes() == Path("whole/transforms.csv").read_bytes()
 
 
+def test_a_frame_without_points_is_a_gap(run: Run) -> None:
+    formats.write("seq/f1.npz", PointCloud.from_arrays(np.full((5, 3), np.nan)))
+    done = run("motion", "seq", "--unit", "mm", "--region", "region.json", "-o", "out")
+    assert done.code == 0, done.err
+    assert "Scan4D finds no motion in 1 of 3 frames, such as frame 2: " in done.err
+    assert json.loads(Path("out/report.json").read_text())["states"] == {"ok": 2, "weak": 0, "gap": 1}
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no small disk can be mounted")
+def test_a_full_disk_is_one_message_and_the_command_continues_elsewhere(run: Run, tmp_path: Path) -> None:
+    words = ("motion", "seq", "--unit", "mm", "--region", "region.json", "-o")
+    with small_disk(tmp_path / "disk", 4) as disk:
+        done = run(*words, disk)
+        assert (done.code, done.out) == (2, "")
+        assert done.err.splitlines() == [
+            f"scan4d: {disk / 'transforms.partial'}: cannot be written: the disk is full. "
+            "Free some space, or use another disk"
+        ]
+        (tmp_path / "out").mkdir()
+        shutil.copy(disk / "transforms.partial", tmp_path / "out")
+    assert "the motions of 1 of 3 frames are known" in run(*words, "out").out
+
+
 def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
     key = SurfacePoint(frame=1, time=0.04, position=(0.5, 0.0, 1.0), id=None, spacing=None, level=0)
     landmarks = Landmarks(all=(Landmark("nose", (key,)),))
@@ -127,7 +153,7 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
     assert np.allclose(report["region"]["middle"][:2], [0.5, 0.0], atol=1.5)
     elsewhere = run(*words, "0", "--force")
     assert elsewhere.code == 2
-    assert "nose" in elsewhere.err
+    assert "nose.json: the reference frame has no landmark 'nose'. Place it there" in elsewhere.err
 
 
 @pytest.mark.parametrize(
@@ -135,10 +161,20 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
     [
         (("seq", "-o", "out"), "State the unit of the scan, such as --unit mm"),
         (("seq", "--unit", "mm", "--reference", "7", "-o", "out"), "no pose 7"),
+        (("seq", "--unit", "mm", "--reference", "-1", "-o", "out"), "no pose -1"),
         (("seq", "--unit", "mm", "--region", "none.json", "-o", "out"), "none.json"),
+        (
+            ("seq", "--unit", "mm", "--region", "points.json", "-o", "out"),
+            "points.json: the reference frame has",
+        ),
+        (("seq", "--unit", "mm", "--region", "far.json", "-o", "out"), "the region has 0 points"),
+        (("seq/f0.npz", "--unit", "mm", "--region", "region.json", "-o", "out"), "has only one frame"),
+        (("seq", "--unit", "mm", "-o", "region.json"), "a part of the path is not a folder"),
     ],
 )
-def test_mistakes_are_told(run: Run, words: tuple[str, ...], what: str) -> None:
+def test_mistakes_are_reported(run: Run, words: tuple[str, ...], what: str) -> None:
+    Path("points.json").write_text('{"points": [9999]}')
+    Path("far.json").write_text('{"spheres": [[0, 900, 0, 1]]}')
     done = run("motion", *words)
     assert done.code == 2
     assert what in done.err

@@ -1,7 +1,7 @@
 """Find the motion of a rigid region, such as the head, over time.
 
-DIR gets transforms.csv with the motion of each frame and how sure it is, report.json, and region.json with
-the points of the region. An interrupted command goes on where it stopped.
+Scan4D writes into DIR: transforms.csv with the motion of each frame and how sure it is, report.json, and
+region.json with the points of the region. If you interrupt the command, the same command later continues.
 """
 
 from __future__ import annotations
@@ -52,11 +52,12 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     parser.add_argument(
         "--region", type=Path, metavar="FILE",
-        help="region that counts as rigid (JSON: spheres, points or landmarks); default: Scan4D finds it",
+        help="JSON file of the rigid region (spheres, points or landmarks); default: Scan4D finds it",
     )  # fmt: skip
     parser.add_argument(
         "--reference", type=_reference, default=0, metavar="I|SCAN",
-        help="reference: a frame of SCAN, counted from 0, or the first frame of another scan; default 0",
+        help="frame of SCAN in which motions begin, counted from 0; or another scan, for its first frame; "
+        "default 0",
     )  # fmt: skip
     add_output_argument(parser, "folder for the results", "DIR")
 
@@ -70,16 +71,17 @@ def run(args: Namespace) -> int:
         region = RigidRegion.read(args.region) if args.region else None
         pose, frame = _reference_pose(args, timeline)
         if region is None:
+            output_folder(args.out)  # an error comes before the search
             tell("Scan4D looks for a region that stays rigid in all frames")
             rows = found_region(timeline, pose, frame)
         else:
-            rows = region.rows(pose.cloud, _places(args, region, frame))
-        output_folder(args.out)
+            rows = _rows(args, region, pose, frame)
         reference = MotionReference.of(pose, rows, frame)
+        output_folder(args.out)
         partial = PartialMotions(args.out / _PARTIAL, _key(args, timeline, pose.cloud.world()[rows]))
         known = partial.read()
         if known:
-            tell(f"Scan4D continues: {len(known)} of {len(timeline)} frames are known")
+            tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")
         with progress(len(timeline) - len(known)) as tick:
             for _ in stabilise(timeline, reference, limits.shift, known):
                 partial.save(known)
@@ -97,7 +99,7 @@ def run(args: Namespace) -> int:
             "unit": timeline.unit,
             "reference": _facts_of_reference(args, pose),
             "region": _facts_of_region(args, pose, rows, reference),
-            **_facts_of_motions(known, states, limits),
+            **_facts_of_motions(known, states, limits, frame),
             "weak_directions": [
                 {**asdict(one), "words": one.in_words(timeline.unit)}
                 for one in weak_directions(known, axes, limits)
@@ -114,7 +116,7 @@ def run(args: Namespace) -> int:
 def _reference(text: str) -> int | str:
     if not text:
         raise ArgumentTypeError("'' is neither a number of a frame nor a scan")
-    return int(text) if text.isdecimal() else text
+    return int(text) if text.removeprefix("-").isdecimal() else text
 
 
 def _inputs(args: Namespace, timeline: Timeline) -> list[Path]:
@@ -125,7 +127,7 @@ def _millimetres(timeline: Timeline, length: float) -> float:
     """A length in mm in the unit of a scan. Raises InputError where that is no known length."""
     factor = conversion("mm", timeline.unit)
     if factor is None:
-        what = f"has the unit '{timeline.unit}', but ±{_CLOSE} mm needs a known length"
+        what = f"has the unit '{timeline.unit}', which is not a known unit of length"
         raise InputError(what, timeline.name, "State the unit of the scan, such as --unit mm")
     return length * factor
 
@@ -134,12 +136,24 @@ def _reference_pose(args: Namespace, timeline: Timeline) -> tuple[Pose, int | No
     """The pose that motions begin in, and its frame; None: it is of another scan."""
     if isinstance(args.reference, int):
         timeline.label(args.reference)  # raises where there is none
+        if len(timeline) == 1:
+            hint = "Name a scan with several frames, or name another scan with --reference"
+            raise InputError("has only one frame, so there is no motion to find", timeline.name, hint)
         return timeline.pose(args.reference), args.reference
     with open_timeline(args, args.reference) as other:
         if conversion(other.unit, timeline.unit) != 1.0:
             what = f"has the unit '{other.unit}', but the scan has '{timeline.unit}'"
             raise InputError(what, other.name, "Use a reference in the unit of the scan")
         return other.pose(0), None
+
+
+def _rows(args: Namespace, region: RigidRegion, pose: Pose, frame: int | None) -> NDArray[np.int64]:
+    """The rows of the reference in the region of a file. Raises InputError, which names that file."""
+    places = _places(args, region, frame)
+    try:
+        return region.rows(pose.cloud, places)
+    except InputError as error:
+        raise InputError(error.what, args.region, error.hint) from None
 
 
 def _places(args: Namespace, region: RigidRegion, frame: int | None) -> dict[str, NDArray[np.float64]]:
@@ -177,8 +191,8 @@ def _row(timeline: Timeline, index: int, found: FrameMotion, state: MotionState)
         numbers: list[float | None] = [None] * 13
     else:
         x, y, z, w = Rotation.from_matrix(found.motion.rotation).as_quat(canonical=True)
-        sigmas = found.spread(_WORLD) / 1.96
-        numbers = [cell(value) for value in (w, x, y, z, *found.motion.matrix[:3, 3], *sigmas)]
+        shift, sigmas = found.motion.matrix[:3, 3], found.deviations(_WORLD)
+        numbers = [cell(value) for value in (w, x, y, z, *shift, *sigmas)]
     return [index + 1, float(timeline.times[index]), *numbers, state.value]
 
 
@@ -212,10 +226,13 @@ def _facts_of_region(
 
 
 def _facts_of_motions(
-    known: Mapping[int, FrameMotion], states: Mapping[int, MotionState], limits: WeakLimits
+    known: Mapping[int, FrameMotion],
+    states: Mapping[int, MotionState],
+    limits: WeakLimits,
+    frame: int | None,
 ) -> dict[str, Any]:
-    """The facts of the motions, for the report."""
-    shares = {index: found.within for index, found in known.items() if found.motion is not None}
+    """The facts of the motions, for the report. frame: of the reference, which agrees with itself."""
+    shares = {index: found.within for index, found in known.items() if found.motion and index != frame}
     least = min(shares, key=lambda index: shares[index]) if shares else None
     return {
         "within_half_mm": {
@@ -236,16 +253,19 @@ def _tell(found: Mapping[str, Any], timeline: Timeline) -> None:
         f"The region has {region['points']:,} points, {region['share_of_points']:.0%} of the reference frame"
     )
     if within["mean"] is not None:
-        tell(f"{within['mean']:.1%} of the distances of the region from the frames are within ±{_CLOSE} mm")
+        share = f"{within['mean']:.1%} of the region"
+        tell(f"On average, {share} lies within ±{_CLOSE} mm of the surface of a frame")
     for one in found["weak_directions"]:
         warn(f"{one['words']} (in {one['frames']} of {len(timeline)} frames)")
     if found["gaps"]:
         number, reason = next(iter(found["gaps"].items()))
-        warn(f"{len(found['gaps'])} motions are gaps, such as that of {_frame(number)}: {reason}")
+        share = f"{len(found['gaps'])} of {len(timeline)} frames"
+        warn(f"Scan4D finds no motion in {share}, such as {_frame(number)}: {reason}")
     if within["least"] is not None and within["least"] < _RIGID:
+        share = f"in {_frame(within['least_in_frame'])}, only {within['least']:.1%} of it lies"
         warn(
-            f"The region does not stay rigid: only {within['least']:.1%} of its distances from "
-            f"{_frame(within['least_in_frame'])} are within ±{_CLOSE} mm. Choose another region"
+            f"The region does not stay rigid: {share} within ±{_CLOSE} mm of the surface. "
+            "Name another region with --region"
         )
 
 

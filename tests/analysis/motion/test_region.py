@@ -1,4 +1,4 @@
-"""Regions as files tell them."""
+"""Regions in files: what they contain, and messages for files that Scan4D cannot use."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_a_region_is_all_that_its_parts_hold(data: dict[str, Any], rows: list[in
         ("{", "is not valid JSON"),
         ("[]", "has no region"),
         ('{"spheres": []}', "has no region"),
-        ('{"sphere": [], "points": [1]}', "'sphere'"),
+        ('{"sphere": [[0, 0, 0, 1]]}', "'sphere'. Did you mean 'spheres'"),
         ('{"spheres": [[0, 0, 0]]}', "'spheres' is not a list"),
         ('{"spheres": [[0, 0, 0, -1]]}', "'spheres' is not a list"),
         ('{"spheres": [[0, 0, NaN, 1]]}', "'spheres' is not a list"),
@@ -46,7 +46,7 @@ def test_a_region_is_all_that_its_parts_hold(data: dict[str, Any], rows: list[in
         ('{"landmarks": [1], "radius": 2}', "'landmarks' is not a list"),
     ],
 )
-def test_what_is_no_region_is_told_with_its_file(tmp_path: Path, text: str, what: str) -> None:
+def test_an_unusable_region_is_reported_with_its_file(tmp_path: Path, text: str, what: str) -> None:
     path = tmp_path / "region.json"
     path.write_text(text)
     with pytest.raises(InputError, match=what) as raised:
@@ -56,8 +56,11 @@ def test_what_is_no_region_is_told_with_its_file(tmp_path: Path, text: str, what
 
 @pytest.mark.parametrize(
     ("data", "what"),
-    [({"points": [1]}, "no point 1"), ({"landmarks": ["x"], "radius": 1.0}, "landmark")],
+    [
+        ({"points": [1]}, "no point 1. It has 3 points with numbers from 0 to 3"),
+        ({"landmarks": ["x"], "radius": 1.0}, "no landmark 'x'. Place it there .* one that is there: n"),
+    ],
 )
-def test_what_the_frame_does_not_have_is_told(data: dict[str, Any], what: str) -> None:
+def test_points_and_landmarks_that_the_frame_lacks_are_reported(data: dict[str, Any], what: str) -> None:
     with pytest.raises(InputError, match=what):
         RigidRegion.from_json(data).rows(CLOUD, {"n": np.zeros(3)})

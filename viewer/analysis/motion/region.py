@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError, unknown_name
+from ...errors import InputError, did_you_mean, shortened, unknown_name
 from ...files import parsed_json, read_text, reading
 from ...scan.points import PointCloud
 
@@ -53,11 +53,12 @@ class RigidRegion:
     @classmethod
     def from_json(cls, data: Any) -> RigidRegion:
         """The region of a JSON object. Raises InputError."""
-        if not isinstance(data, dict) or not any(data.get(key) for key in _KEYS[:3]):
-            raise InputError("has no region", hint=_HINT)
+        data = data if isinstance(data, dict) else {}
         for key in data:
             if key not in _KEYS:
                 raise unknown_name("entry of a region", key, list(_KEYS))
+        if not any(data.get(key) for key in _KEYS[:3]):
+            raise InputError("has no region", hint=_HINT)
         names, radius = data.get("landmarks", []), data.get("radius", 0.0)
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise InputError("'landmarks' is not a list of names", hint=_HINT)
@@ -84,11 +85,16 @@ class RigidRegion:
         ids = np.arange(len(cloud)) if cloud.ids is None else cloud.ids
         missing = np.setdiff1d(self.points, ids)
         if len(missing):
-            raise InputError(f"the reference frame has no point {missing[0]}", hint="Choose its own points")
+            hint = f"It has {len(ids):,} points with numbers from {ids.min()} to {ids.max()}"
+            raise InputError(f"the reference frame has no point {missing[0]}", hint=hint)
         is_in = np.isin(ids, self.points)
         for name in self.landmarks:
             if name not in places:
-                raise unknown_name("landmark", name, list(places))
+                what = f"the reference frame has no landmark '{shortened(name)}'"
+                hint = (
+                    f"Place it there in the window, or name one that is there: {', '.join(places) or 'none'}"
+                )
+                raise InputError(what, hint=did_you_mean(name, places) + hint)
         around = [np.append(places[name], self.radius) for name in self.landmarks]
         positions = cloud.world()
         for sphere in [*self.spheres, *around]:

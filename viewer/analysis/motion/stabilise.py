@@ -21,7 +21,7 @@ from ...scan.spacing import typical_spacing
 from ...scan.timeline import Timeline
 from ...task import checkpoint
 from ..tracking.surface import MomentSurface
-from .registration import LEVELS, RegionSurface, RegisteredRegion, distances, register_region
+from .registration import FEWEST, LEVELS, RegionSurface, RegisteredRegion, distances, register_region
 
 Float = NDArray[np.float64]
 
@@ -72,11 +72,16 @@ class FrameMotion:
         """A frame without a motion."""
         return cls(None, np.full((6, 6), np.nan), reason)
 
-    def spread(self, axes: Float) -> Float:
-        """The ± along and about axes (3, 3), by row: (6,), of turns, degrees, then of shifts, scan units."""
+    def deviations(self, axes: Float) -> Float:
+        """Standard deviations about and along axes (3, 3), by row: (6,), of turns, degrees, then of shifts,
+        scan units."""
         shift, turn = self.covariance[:3, :3], self.covariance[3:, 3:]
         variances = [np.einsum("ai,ij,aj->a", axes, block, axes) for block in (turn, shift)]
-        return _TOLD * np.sqrt(np.concatenate(variances)) * np.repeat([np.degrees(1.0), 1.0], 3)
+        return np.sqrt(np.concatenate(variances)) * np.repeat([np.degrees(1.0), 1.0], 3)
+
+    def spread(self, axes: Float) -> Float:
+        """The ± that Scan4D reports: 1.96 of the `deviations`."""
+        return _TOLD * self.deviations(axes)
 
     def state(self, axes: Float, limits: WeakLimits) -> MotionState:
         """Whether it is known well along and about axes (3, 3)."""
@@ -107,7 +112,8 @@ class MotionReference:
         region = RegionSurface.of(surface, rows)
         if region is None:
             what = f"the region has {len(rows)} points in the reference frame, which is too few"
-            raise InputError(what, pose.label, "Choose a larger region")
+            hint = f"Choose a larger region: at least {FEWEST} points need neighbours"
+            raise InputError(what, pose.label, hint)
         return cls(surface, origin, region, frame)
 
     @property
