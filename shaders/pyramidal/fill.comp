@@ -13,7 +13,7 @@ layout(binding = TEXTURE_SHOWN) uniform usamplerBuffer shown;  // by the targets
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed_cells;
 
 const float SLANTED = 1.5;  // times as far apart samples of a grid may lie where a surface is seen aslant
-const float AHEAD = 0.65;   // how far beside a pixel on an outline the nearest sample may lie, in sample spacings
+const float AHEAD = 0.59;   // how far beside a pixel on an outline the nearest sample may lie, in sample spacings
 const float LEAST = 1e-3;  // weight of samples beyond a kernel's reach, before distance
 
 float kernel(float x) {
@@ -58,15 +58,17 @@ void extend_beyond_frame(inout Sides sides, vec2 offset, Window window, float ap
 }
 #endif
 
-// Blends what a surface shows around a pixel into it.
+// Blends what a surface shows around a pixel into it. Samples of a grid that lie farther apart than cells are blended as
+// far as they lie apart.
 void blend(int i, ivec2 pixel, int level, vec2 span) {
     Window window = window_of(level, pixel, UPSAMPLING == 2 ? 2 : 1);
+    float wide = FRAMED != 0 ? max(spacing / cell_width(level, span.x), 1.0) : 1.0;
     float total = 0.0, depth = 0.0;
     Seen sum = UNSEEN;
     EACH_CELL(window, cell) {
         float here = depth_of(cell);
         if (here < span.x || here > span.y) continue;
-        float weight = weight_of(offset_to(window, cell));
+        float weight = weight_of(offset_to(window, cell) / wide);
         Seen one = unpack_seen(texelFetch(shown, cell));
 #if UPSAMPLING == 0
         if (weight <= total) continue;
@@ -89,28 +91,50 @@ void blend(int i, ivec2 pixel, int level, vec2 span) {
     store(i, depth, NOTHING, level, sum);
 }
 
-// Fills a pixel from a target; whether it could.
-bool fill(int i, ivec2 pixel, int level) {
-    Window window = window_of(level, pixel, 1);  // what encloses the pixel, however wide the kernel is
-    bool gap = level <= density + 1;            // between samples, rather than a hole in what was measured
-    bool hole = level > density && is_hole(window, level);
-    if (!gap && !hole) return false;
-    vec2 around = depths_around(window), span = vec2(0.0), nearest = span;
-    if (isinf(around.x)) return false;
-    float apart = spacing / cell_width(level, around.x), least = 1e9;  // samples, in cells
-    float farthest = POLYGONS == 0 && !hole ? (FRAMED != 0 ? SLANTED : 1.0) * reach * max(apart, window.scale) : 1e9;
-    Sides all_around = NO_SIDES;
 #if FRAMED
+// The samples of a grid around a pixel, as far away as they may lie apart. farthest, apart: in cells.
+Sides sides_around(ivec2 pixel, int level, float farthest, float apart) {
+    Window window = window_of(level, pixel, 2);
+    Sides sides = NO_SIDES;
     EACH_CELL(window, cell) {
         vec2 offset = offset_to(window, cell);
         if (isinf(depth_of(cell)) || dot(offset, offset) > farthest * farthest) continue;
-        extend(all_around, offset);
-        if (gap) extend_beyond_frame(all_around, offset, window, apart);
+        extend(sides, offset);
+        extend_beyond_frame(sides, offset, window, apart);
     }
-    float ahead = margin * apart + (gap ? AHEAD * apart : max(AHEAD * apart, 1.0));  // a cell shows one sample
-    if (!is_ahead(all_around, ahead)) return false;
+    return sides;
+}
 #endif
-    for (int n = 0; n < SURFACES; ++n) {
+
+// What a target gives a pixel: the depths of the surface that encloses it; and between the outline of one surface and what
+// was measured beside it behind, of the one that is nearer in the picture. x is +inf where there is none. closed: whether
+// the pixel is in a hole or between samples, rather than in a bay of an outline.
+struct Given {
+    vec2 surface, beside;
+    bool closed;
+};
+
+const vec2 NO_SPAN = vec2(uintBitsToFloat(NO_DEPTH));
+
+Given given_by(ivec2 pixel, int level) {
+    Given given = Given(NO_SPAN, NO_SPAN, false);
+    Window window = window_of(level, pixel, 1);  // what encloses the pixel, however wide the kernel is
+    bool gap = level <= density + 1;            // between samples, rather than a hole in what was measured
+    bool hole = level > density && is_hole(window, level);
+    if (!gap && !hole) return given;
+    vec2 around = depths_around(window), span = vec2(0.0), nearest = span;
+    if (isinf(around.x)) return given;
+    float apart = spacing / cell_width(level, around.x), least = 1e9;  // samples, in cells
+    float farthest = POLYGONS == 0 && !hole ? (FRAMED != 0 ? SLANTED : 1.0) * reach * max(apart, window.scale) : 1e9;
+    bool bay = false;
+    Sides all_around = NO_SIDES;
+#if FRAMED
+    if (gap) {
+        all_around = sides_around(pixel, level, farthest, apart);
+        bay = !is_ahead(all_around, (margin + AHEAD) * apart);
+    }
+#endif
+    for (int n = 0; n < SURFACES && isinf(given.surface.x); ++n) {
         span = surface_beyond(window, around, span.y, level);
         if (isinf(span.x)) break;
         Sides sides = NO_SIDES;
@@ -129,19 +153,16 @@ bool fill(int i, ivec2 pixel, int level) {
         }
         if (!encloses(sides, margin * spacing / cell_width(level, span.x))) continue;
 #if FRAMED
-        if (!gap && !is_ahead(sides, ahead)) continue;
+        // A cell shows one sample.
+        if (!gap && !is_ahead(sides, margin * apart + max(AHEAD * apart, 1.0))) continue;
 #endif
-        blend(i, pixel, level, span);
-        return true;
+        given.surface = span;
     }
 #if POLYGONS || FRAMED
-    // Between the outline of one surface and what was measured beside it behind: the one that is nearer in the picture.
-    if (gap && encloses(all_around, margin * apart)) {
-        blend(i, pixel, level, nearest);
-        return true;
-    }
+    if (gap && least < 1e9 && encloses(all_around, margin * apart)) given.beside = nearest;
 #endif
-    return false;
+    given.closed = !bay && !isinf(min(given.surface.x, given.beside.x));
+    return given;
 }
 
 void main() {
@@ -153,8 +174,30 @@ void main() {
     if (any(greaterThanEqual(pixel, view_size))) return;
     int i = pixel.y * view_size.x + pixel.x;
     if (rows[i] != NOTHING && (levels & 1) != 0) return;
-    for (int level = 1; level <= coarsest; ++level)
-        if ((levels >> level & 1) != 0 && fill(i, pixel, level)) return;
+    // From the finest target that encloses it; if it is closed there or in a coarser one, which may not be shown.
+    int from = 0, from_beside = 0;
+    vec2 surface, beside;
+    bool closed = false;
+    for (int level = 1; level <= coarsest; ++level) {
+        Given given = given_by(pixel, level);
+        bool is_shown = (levels >> level & 1) != 0;
+        closed = closed || given.closed;
+        if (from == 0 && is_shown && !isinf(given.surface.x)) {
+            from = level;
+            surface = given.surface;
+        }
+        if (from_beside == 0 && is_shown && !isinf(given.beside.x)) {
+            from_beside = level;
+            beside = given.beside;
+        }
+        if (from == 0 && level > min(density, coarsest - 1)) {  // no gap between samples of one surface
+            from = from_beside;
+            surface = beside;
+        }
+        if (from == 0 || !closed) continue;
+        blend(i, pixel, from, surface);
+        return;
+    }
     depths[i] = NO_DEPTH;
     rows[i] = NOTHING;
 }
