@@ -80,10 +80,27 @@ def test_it_stops_where_it_is_cancelled() -> None:
     points = rng.normal(size=(100, 3))
     near = np.argsort(np.linalg.norm(points[:, None] - points, axis=2), axis=1)[:, :20].astype(np.int32)
     links = np.column_stack([near[:, 0], near[:, 1]]).astype(np.int32)
-    bonds = fine_sides.Bonds(links, np.ones(100, np.float32), np.zeros(100))
+    bonds = fine_sides.Bonds(links, np.ones(100, np.float32), np.zeros(100), np.zeros(100))
     task.cancel()
     with task.current(), pytest.raises(Cancelled):
         fine_sides.better_sides(points, np.tile(np.float32([0, 0, 1]), (100, 1)), near, bonds)
+
+
+@pytest.mark.parametrize(("seen", "outside", "turns"), [(1.0, 0.0, True), (1.0, 1.0, False)])
+def test_that_it_faces_the_front_keeps_no_side_that_links_and_winding_number_contradict(
+    seen: float, outside: float, turns: bool
+) -> None:
+    """A cap of a body points inwards."""
+    points, truth = lens(1500, 0.5)
+    cap = points[:, 0] > 0.9
+    normals = truth / np.linalg.norm(truth, axis=1, keepdims=True) * np.where(cap, -1, 1)[:, None]
+    near = np.argsort(np.linalg.norm(points[:, None] - points, axis=2), axis=1)[:, :20].astype(np.int32)
+    links = np.column_stack([np.repeat(near[:, 0], 8), near[:, 1:9].ravel()]).astype(np.int32)
+    weights = np.where(cap[links[:, 0]] == cap[links[:, 1]], 1.0, -1.0)
+    bonds = fine_sides.Bonds(links, weights, seen * cap, outside * cap)
+    signs = np.where(cap, -1, 1).astype(np.int8)
+    accepted = fine_sides._accepted(fine_sides._Field(points, normals, near), bonds, signs)
+    assert np.array_equal(accepted, signs if turns else np.ones_like(signs))
 
 
 def test_contradicting_links_are_unsure() -> None:

@@ -43,20 +43,23 @@ _GROUPS = 200  # that may turn, the largest ones
 # A group turns round where this much is gained for each of its points, in the square of how far the winding
 # number is off, and where the view from outside, in links, does not object.
 _GAIN, _OBJECTION = 0.1, -0.05
-# A view sees one side of a thin sheet through the other. Many points turn if their links gain as well.
-_SHEET_GAIN, _SHEET_LINKS, _MANY = 0.05, 1.0, 100
+# Where links gain so much for each point, the two sides of a thin sheet part: that one faces the front says
+# nothing then.
+_PARTED, _PARTED_GAIN = 1.0, 0.05
 
 
 class Bonds(NamedTuple):
     """Links between points, and the view from outside, which tell sides.
 
     links: (L, 2). weights: (L,), from 1, where the normals as they are point to the same side, to -1. seen:
-    (N,), how much more the sides of the normals are seen from outside than the others.
+    (N,), how much more the sides of the normals are seen from outside than the others, or face the front.
+    outside: (N,), the first of the two alone.
     """
 
     links: NDArray[np.int32]
     weights: NDArray[np.floating]
     seen: NDArray[np.floating]
+    outside: NDArray[np.floating]
 
 
 def is_unsure(weights: NDArray[np.floating]) -> bool:
@@ -176,7 +179,7 @@ def _of_all_patches(field: _Field, bonds: Bonds) -> NDArray[np.int8]:
     """1 or -1 for each point, (N,): patches that together agree best with bonds and the winding number."""
     from . import fine_kernels
 
-    links, weights, seen = bonds
+    links, weights, seen, _ = bonds
     largest = max(len(seen) // _PATCHES, _SMALLEST)
     patch, agreeing = patches_of(links, weights, len(seen), tuple(sorted({_SMALLEST, largest})))
     patch, count = _largest(patch, _MOST_PATCHES)
@@ -218,7 +221,7 @@ def _accepted(field: _Field, bonds: Bonds, signs: NDArray[np.int8]) -> NDArray[n
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    links, weights, seen = bonds
+    links, weights, seen, outside = bonds
     turned = signs < 0
     rows = np.flatnonzero(turned)
     if not len(rows):
@@ -240,11 +243,14 @@ def _accepted(field: _Field, bonds: Bonds, signs: NDArray[np.int8]) -> NDArray[n
     ends = links[border]
     of_border = np.where(turned[ends[:, 0]], group[ends[:, 0]], group[ends[:, 1]])
     by_links = -2 * np.bincount(of_border, weights[border], len(sizes) + 1)[:-1] / sizes
-    by_view = -2 * np.bincount(group[rows], seen[rows], len(sizes) + 1)[:-1] / sizes
+    by_view, from_outside = (
+        -2 * np.bincount(group[rows], view[rows], len(sizes) + 1)[:-1] / sizes for view in (seen, outside)
+    )
     by_field = _gain(field, group, len(sizes)) / sizes
-    alone = (by_field >= _GAIN) & (by_view >= _OBJECTION)
-    as_sheet = (by_field >= _SHEET_GAIN) & (by_links >= _SHEET_LINKS) & (sizes >= _MANY)
-    accepted = np.append(alone | as_sheet, False)
+    is_parted = by_links >= _PARTED
+    gains = by_field >= np.where(is_parted, _PARTED_GAIN, _GAIN)
+    accepted = gains & (np.where(is_parted, from_outside, by_view) >= _OBJECTION)
+    accepted = np.append(accepted, False)
     return np.where(turned & accepted[group], -1, 1).astype(np.int8)
 
 

@@ -41,6 +41,14 @@ _DOUBTFUL = 0.1  # the weight of a link from which it makes a side doubtful
 _OFTEN = 1 << 12  # steps between checkpoints
 
 
+class SeenFrom(NamedTuple):
+    """Sums of the directions from which nothing hides a point, (N, 3). outside: all of them count alike.
+    front: what those towards the front count more."""
+
+    outside: NDArray[np.float32]
+    front: NDArray[np.float32]
+
+
 class FoundSides(NamedTuple):
     """How Scan4D found the sides of normals. doubtful: the share of the points that have links to neighbours
     which contradict their sides, 0 to 1."""
@@ -78,23 +86,24 @@ def facing_out(
 
 
 def _linked_sides(
-    points: Vectors, normals: NDArray[np.float32], linked: NDArray[np.int32], seen_from: NDArray[np.float32]
+    points: Vectors, normals: NDArray[np.float32], linked: NDArray[np.int32], seen_from: SeenFrom
 ) -> tuple[NDArray[np.float32], Bonds]:
     """The normals, (N, 3), on the sides that links and the view from outside tell, and their bonds.
 
-    linked: (N, K), each point and its neighbours. seen_from: (N, 3), of `_seen_from`.
+    linked: (N, K), each point and its neighbours.
     """
     from . import fine_sides, side_kernels
 
     normals = facing(normals, np.array([[1e-6, 1e-3, 1.0]]))  # whichever sign they came with
-    seen = _SEEN * np.einsum("ij,ij->i", normals, seen_from)
+    outside, front = (_SEEN * np.einsum("ij,ij->i", normals, sums) for sums in seen_from)
+    seen = outside + front
     most = len(linked) * (linked.shape[1] - 1)
     links, weights = np.empty((most, 2), np.int32), np.empty(most, np.float32)
     found = side_kernels.link(points, normals, linked, links, weights)
     links, weights = links[:found], weights[:found]
     signs = _agreeing(links, weights, seen)
     held = weights * signs[links].prod(axis=1)
-    return normals * signs[:, None], fine_sides.Bonds(links, held, seen * signs)
+    return normals * signs[:, None], fine_sides.Bonds(links, held, seen * signs, outside * signs)
 
 
 def facing(normals: NDArray[np.float32], directions: NDArray[np.floating]) -> NDArray[np.float32]:
@@ -187,19 +196,19 @@ def _agreement(pairs: NDArray[np.intp], bonds: NDArray[np.float64]) -> NDArray[n
     return agreeing
 
 
-def _seen_from(points: Vectors, reach: float) -> NDArray[np.float32]:
-    """Sums for each point of the directions from which nothing hides it, (N, 3)."""
+def _seen_from(points: Vectors, reach: float) -> SeenFrom:
+    """Sums for each point of the directions from which nothing hides it."""
     center = np.median(points, axis=0)
     half = 2 * np.quantile(np.linalg.norm(points - center, axis=1), 0.98)  # strays beyond go to the rim
     cell = max(_CELL * reach, 2 * half / _GRID) or 1.0
     local = np.clip((points - center) / cell, -_GRID, _GRID).astype(np.float32)  # in cells
-    seen_from = np.zeros_like(local)
+    outside, front = np.zeros_like(local), np.zeros_like(local)
     for axis in _half_sphere(_AXES).astype(np.float32):
         checkpoint()
         from_front, from_back = _visible(local, axis, side=int(2 * half / cell) + 1)
-        votes = from_front * (1 + _FRONT_BONUS * axis[2]) - from_back * (1 - _FRONT_BONUS * axis[2])
-        seen_from += votes[:, None] * axis
-    return seen_from
+        outside += (from_front - from_back)[:, None] * axis
+        front += (_FRONT_BONUS * axis[2] * (from_front + from_back))[:, None] * axis
+    return SeenFrom(outside, front)
 
 
 def _visible(
