@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from PIL import Image
 from rigid_hills import RigidHills, truth
-from virtual_screen import Screen, running_app, wait_until_stored
+from scipy.spatial.transform import Rotation
+from virtual_screen import ROOT, Screen, running_app, wait_until_stored
 
+from viewer.analysis.motion.axes import NAMES as AXES
 from viewer.document.recording import Recording
 from viewer.scan import formats
 
 FRAMES, GAP = 5, 3
 STILL = np.eye(4)
+ABOVE_LEGEND = 320  # rows of the picture
 
 
 @pytest.fixture
@@ -67,3 +74,51 @@ def test_a_key_switches_between_as_recorded_and_stabilised(
         kept = "".join(file.read_text() for file in (tmp_path / "cache/scan4d/motions").iterdir())
         assert "motion" in kept
         assert str(tmp_path) not in kept
+
+
+@pytest.mark.slow
+def test_from_opening_to_a_stabilised_film_coloured_by_distance_in_eight_actions(
+    screen: Screen, tmp_path: Path, scan: Path
+) -> None:
+    actions = 1  # the scan is opened
+    with running_app(screen, tmp_path, scan, before=alone(tmp_path)) as app:
+        app.press("shift+u")
+        app.press("ctrl+e")
+        actions += 2
+        for field, item in (("what", "###frames"), ("format", "###mp4")):
+            app.choose("Export", f"##{field}", item)
+            actions += 2  # the list, and the item
+        app.act("Export", ("item_click", "Export"))
+        actions += 1
+        film = Path(app.told(r"Saved (.+\.mp4)")[1])
+        assert film.stat().st_size > 1000
+        assert actions <= 8
+        assert app.state.undoes == "Colour by distance"
+        app.press("Right")
+        assert app.state.color_range[0] == 0
+        app.press("p")
+        saved = Path(app.told(r"Saved (.+\.png)")[1])
+        (entry,) = Recording.load(saved).entries
+        assert entry.stabilised is not None
+        assert (entry.stabilised.region, entry.stabilised.reference) == ("found by scan4d", 0)
+        assert not entry.stabilised.is_gap
+        redraw = [sys.executable, "-m", "viewer.cli", "render", "--replay", str(saved), "-o"]
+        here = {**os.environ, "PYTHONPATH": str(ROOT)}
+        for name, more in (("again.png", []), ("nameless.png", ["--anonymous"])):
+            subprocess.run([*redraw, str(tmp_path / name), *more], check=True, cwd=tmp_path, env=here)
+        pictures = [
+            np.asarray(Image.open(file).convert("RGB")).astype(int)[:ABOVE_LEGEND]
+            for file in (saved, tmp_path / "again.png", tmp_path / "nameless.png")
+        ]
+        assert (pictures[0] == pictures[1]).all(), "its colours are computed again"
+        assert np.abs(pictures[0] - pictures[2]).mean() < 1
+        assert len(np.unique(pictures[0].reshape(-1, 3), axis=0)) > 1000, "it is coloured"
+        rises = app.state.motion["Residual (RMS)"]
+        assert 0 < rises[1] < 0.5
+        assert np.isnan(rises[GAP])
+        turn = np.array([app.state.motion[f"Rotation, {axis}"] for axis in AXES])[:, 2]
+        wanted = Rotation.from_matrix(truth(2, 0).rotation).magnitude()
+        assert np.linalg.norm(np.radians(turn)) == pytest.approx(wanted, abs=0.01)
+        app.press("shift+u")
+        assert app.state.document["look"]["color_by"] == "auto"
+        assert "Traceback" not in app.log()

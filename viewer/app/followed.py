@@ -18,13 +18,15 @@ class Followed:
     computed. Either is another object where something has changed, and only then. is_following: whether
     more of the tracks is being found, or is about to be; is_measuring: likewise of measures of surfaces.
     still: the motion of each frame to where the stabilised scan stands, None in a gap; None while the scan
-    is shown as recorded.
+    is shown as recorded. motion: curves of the subject's own motion by name, another object after each
+    change.
     """
 
     def __init__(self) -> None:
         self.tracks: Mapping[str, Track] = MappingProxyType({})
         self.series: Mapping[str, Series] = MappingProxyType({})
         self.is_following = self.is_measuring = False
+        self.motion: Mapping[str, Series] = MappingProxyType({})
         self.still: tuple[Rigid | None, ...] | None = None
 
     @property

@@ -136,10 +136,12 @@ def _request(entry: Entry, args: Namespace, timeline: Timeline) -> Request:
     timeline.average(Averaging(entry.average))
     pose, start = timeline.drawn(entry.pose), float(timeline.times[0])
     entry = replace(entry, look=replace(entry.look, quality=args.quality or entry.look.quality))
+    computed = entry.computed(timeline)
     if entry.anonymous:
-        return entry.request(anonymous_pose(pose, start))
-    request = entry.request(pose)
-    drawing.check_color_source(entry.look, timeline, [entry.pose], entry.backend)
+        return entry.request(anonymous_pose(pose, start), computed)
+    request = entry.request(pose, computed)
+    if not computed:
+        drawing.check_color_source(entry.look, timeline, [entry.pose], entry.backend)
     return anonymous_request(request, start) if args.anonymous else request
 
 

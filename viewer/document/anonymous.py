@@ -31,11 +31,14 @@ def anonymous_request(request: Request, start: float) -> Request:
     """Request for the same picture of a pose that stands about the origin of its coordinates.
 
     Times count from the scan's first frame, which is at `start` seconds, heights from the middle of the
-    pose, and a scalar has its number for a name.
+    pose, and a scalar of the scan has its number for a name.
     """
     pose = request.pose
     middle = middle_of(pose) if pose.count else np.array(request.camera.target)
-    look = raised(unnamed(request.look, request.layers.names(pose.overview.scalars)), -middle)
+    look, names = request.look, request.layers.names(pose.overview.scalars)
+    if look.color_by not in request.layers.scalars:  # what Scan4D computes has names of its own
+        look = unnamed(look, names)
+    look = raised(look, -middle)
     layers = replace(request.layers, world_from_pose=request.layers.world_from_pose.in_frame(middle))
     anonymous, camera = anonymous_pose(pose, start), request.camera.moved(-middle)
     return replace(request, pose=anonymous, camera=camera, look=look, layers=layers)

@@ -23,6 +23,7 @@ import re
 import secrets
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -30,7 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..analysis.motion import distances
+from ..analysis.motion.stabilise import moment_surface
 from ..analysis.surface_point import slack_before
+from ..analysis.tracking.surface import MomentSurface
 from ..backends import backend as find_backend
 from ..camera import Camera
 from ..choice.choose import Automatic, Choice
@@ -50,6 +54,7 @@ from ..output.overlays import (
     DrawnPath,
     DrawnPlot,
     Overlay,
+    Stabilised,
 )
 from ..rigid import STILL, Rigid, is_rigid
 from ..scan.layers import NO_LAYERS, Layers
@@ -59,7 +64,7 @@ from ..scan.reading.corrections import Corrections
 from ..scan.reading.record import Reading
 from ..scan.timeline import Timeline
 from ..scan.units import Scale
-from .anonymous import anonymous_unit
+from .anonymous import anonymous_unit, middle_of
 from .landmarks import Note
 from .schema import (
     DAMAGED,
@@ -108,7 +113,8 @@ class Entry:
     own. shown_unit: that marks tell lengths in, None for `unit`. place: the matrix that the scan is moved by,
     None where it is not. anonymous: whether camera, time, look and place are those of the scan as
     `anonymous_request` has it. notes: of the
-    scan, where the marks show them. labels: where those over the view stand. scale: of width and height, at
+    scan, where the marks show them. stabilised: how the place was found, None where it is as recorded.
+    labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
     the scan says which it is. reading: corrections of how Scan4D reads the scan, as documents have them.
     record: how Scan4D read it (see `Reading.to_json`), for information only. average: frames that points are
@@ -136,6 +142,7 @@ class Entry:
     held: Matrix | None = None
     measure_lines: tuple[DrawnPath, ...] = ()
     plot: DrawnPlot | None = None
+    stabilised: Stabilised | None = None
     labels: tuple[LabelSpot, ...] = ()
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
@@ -203,12 +210,26 @@ class Entry:
             held=matrix_of(drawn.held) if marks.trajectories else None,
             measure_lines=drawn.measure_lines if marks.measure_lines else (),
             plot=drawn.plot if marks.plot else None,
+            stabilised=drawn.stabilised,
         )
 
-    def request(self, pose: Pose) -> Request:
-        """The picture to draw. pose: number `self.pose` of the scan."""
-        layers = NO_LAYERS if self.place is None else Layers(world_from_pose=self.motion)
+    def request(self, pose: Pose, scalars: Mapping[str, NDArray[np.generic]] | None = None) -> Request:
+        """The picture to draw. pose: number `self.pose` of the scan. scalars: as `computed` gives them."""
+        is_plain = self.place is None and not scalars
+        layers = NO_LAYERS if is_plain else Layers(scalars or {}, self.motion)
         return Request(pose, self.camera, self.backend, self.params, self.look, layers)
+
+    def computed(self, timeline: Timeline) -> dict[str, NDArray[np.generic]]:
+        """The numbers that the picture is coloured by and no file of the scan has, by name. timeline: of the
+        scan. Raises InputError where the reference frame cannot be read."""
+        if self.stabilised is None or self.look.color_by != distances.NAME:
+            return {}
+        pose = timeline.drawn(self.pose)
+        if self.stabilised.is_gap:
+            return {distances.NAME: distances.unknown_distances(len(pose.cloud))}
+        surface, origin = _reference_surface(timeline, self.stabilised.reference)
+        motion = self.motion.in_frame(-middle_of(pose)) if self.anonymous else self.motion
+        return {distances.NAME: distances.distances_from(surface, origin, pose.cloud, motion)}
 
     @property
     def motion(self) -> Rigid:
@@ -299,6 +320,13 @@ class Entry:
     def description(self) -> str:
         """The JSON text that a picture carries."""
         return json.dumps(_head() | self.to_json())
+
+
+@lru_cache(maxsize=1)  # all frames of a film share it
+def _reference_surface(timeline: Timeline, frame: int) -> tuple[MomentSurface, NDArray[np.float64]]:
+    """The surface of a frame, and the origin that it is relative to."""
+    cloud = timeline.pose(frame).cloud
+    return moment_surface(cloud, cloud.origin), cloud.origin
 
 
 def matrix_of(place: Rigid) -> Matrix | None:

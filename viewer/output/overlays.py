@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.motion import distances
 from ..analysis.track import Known
 from ..camera import Camera
 from ..geometry import Vector
@@ -112,11 +113,22 @@ class DrawnPlot:
 
 
 @dataclass(frozen=True)
+class Stabilised:
+    """How a tool removed the motion of the subject from a frame. region: that counts as rigid, in words
+    without names. reference: the frame that others are brought to. is_gap: whether the frame's motion is not
+    known, so that it stands as recorded."""
+
+    region: str
+    reference: int
+    is_gap: bool = False
+
+
+@dataclass(frozen=True)
 class DrawnMarks:
     """Landmarks and lines that tools draw over a frame, in the scan's coordinates.
 
     held: the motion that brings the trajectories to where they are about this frame. plot: None where none is
-    shown.
+    shown. stabilised: None where the frame stands as recorded.
     """
 
     landmarks: tuple[DrawnLandmark, ...] = ()
@@ -124,13 +136,19 @@ class DrawnMarks:
     held: Rigid = STILL
     measure_lines: tuple[DrawnPath, ...] = ()
     plot: DrawnPlot | None = None
+    stabilised: Stabilised | None = None
+
+    @property
+    def replayable(self) -> tuple[str, ...]:
+        """The numbers of tools that a recording can compute again, and so colour by."""
+        return () if self.stabilised is None else (distances.NAME,)
 
     def with_more(self, other: DrawnMarks) -> DrawnMarks:
         """Add the marks of another tool."""
         return DrawnMarks(
             (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
             other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
-            other.plot or self.plot,
+            other.plot or self.plot, other.stabilised or self.stabilised,
         )  # fmt: skip
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,11 @@ class Layers:
     def names(self, scalars: Iterable[str]) -> list[str]:
         """The names of all numbers there are: the scan's first."""
         return list(dict.fromkeys([*scalars, *self.scalars]))
+
+    def without(self, names: Collection[str]) -> Layers:
+        """The layers without some of the numbers."""
+        left = {name: values for name, values in self.scalars.items() if name not in names}
+        return replace(self, scalars=left)
 
 
 NO_LAYERS = Layers()

@@ -11,7 +11,7 @@ from rigid_hills import RigidHills, opened, truth
 from viewer.analysis.motion.axes import anatomical_axes
 from viewer.analysis.motion.stabilise import FEW, FrameMotion
 from viewer.app.tools.stabilising.choices import FOUND, LANDMARKS, PAINTED, Stabilising
-from viewer.app.tools.stabilising.stabiliser import Asked, Motions, close_distance, motions_folder
+from viewer.app.tools.stabilising.stabiliser import Asked, Motions, half_millimetre, motions_folder
 from viewer.app.tools.stabilising.words import facts_of, motion_gap_spans
 from viewer.errors import InputError
 from viewer.rigid import STILL
@@ -116,5 +116,5 @@ def test_runs_of_gaps_are_marked_on_the_timeline() -> None:
 
 
 def test_half_a_millimetre_is_close_where_the_unit_is_known() -> None:
-    assert close_distance("m", 1.3) == pytest.approx(5e-4)
-    assert close_distance("units", 1.3) == 1.3
+    assert half_millimetre("m") == pytest.approx(5e-4)
+    assert half_millimetre("units") is None

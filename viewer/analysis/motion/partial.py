@@ -49,11 +49,13 @@ def _values(found: FrameMotion) -> dict[str, Any]:
     if found.motion is None:
         return {"gap": found.reason}
     matrix, covariance = found.motion.matrix.tolist(), found.covariance.tolist()
-    return {"motion": matrix, "covariance": covariance, "within": found.within}
+    kept = {"within": found.within, "residual": found.residual}
+    return {"motion": matrix, "covariance": covariance, **kept}
 
 
 def _motion(values: Mapping[str, Any]) -> FrameMotion:
     if "gap" in values:
         return FrameMotion.gap(values["gap"])
     covariance = np.array(values["covariance"], np.float64).reshape(6, 6)
-    return FrameMotion(Rigid(np.array(values["motion"])), covariance, within=values["within"])
+    within, residual = values["within"], values["residual"]
+    return FrameMotion(Rigid(np.array(values["motion"])), covariance, within=within, residual=residual)

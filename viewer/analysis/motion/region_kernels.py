@@ -6,9 +6,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ..tracking.surface_kernels import Cells, fit_at, nearest_within
+from ..tracking.surface_kernels import (
+    OWN_SPACING,
+    Cells,
+    fit_at,
+    nearest_within,
+    parabola_height,
+    parabola_slopes,
+)
 
 Float = NDArray[np.float64]
+_HOLE = 1.6  # spacings to the nearest point beyond which there is a hole, as of correspondences
 
 
 @compiled
@@ -40,3 +48,29 @@ def rows_nearest(surface: Cells, positions: Float, reach: float) -> NDArray[np.i
     for i in range(len(positions)):
         rows[i] = nearest_within(surface, positions[i, 0], positions[i, 1], positions[i, 2], reach)
     return rows
+
+
+@compiled
+def heights_over(surface: Cells, positions: Float, reach: float) -> Float:
+    """The heights of positions (n, 3) over the parabola around the nearest point, along its normal; NaN where
+    no point is within reach, and over holes."""
+    heights = np.full(len(positions), np.nan)
+    for i in range(len(positions)):
+        row = nearest_within(surface, positions[i, 0], positions[i, 1], positions[i, 2], reach)
+        if row < 0 or not fit_at(surface, row):
+            continue
+        f, p = surface.frames[row], surface.parabolas[row]
+        x, y, z = (
+            positions[i, 0] - surface.points[row, 0],
+            positions[i, 1] - surface.points[row, 1],
+            positions[i, 2] - surface.points[row, 2],
+        )
+        u = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z
+        v = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z
+        w = f[2, 0] * x + f[2, 1] * y + f[2, 2] * z
+        if u * u + v * v > (_HOLE * (surface.reaches[row] * OWN_SPACING)) ** 2:
+            continue
+        slope_u, slope_v = parabola_slopes(p[0], u, v)
+        slant = np.sqrt(1.0 + slope_u * slope_u + slope_v * slope_v)
+        heights[i] = (w - parabola_height(p[0], u, v)) / slant
+    return heights

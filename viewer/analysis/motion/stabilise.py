@@ -59,13 +59,15 @@ class FrameMotion:
 
     motion: None in a gap. covariance: (6, 6), of the shift of the region's middle, scan units, and of the
     turn about it, radians, along the world's axes; NaN in a gap. reason: why there is a gap. within: the
-    share of the region's distances from the frame's surface that is no larger than a limit.
+    share of the region's distances from the frame's surface that is no larger than a limit. residual: root
+    mean square of these distances, scan units.
     """
 
     motion: Rigid | None
     covariance: Float
     reason: str = ""
     within: float = np.nan
+    residual: float = np.nan
 
     @classmethod
     def gap(cls, reason: str) -> FrameMotion:
@@ -172,7 +174,7 @@ def _motion(
 ) -> FrameMotion:
     """The motion of a region to a frame. start: relative to the reference's origin."""
     if frame == reference.frame:
-        return FrameMotion(STILL, np.zeros((6, 6)), within=1.0)
+        return FrameMotion(STILL, np.zeros((6, 6)), within=1.0, residual=0.0)
     try:
         surface = moment_surface(timeline.pose(frame).cloud, reference.origin)
     except InputError as error:
@@ -188,6 +190,7 @@ def _motion(
         found.motion.in_frame(-reference.origin),
         found.covariance,
         within=float((np.abs(near) <= within).mean()),
+        residual=float(np.sqrt((near**2).mean())),
     )
 
 

@@ -83,13 +83,15 @@ class Capture(WindowPart):
         session, viewport, request = self.session, self.viewport, self.viewport.request
         if not viewport.is_there or request is None:
             return None
+        drawn = self.drawn(request.pose.index)
+        kept = replace(request, layers=request.layers.without(drawn.replayable))
         entry = Entry.of(
-            request, session.scan, session.hash, viewport.size, self.playback.unit,
+            kept, session.scan, session.hash, viewport.size, self.playback.unit,
             self.marks_of_files() if marks is None else marks, self.choice_of(request),
         )  # fmt: skip
         entry = entry.with_reading(self.playback.timeline)
         entry = entry.with_notes(session.document.part(Landmarks).notes)
-        entry = entry.with_drawn(self.drawn(request.pose.index))
+        entry = entry.with_drawn(drawn)
         labels = self.label_places().spots if entry.marks else ()
         return replace(entry, shown_unit=session.document.shown_unit, labels=labels)
 

@@ -148,7 +148,8 @@ class Exporting(WindowPart):
         Frames are not exported by numbers that are laid over some, also where the one that is shown has none.
         """
         name = self.session.document.look.color_by
-        if self.choices.what == export_plan.FRAMES and name in self.session.laid.names:
+        computed = self.session.laid.names.difference(self.drawn(self.session.index).replayable)
+        if self.choices.what == export_plan.FRAMES and name in computed:
             self.note_of_work(
                 f"Cannot export: some frames use the colours '{name}', which a tool computes. Choose "
                 "other colours."

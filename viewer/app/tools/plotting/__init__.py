@@ -128,7 +128,7 @@ class Tool:
 
     def is_bare(self) -> bool:
         """Whether there is nothing to plot yet: the drawer is then as low as its words."""
-        return not self.landmarks.measures
+        return not self.landmarks.measures and not self.context.followed.motion
 
     def below(self, ui: Ui) -> None:
         """Declare the curves under the timeline."""
@@ -137,7 +137,8 @@ class Tool:
     def update(self) -> None:
         """Find what is plotted now."""
         paths = self.paths.trajectories(self.settings, self.choices)
-        count, series = len(self.times), self.context.followed.series
+        followed, count = self.context.followed, len(self.times)
+        series = {**followed.series, **followed.motion}
         fitting = {
             name: one for name, one in series.items() if len(one.times) == count
         }  # not of a scan before

@@ -6,31 +6,42 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 from imgui_bundle import icons_fontawesome_6 as icons
+from numpy.typing import NDArray
 
+from ....analysis.measures import Series
+from ....analysis.motion import distances
 from ....analysis.motion.axes import anatomical_axes
+from ....analysis.motion.curves import RESIDUAL, SHIFTS, TURNS, motion_curves
 from ....document.landmarks import Landmarks
 from ....errors import InputError
 from ....geometry import Vector
+from ....look import Look
+from ....output.overlays import NOTHING_DRAWN, DrawnMarks, Stabilised
 from ....rigid import STILL, Rigid
+from ....scan.pose import Pose
 from ...commands import Command
 from ...tool_context import FrameSpan, ToolContext
 from ...ui import Ui
 from .._cached import Cached
 from . import panel
-from .choices import Stabilising
+from .choices import Settings, Stabilising
+from .distance_colors import DistanceColors
 from .stabiliser import Asked, Stabiliser
 from .words import Facts, facts_of, motion_gap_spans
 
 TITLE = "Stabilise"
+_COLORED = 4.0  # times the limit of what is close: the distance that has the last colour
 
 
 class Tool:
-    """The tool that stabilises the scan. stabiliser: has motions found."""
+    """The tool that stabilises the scan. stabiliser: has motions found. colors: has distances found."""
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context
         self.stabiliser = Stabiliser(context)
+        self.colors = DistanceColors(context)
         self._cached = Cached()
         self._laid: tuple[object, ...] = ()
 
@@ -50,13 +61,36 @@ class Tool:
 
     def toggle(self) -> None:
         """Show the scan stabilised, or as recorded. Raises InputError for a scan of one frame."""
-        if len(self.context.timeline) < 2:
-            raise InputError("The scan has one frame, so there is no motion to remove.")
+        self._check_frames()
         is_shown = not self.choices.is_shown
         self.choose("Stabilise" if is_shown else "Show as recorded", is_shown=is_shown)
         if is_shown:
             self.stabiliser.resume()
             self.context.reveal()
+
+    @property
+    def is_colored(self) -> bool:
+        """Whether the colours show distances from the reference."""
+        return self.context.document.look.color_by == distances.NAME
+
+    def toggle_colors(self) -> None:
+        """Colour the scan by distances from the reference frame, for which it is stabilised; or as usual.
+        Raises InputError for a scan of one frame."""
+        look, usual = self.context.document.look, Look()
+        if self.is_colored:
+            look = replace(look, color_by=usual.color_by, low=usual.low, high=usual.high)
+            self.context.change("Change colours", look=look)
+            return
+        self._check_frames()
+        close = self.stabiliser.close
+        high = None if close is None else _COLORED * close
+        look = replace(look, color_by=distances.NAME, low=0.0, high=high)
+        self.context.change("Colour by distance", replace(self.choices, is_shown=True), look=look)
+        self.stabiliser.resume()
+
+    def _check_frames(self) -> None:
+        if len(self.context.timeline) < 2:
+            raise InputError("The scan has one frame, so there is no motion to remove.")
 
     @property
     def _places(self) -> Mapping[str, Vector]:
@@ -71,18 +105,27 @@ class Tool:
         choices = self.choices
         asked = Asked.of(self.context.timeline, self.context.unit, choices, self._places)
         is_new = self.stabiliser.advance(asked, choices.is_shown)
+        self.colors.advance(self.stabiliser.motions, self.is_colored)
+        self.context.followed.motion = self._curves()
         return self._lay() or is_new
 
     def _lay(self) -> bool:
         """Move the scan by what is known of the frame that is shown; whether that has changed something."""
-        known, is_shown = self.stabiliser.known, self.choices.is_shown and bool(self.stabiliser.known)
+        known, pose = self.stabiliser.known, self.context.playback.pose
+        is_shown = self.choices.is_shown and bool(known)
         self.context.followed.still = self._still() if is_shown else None
-        wanted = (self.context.timeline, is_shown and known.get(self.frame), is_shown and self._is_whole)
+        values = self.colors.of(pose) if known and pose is not None else None
+        now = (known.get(self.frame), self._is_whole) if is_shown else None
+        wanted = (self.context.timeline, now, values is not None and id(values))
         if wanted == self._laid:
             return False
         self._laid = wanted
-        self.context.lay(motion=self._motion if is_shown else None)
+        numbers = self._numbers if known else None
+        self.context.lay(numbers, self._motion if is_shown else None)
         return True
+
+    def _numbers(self, pose: Pose) -> Mapping[str, NDArray[np.float32]]:
+        return {distances.NAME: self.colors.of(pose)}
 
     @property
     def _is_whole(self) -> bool:
@@ -102,6 +145,25 @@ class Tool:
         """The motion of a frame to where it is shown: a gap is shown as recorded."""
         still = self._still()
         return still[frame] or STILL
+
+    def _curves(self) -> Mapping[str, Series]:
+        """The curves of the motion that the user wants plotted."""
+        motions, known, times = self.stabiliser.motions, self.stabiliser.known, self.context.timeline.times
+        up, front = self.context.document.look.up, self.context.document.front
+
+        def make() -> Mapping[str, Series]:
+            if motions is None or motions.reference is None or not known:
+                return {}
+            return motion_curves(known, times, motions.reference.middle, anatomical_axes(up, front))
+
+        found = self._cached.of(("curves", up, front), (motions, known, times), make)
+        settings: Settings = self.context.settings
+        wanted = (
+            (settings.rotations, TURNS),
+            (settings.translations, SHIFTS),
+            (settings.residual, [RESIDUAL]),
+        )
+        return {name: found[name] for is_on, names in wanted if is_on and found for name in names}
 
     # --- in the window ----------------------------------------------------------------
 
@@ -123,6 +185,13 @@ class Tool:
         """Declare the section of the panel."""
         panel.draw(self, ui)
 
+    def drawn(self, frame: int) -> DrawnMarks:
+        """How a frame of a saved picture was stabilised."""
+        if self.context.followed.still is None:
+            return NOTHING_DRAWN
+        choices, is_gap = self.choices, self.context.followed.still[frame] is None
+        return DrawnMarks(stabilised=Stabilised(choices.words, choices.reference, is_gap))
+
     def spans(self) -> list[FrameSpan]:
         """The gaps, while the scan is shown stabilised."""
         known = self.stabiliser.known
@@ -139,6 +208,10 @@ COMMANDS = {
             "stabilise", "Stabilise", Tool.toggle, "U",
             is_on=lambda tool: tool.choices.is_shown, can=lambda tool: len(tool.context.timeline) > 1,
             short="Stabilise", icon=icons.ICON_FA_ANCHOR,
+        ),
+        Command(
+            "distance_colors", "Colour by distance from reference", Tool.toggle_colors, "Shift+U",
+            is_on=lambda tool: tool.is_colored, can=lambda tool: len(tool.context.timeline) > 1,
         ),
     )
 }  # fmt: skip

@@ -8,6 +8,7 @@ import numpy as np
 
 from ....analysis.motion.region import RigidRegion
 from ....document.part import Part
+from ....params import param
 
 Sphere = tuple[float, float, float, float]  # middle and radius
 FOUND, PAINTED, LANDMARKS = "found", "painted", "landmarks"
@@ -29,6 +30,13 @@ class Stabilising(Part, name="stabilising"):
     radius: float = 0.0
 
     @property
+    def words(self) -> str:
+        """The region in words, without names of landmarks."""
+        count = {PAINTED: len(self.spheres), LANDMARKS: len(self.landmarks)}.get(self.region, 0)
+        what = {PAINTED: "painted spheres", LANDMARKS: f"landmarks, {self.radius:g} around each"}
+        return f"{count} {what[self.region]}" if self.region in what else REGION_WORDS[FOUND].lower()
+
+    @property
     def of_motions(self) -> Stabilising:
         """The choices that motions depend on; others have their defaults."""
         chosen = Stabilising(reference=self.reference, region=self.region)
@@ -47,3 +55,18 @@ class Stabilising(Part, name="stabilising"):
         if self.region == LANDMARKS:
             return RigidRegion(np.empty((0, 4)), np.empty(0, np.int64), self.landmarks, self.radius)
         return None
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Choices that come back at the next start, whatever the scan."""
+
+    rotations: bool = param(
+        True, "Plot rotations about the axes of the subject", title="Rotations", basic=True
+    )
+    translations: bool = param(
+        True, "Plot how far the middle of the region moves along the axes", title="Translations", basic=True
+    )
+    residual: bool = param(
+        True, "Plot how far the region is off in each frame (root mean square)", title="Residual", basic=True
+    )

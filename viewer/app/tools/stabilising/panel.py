@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from ....scan.times import frame_in_words
 from ... import widgets
 from ...ui import Ui
+from .choices import Settings
 
 if TYPE_CHECKING:
     from . import Tool
@@ -45,6 +46,12 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
         if stabiliser.is_stopped and ui.row("Continue").button():
             stabiliser.resume()
     facts = tool.facts
+    changed, _ = imgui.checkbox("Colour by distance", tool.is_colored)
+    ui.tooltip("Colour the scan by its distance from the surface of the reference frame", "distance_colors")
+    if changed:
+        tool.toggle_colors()
+    widgets.faint("Curves of the motion (V plots them):")
+    tool.context.settings = widgets.edit(tool.context.settings, Settings())
     for line in facts.lines:
         widgets.faint(line)
     for warning in facts.warnings:

@@ -103,7 +103,8 @@ class Motions:
             rows = self._rows(pose, folder / f"{digest}-region.json")
             reference = MotionReference.of(pose, rows, frame)
             self.rows, self.pose = rows, pose
-            self.limits = WeakLimits(close_distance(self.asked.unit, reference.surface.spacing))
+            close = half_millimetre(self.asked.unit)
+            self.limits = WeakLimits(reference.surface.spacing if close is None else close)
             with suppress(InputError):  # damaged: all is found again
                 self.known |= kept.read()
             self.reference = reference
@@ -159,6 +160,13 @@ class Stabiliser:
         """Whether motions are being found."""
         return any(work.task is self._task for work in self._context.works)
 
+    @property
+    def close(self) -> float | None:
+        """The distance up to which a region is said to fit, scan units; None as long as it is not known."""
+        if self.motions is not None and self.motions.reference is not None:
+            return self.motions.limits.shift
+        return half_millimetre(self._context.unit)
+
     def resume(self) -> None:
         """Go on after the user has cancelled it."""
         self.is_stopped = False
@@ -191,11 +199,11 @@ class Stabiliser:
         return motions.is_whole or self.is_stopped or bool(motions.problem)
 
 
-def close_distance(unit: str, spacing: float) -> float:
-    """The distance up to which a region is said to fit: half a millimetre, scan units; where the unit is no
-    known length, a point spacing."""
+def half_millimetre(unit: str) -> float | None:
+    """Half a millimetre in scan units: the distance up to which a region is said to fit. None where the unit
+    is no known length; a point spacing stands for it then."""
     factor = conversion("mm", unit)
-    return spacing if factor is None else CLOSE * factor
+    return None if factor is None else CLOSE * factor
 
 
 def motions_folder() -> Path:
