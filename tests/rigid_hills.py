@@ -86,10 +86,10 @@ class RigidHills:
 
 
 class RollingHills(RigidHills):
-    """Hills with other waves in each frame, so that nothing stays rigid."""
+    """Hills with other waves in each frame. Nothing stays rigid, so the region shrinks in each round."""
 
     def heights(self, index: int, x: NDArray, y: NDArray) -> NDArray[np.float64]:
-        waves = 0.5 * np.sin(0.5 * x + 1.7 * index) * np.cos(0.4 * y - 2.3 * index)
+        waves = 0.35 * np.sin(x + 1.7 * index) * np.cos(0.8 * y - 2.3 * index)
         return super().heights(index, x, y) + waves
 
 

@@ -8,28 +8,12 @@ import numpy as np
 import pytest
 from experiments.landmarks.known import KeptFrames
 from experiments.landmarks.resampled import ResampledMesh
-from experiments.motion.heads import (
-    REGIONS,
-    Heads,
-    misplaced,
-    motion_error,
-    rows_within,
-    strays,
-    without_side,
-)
+from experiments.motion.heads import REGIONS, Heads, region_motions, stabilised_errors, strays, without_side
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from viewer.analysis.motion.found import found_region
-from viewer.analysis.motion.registration import RegionSurface, register_region
-from viewer.analysis.motion.stabilise import (
-    FrameMotion,
-    MotionReference,
-    MotionState,
-    WeakLimits,
-    moment_surface,
-    stabilise,
-)
+from viewer.analysis.motion.stabilise import FrameMotion, MotionReference, MotionState, WeakLimits, stabilise
 from viewer.errors import InputError
 from viewer.scan.open import find_source
 from viewer.scan.timeline import Timeline
@@ -56,40 +40,22 @@ def test_the_motion_of_a_talking_head_is_found(talking: Heads, fault: str | None
     if fault is not None:
         timeline = talking.timeline(strays if fault == "outliers" else without_side(talking, rows, 0.3))
     reference = MotionReference.of(timeline.pose(0), rows, 0)
-    known: dict[int, FrameMotion] = {}
-    for _ in stabilise(timeline, reference, LIMITS.shift, known):
-        pass
-    errors = []
-    for frame in range(1, len(timeline)):
-        motion = known[frame].motion
-        assert motion is not None
-        errors.append(motion_error(motion, talking.truth(frame, 0), reference.middle))
+    errors = stabilised_errors(talking, timeline, reference, LIMITS.shift)
+    assert len(errors) == len(timeline) - 1, "there are no gaps"
     turns, shifts = np.linalg.norm(np.reshape(errors, (-1, 2, 3)), axis=2).T
     assert np.median(turns) <= most
     assert np.median(shifts) <= most
 
 
-def test_regions_of_growing_difficulty_are_within_what_is_told() -> None:
+def test_errors_of_regions_of_growing_difficulty_are_within_the_spread() -> None:
     """A head that only turns, so that each region is rigid; three references with noise of their own."""
     values, told = {name: [] for name in REGIONS}, {name: [] for name in REGIONS}
     for seed, first in enumerate((2, 24, 45)):
-        heads = Heads.turning(seed)
-        cloud = heads.source.load(first)
-        surface, rest = moment_surface(cloud, np.zeros(3)), heads.at(first).inverse.points(cloud.world())
-        for frame in (10, 33, 56):
-            other, right = moment_surface(heads.source.load(frame), np.zeros(3)), heads.truth(frame, first)
-            for name, spheres in REGIONS.items():
-                region = RegionSurface.of(surface, rows_within(spheres, rest))
-                assert region is not None
-                middle = region.patch.center
-                found = register_region(region, other, misplaced(right, middle, 1.5, 1.5, (frame, seed)))
-                assert found is not None
-                motion = FrameMotion(found.motion, found.covariance)
-                error, spread = motion_error(found.motion, right, middle), motion.spread(np.eye(3))
-                is_close = (np.abs(error) <= 0.5).all()
-                assert is_close or motion.state(np.eye(3), LIMITS) is MotionState.WEAK, name
-                values[name] += list(np.abs(error))
-                told[name] += list(spread)
+        for name, motion, error in region_motions(Heads.turning(seed), first, (10, 33, 56), seed):
+            is_close = (np.abs(error) <= 0.5).all()
+            assert is_close or motion.state(np.eye(3), LIMITS) is MotionState.WEAK, name
+            values[name] += list(np.abs(error))
+            told[name] += list(motion.spread(np.eye(3)))
     shares = {name: np.mean(np.array(values[name]) <= told[name]) for name in REGIONS}
     assert min(shares.values()) >= 0.8, shares
     assert 0.93 <= np.mean(list(shares.values())) <= 0.99, shares

@@ -97,7 +97,7 @@ def test_the_found_region_leaves_out_what_moves_otherwise() -> None:
 
 
 def test_a_subject_without_a_rigid_part_has_no_region() -> None:
-    timeline = opened(RollingHills(6))
+    timeline = opened(RollingHills(3))
     with pytest.raises(InputError, match="no region that stays rigid"):
         found_region(timeline, timeline.pose(0), 0)
 

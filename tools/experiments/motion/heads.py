@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from experiments.landmarks.known import KeptFrames
 from experiments.landmarks.resampled import ResampledDemo
+from viewer.analysis.motion.registration import RegionSurface, register_region
+from viewer.analysis.motion.stabilise import FrameMotion, MotionReference, moment_surface, stabilise
 from viewer.rigid import Rigid, rigid_matrix
 from viewer.scan.demo.motion import NECK, HeadMotion
 from viewer.scan.points import PointCloud
@@ -18,6 +21,7 @@ from viewer.scan.timeline import Timeline
 
 NOISE = 0.1  # mm, standard deviation of points along the normal
 BEHIND = -25.0  # mm: what is farther back is left out
+ASTRAY = 1.5  # degrees and mm: standard deviation of starts
 # Spheres at rest: middle and radius, mm. From what holds all directions to what is nearly flat or round.
 REGIONS = {
     "skull": [(0, 50, 20, 110)],
@@ -123,3 +127,48 @@ def without_side(heads: Heads, rows: NDArray[np.integer], share: float) -> Chang
         return points if not frame else points[heads.at(frame).inverse.points(points)[:, 0] < edge]
 
     return change
+
+
+class RegionMotion(NamedTuple):
+    """The motion of one of the `REGIONS`, with its error, see `motion_error`."""
+
+    region: str
+    motion: FrameMotion
+    error: Float
+
+
+def region_motions(heads: Heads, first: int, frames: Iterable[int], seed: int) -> Iterator[RegionMotion]:
+    """Register each of the `REGIONS` of a head that only turns, from a first frame to others.
+
+    Starts are off by chance, by `ASTRAY`.
+    """
+    cloud = heads.source.load(first)
+    surface, rest = moment_surface(cloud, np.zeros(3)), heads.at(first).inverse.points(cloud.world())
+    for frame in frames:
+        other, right = moment_surface(heads.source.load(frame), np.zeros(3)), heads.truth(frame, first)
+        for name, spheres in REGIONS.items():
+            region = RegionSurface.of(surface, rows_within(spheres, rest))
+            assert region is not None
+            middle = region.patch.center
+            found = register_region(region, other, misplaced(right, middle, ASTRAY, ASTRAY, (frame, seed)))
+            assert found is not None
+            motion = FrameMotion(found.motion, found.covariance)
+            yield RegionMotion(name, motion, motion_error(found.motion, right, middle))
+
+
+def stabilised_errors(
+    heads: Heads, timeline: Timeline, reference: MotionReference, within: float
+) -> list[Float]:
+    """The errors, see `motion_error`, of all frames but the first, which is the reference, and but gaps.
+
+    within: see `stabilise`.
+    """
+    known: dict[int, FrameMotion] = {}
+    for _ in stabilise(timeline, reference, within, known):
+        pass
+    motions = {frame: found.motion for frame, found in known.items() if frame}
+    return [
+        motion_error(motion, heads.truth(frame, 0), reference.middle)
+        for frame, motion in motions.items()
+        if motion is not None
+    ]

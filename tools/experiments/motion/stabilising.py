@@ -14,9 +14,10 @@ from experiments.motion.heads import (
     REGIONS,
     Change,
     Heads,
-    misplaced,
     motion_error,
+    region_motions,
     rows_within,
+    stabilised_errors,
     strays,
     without_side,
 )
@@ -24,14 +25,8 @@ from experiments.motion.methods import Method, open3d_icp, small_gicp
 from experiments.script import Script
 from experiments.tables import Row
 from viewer.analysis.motion.found import found_region
-from viewer.analysis.motion.registration import LEVELS, RegionSurface, register_region
-from viewer.analysis.motion.stabilise import (
-    FrameMotion,
-    MotionReference,
-    WeakLimits,
-    moment_surface,
-    stabilise,
-)
+from viewer.analysis.motion.registration import LEVELS, register_region
+from viewer.analysis.motion.stabilise import FrameMotion, MotionReference, WeakLimits, moment_surface
 from viewer.rigid import Rigid
 from viewer.scan.points import PointCloud
 
@@ -44,7 +39,6 @@ REFERENCES = (5, 16, 29, 40, 51)  # frames, and
 AFTER = range(2, 64, 9)  # those that are registered with each
 SEEDS = range(8)  # of heads that only turn, each with another reference
 TURNED = (3, 19, 35, 51)  # frames of each
-ASTRAY = 1.5  # degrees and mm: standard deviation of starts
 COMPARED = range(4, 64, 6)  # frames that each method registers
 DEFORMING = "nose", "upper face"
 OTHERS: Mapping[str, Callable[[Float], Method]] = {
@@ -83,14 +77,10 @@ def _stabilised(
     if rows is None:
         rows = found_region(timeline, poses[0], 0)
     finding = time.process_time() - before
-    reference, errors = MotionReference.of(poses[0], rows, 0), []
-    known: dict[int, FrameMotion] = {}
-    for frame in stabilise(timeline, reference, LIMITS.shift, known):
-        motion = known[frame].motion
-        if frame and motion is not None:
-            errors.append(motion_error(motion, heads.truth(frame, 0), reference.middle))
+    reference = MotionReference.of(poses[0], rows, 0)
+    errors = stabilised_errors(heads, timeline, reference, LIMITS.shift)
     taken = time.process_time() - before - finding
-    gaps = sum(found.motion is None for found in known.values())
+    gaps = len(timeline) - 1 - len(errors)
     times = {
         "time of 64 frames": f"{taken:.1f} s",
         "search": f"{finding:.1f} s" if is_found else "",
@@ -121,19 +111,9 @@ def regions(_: Namespace) -> Iterator[Row]:
     told: dict[str, list[Float]] = {name: [] for name in REGIONS}
     for seed in SEEDS:
         heads, first = Heads.turning(seed), int(np.random.default_rng(seed).integers(64))
-        cloud = heads.source.load(first)
-        surface, rest = moment_surface(cloud, ZERO), heads.at(first).inverse.points(cloud.world())
-        for frame in set(TURNED) - {first}:
-            other, right = moment_surface(heads.source.load(frame), ZERO), heads.truth(frame, first)
-            for name, spheres in REGIONS.items():
-                region = RegionSurface.of(surface, rows_within(spheres, rest))
-                assert region is not None
-                middle = region.patch.center
-                start = misplaced(right, middle, ASTRAY, ASTRAY, (frame, seed))
-                found = register_region(region, other, start)
-                assert found is not None
-                errors[name].append(motion_error(found.motion, right, middle))
-                told[name].append(FrameMotion(found.motion, found.covariance).spread(WORLD))
+        for found in region_motions(heads, first, set(TURNED) - {first}, seed):
+            errors[found.region].append(found.error)
+            told[found.region].append(found.motion.spread(WORLD))
     for name in REGIONS:
         exceeded = np.median(LIMITS.exceeded(np.array(told[name])), axis=0).reshape(2, 3)
         weak = [", weak" if one > 1 else "" for one in exceeded.max(axis=1)]
