@@ -2,8 +2,9 @@
 
 python tools/experiment.py                          list all experiments
 python tools/experiment.py NAME [OPTION ...]        run one; --help shows its options
-python tools/experiment.py SUITE --resume           go on with one that was stopped
+python tools/experiment.py NAME --resume            go on with a stopped run of a suite
 python tools/experiment.py NAME --against TREE      compare with another checkout, by turns
+python tools/experiment.py --stale                  list how old each stored run is
 """
 
 import sys

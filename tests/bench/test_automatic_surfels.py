@@ -18,7 +18,7 @@ from viewer.bench.surface_suite import (
     Amount,
     PictureTruth,
     ScanCondition,
-    cameras_of,
+    cameras_for,
     scenes_of,
 )
 from viewer.drawing.frame import render_frame
@@ -45,7 +45,7 @@ def drawn(renderer: Renderer, condition: ScanCondition, scene: str, data: Path) 
     subject = catalog.subject(scene, data)
     moment = subject.moment(0)
     cloud, _ = condition.scan(moment, AMOUNT.points, (0, 0))
-    (camera,) = cameras_of(moment, subject.up, condition, AMOUNT, 0)
+    (camera,) = cameras_for(moment, subject.up, condition, AMOUNT, 0)
     truth, pose = PictureTruth.of(moment, camera, AMOUNT.size, cloud), Pose(0, 0.0, condition.name, cloud)
 
     def errors(values: dict[str, Any]) -> Errors:

@@ -81,7 +81,7 @@ def main(words: Sequence[str]) -> int:
             formatter_class=RawDescriptionHelpFormatter,
         )
         if isinstance(declared, Suite):
-            add_measuring_arguments(parser)
+            add_measuring_arguments(parser, declared.usual)
             parser.add_argument(
                 "--resume",
                 action="store_true",

@@ -54,7 +54,9 @@ class Script:
             else:
                 parser.add_argument(flag, type=Path if default is None else type(default), default=default)
         names = [table.__name__ for table in self.tables]
-        parser.add_argument("--table", nargs="+", choices=names, default=names, dest="tables")
+        parser.add_argument(
+            "--table", nargs="+", choices=names, default=names, dest="tables", help="make only these tables"
+        )
         parser.add_argument(
             "--store", type=Path, metavar="DIR", help="write NAME-MACHINE.json into this folder"
         )

@@ -165,7 +165,7 @@ def measure_condition(
     moment = subject.moment(0)
     poses = [_pose(condition, moment, amount.points, seed, frame) for frame in range(condition.frames)]
     true = condition.scan(moment, amount.points, (seed, 0))[1]
-    cameras = cameras_of(moment, subject.up, condition, amount, seed)
+    cameras = cameras_for(moment, subject.up, condition, amount, seed)
     truths = [PictureTruth.of(moment, camera, amount.size, poses[0].cloud) for camera in cameras]
     if poses[0].cloud.normals is None:
         yield ESTIMATED, estimated_normals(poses[0].cloud, true)
@@ -187,7 +187,7 @@ def _pose(condition: ScanCondition, moment: Moment, count: int, seed: int, frame
     return averaged(poses[-1], reversed(poses[:-1]), Averaging(condition.average))
 
 
-def cameras_of(moment: Moment, up: str, condition: ScanCondition, amount: Amount, seed: int) -> list[Camera]:
+def cameras_for(moment: Moment, up: str, condition: ScanCondition, amount: Amount, seed: int) -> list[Camera]:
     """The cameras of a condition, one for each view. Raises InputError for a scene without such views."""
     if not condition.front:
         return viewpoints(moment.mesh, amount.views, amount.size, up=up, seed=seed)

@@ -30,8 +30,9 @@ _MINUTES = 100  # seconds from which a time is shown in minutes
 QUICK = BenchSettings(size=(384, 256), views=2, repeat=1, frames=2)
 
 
-def add_measuring_arguments(parser: ArgumentParser) -> None:
-    """Add the arguments of every measurement: the folder, the scenes, how much is measured."""
+def add_measuring_arguments(parser: ArgumentParser, usual: BenchSettings) -> None:
+    """Add the arguments of every measurement: the folder, the scenes, how much is measured. usual: the
+    defaults."""
     add_output_argument(parser, "folder for the results", "DIR")
     parser.add_argument(
         "--scene",
@@ -54,15 +55,18 @@ def add_measuring_arguments(parser: ArgumentParser) -> None:
         "--data", type=Path, metavar="DIR",
         help="folder of real scans; default: SCAN4D_DATA, or shared/data beside the checkout",
     )  # fmt: skip
+    size = "x".join(map(str, usual.size))
     parser.add_argument(
-        "--size", type=arguments.size, metavar="WxH", help="size of the pictures; default 1920x1280"
+        "--size", type=arguments.size, metavar="WxH", help=f"size of the pictures; default {size}"
     )
     parser.add_argument(
-        "--views", type=arguments.count, metavar="N", help="number of views of each scene; default 20"
-    )
+        "--views", type=arguments.count, metavar="N",
+        help=f"number of views of each scene; default {usual.views}",
+    )  # fmt: skip
     parser.add_argument(
-        "--seed", type=arguments.seed, metavar="N", help="seed of viewpoints, samples and noise; default 0"
-    )
+        "--seed", type=arguments.seed, metavar="N",
+        help=f"seed of viewpoints, samples and noise; default {usual.seed}",
+    )  # fmt: skip
 
 
 def data_folder(given: Path | None = None) -> Path | None:

@@ -52,7 +52,7 @@ _QUICK_CALIBRATION = ("torus", "box", "sheets-bare", "torus-simulated")
 
 def add_arguments(parser: ArgumentParser) -> None:
     """The arguments of `scan4d bench`."""
-    add_measuring_arguments(parser)
+    add_measuring_arguments(parser, BenchSettings())
     parser.add_argument(
         "--backend",
         nargs="+",

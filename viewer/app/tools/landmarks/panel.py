@@ -117,7 +117,7 @@ def _draw_region(tool: Tool, region: str, height: float) -> None:
         0
     ]:
         tool.open_regions ^= {region}
-    widgets.tooltip("Hide its corners" if is_open else "Show its corners")
+    widgets.tooltip("Hide the corners of the region" if is_open else "Show the corners of the region")
     draw_list, faint = imgui.get_window_draw_list(), imgui.get_color_u32(imgui.Col_.text_disabled)
     icon = icons.ICON_FA_ANGLE_DOWN if is_open else icons.ICON_FA_ANGLE_RIGHT
     draw_list.add_text(corner, imgui.get_color_u32(imgui.Col_.text), icon)
