@@ -398,9 +398,8 @@ class Recorder:
         if before is not None:
             completed = replace(before, record=entry.record)
             if entry == replace(completed, hash=before.hash or entry.hash):
-                self._entries[-1] = (
-                    completed  # nothing, or what is found while the picture stays: sides, the hash
-                )
+                # Nothing has changed, but Scan4D may have found facts of the scan meanwhile, such as sides.
+                self._entries[-1] = completed
                 return None
         self._entries.append(replace(entry, at=self._since(now)))
         return _change(self._entries[-1], before)

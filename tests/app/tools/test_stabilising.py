@@ -79,7 +79,7 @@ def test_what_cannot_be_found_is_told_once() -> None:
     for choices, words in (
         (Stabilising(reference=7), "7"),
         (Stabilising(region=PAINTED), "Choose a larger region"),
-        (Stabilising(region=LANDMARKS, landmarks=("gone",), radius=3.0), "unknown landmark 'gone'"),
+        (Stabilising(region=LANDMARKS, landmarks=("gone",), radius=3.0), "no landmark 'gone'"),
     ):
         found = motions(timeline, choices)
         with pytest.raises(InputError, match=words):

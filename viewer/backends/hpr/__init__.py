@@ -161,7 +161,7 @@ class Params:
 
     @property
     def is_on_cpu(self) -> bool:
-        """Whether the CPU finds something for each view."""
+        """Whether the CPU searches for the radius or for the visible points in each view."""
         return self.mode == EXACT or (
             self.mode in _FLIPPED["mode"] and self.radius is None and self.radius_by != _BY[0]
         )
@@ -195,7 +195,7 @@ class VisiblePoints(Backend):
     }
 
     def foresee(self, cloud: PointCloud, params: Params) -> None:
-        """Estimate the noise and the spacing of points, and take the noise from them."""
+        """Estimate the noise and the spacing of points, and remove the noise."""
         if len(cloud):
             foresee_spacing(cloud)
 
