@@ -48,6 +48,15 @@ def matched(before: Float, now: Float) -> NDArray[np.int64]:
     return RecurringPoints(*surfaces, NOWHERE, NOWHERE).matches
 
 
+def test_hundreds_of_copies_of_a_point_are_passed_over() -> None:
+    points = sheet(scattered(0), 0.3)
+    copied = np.concatenate([points, np.tile(points[300], (600, 1))])
+    assert (matched(points, copied)[:300] >= 0).mean() > 0.9
+    surface = MomentSurface(copied, 1.0)
+    assert surface.axes_at(points[300], 1.0) is None
+    assert PointPattern.around(surface, points[300]) is None
+
+
 @pytest.mark.parametrize(("missing", "least"), [(0.0, 0.97), (0.1, 0.9)])
 def test_points_in_another_order_are_matched_although_some_are_missing(missing: float, least: float) -> None:
     chance, places = np.random.default_rng(1), scattered(0)

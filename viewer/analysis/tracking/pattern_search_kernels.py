@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ...compiled import compiled
 from .pattern_fit_kernels import FREE, apply_map, fit_map, mapped_normal, stand_up, turn_to
-from .surface_kernels import Cells, fit_at, nearest_within, rows_within
+from .surface_kernels import COPIES, Cells, fit_at, nearest_within, rows_within
 
 Float = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ def nearest_of(surface: Cells, x: float, y: float, z: float, rows: NDArray[np.in
         if found >= len(rows):
             break
         reach *= 1.6
-    while found == _MOST:
+    while found == _MOST and reach > COPIES * surface.spacing:
         reach *= 0.7
         found = rows_within(surface, x, y, z, reach, found_rows, found_squared)
     for i in range(found):

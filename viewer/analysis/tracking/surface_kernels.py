@@ -21,6 +21,7 @@ _TERMS = 6  # of a parabola: 1, u, v, u^2, uv, v^2
 _SOFT = 1e-3  # of the weights' sum: holds curvature where points leave it open
 _RINGS = 3  # times that the reach is doubled where points are few
 _MOST = 512  # points that are looked at for one fit
+COPIES = 1e-6  # spacings: points that are nearer to each other are copies
 OWN_SPACING = 0.396  # of the reach of 20 points in a circle
 
 Float = NDArray[np.float64]
@@ -195,7 +196,7 @@ def fit_at(
             break
         reach *= 2.0
     if found == _MOST:  # far denser than elsewhere: those within less
-        while found == _MOST:
+        while found == _MOST and reach > COPIES * spacing:
             reach *= 0.5
             found = rows_within(held, px, py, pz, reach, rows, squared)
     found = _keep_nearest(rows, squared, found, NEAREST)
