@@ -23,6 +23,17 @@ def test_points_of_the_demo_are_on_its_exact_surface() -> None:
     assert np.quantile(value, 0.99) < 1e-3
 
 
+def test_paths_of_points_are_where_they_lie_in_each_frame() -> None:
+    source = ResampledDemo("demo:sway:1", behind=FRONT)
+    still, there = source.paths(20, [20, 25])
+    assert np.allclose(still, source.load(20).world(), atol=1e-4)
+    rest = [
+        rest_of(points.T, float(source.times()[i]), source.demo.motion)
+        for i, points in ((20, still), (25, there))
+    ]
+    assert np.abs(rest[0] - rest[1]).max() < 1e-2
+
+
 def test_noise_is_along_the_normal_and_of_the_size_told() -> None:
     clean, noisy = (ResampledDemo("demo:smile", noise, behind=FRONT) for noise in (0.0, 0.25))
     one, other = clean.load(30).world(), noisy.load(30).world()

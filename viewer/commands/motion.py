@@ -34,6 +34,7 @@ from ..scan.timeline import Timeline
 from ..scan.times import frame_in_words
 from ..scan.units import conversion
 from ._console import progress, tell, warn
+from ._dense import run_dense
 from ._outputs import add_output_argument, claim
 from ._scans import SCAN_HELP, open_timeline, report
 
@@ -59,58 +60,68 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="frame of SCAN in which motions begin, counted from 0; or another scan, for its first frame; "
         "default 0",
     )  # fmt: skip
+    parser.add_argument(
+        "--dense", action="store_true",
+        help="follow every point of the reference frame instead, and write displacements.npz",
+    )  # fmt: skip
     add_output_argument(parser, "folder for the results", "DIR")
 
 
 def run(args: Namespace) -> int:
-    """Write the motions of all frames."""
-    table, facts, region_file = (args.out / name for name in (_TABLE, _REPORT, _REGION))
+    """Write the motions of all frames, or of all points."""
     with open_timeline(args, args.scan) as timeline:
-        claim([table, facts, region_file], _inputs(args, timeline), args.force)
-        limits = WeakLimits(_millimetres(timeline, _CLOSE))
-        region = RigidRegion.read(args.region) if args.region else None
-        pose, frame = _reference_pose(args, timeline)
-        if region is None:
-            output_folder(args.out)  # an error comes before the search
-            tell("Scan4D looks for a region that stays rigid in all frames")
-            rows = found_region(timeline, pose, frame)
-        else:
-            rows = _rows(args, region, pose, frame)
-        reference = MotionReference.of(pose, rows, frame)
-        output_folder(args.out)
-        partial = PartialMotions(args.out / _PARTIAL, _key(args, timeline, pose.cloud.world()[rows]))
-        known = partial.read()
-        if known:
-            tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")
-        with progress(len(timeline) - len(known)) as tick:
-            for _ in stabilise(timeline, reference, limits.shift, known):
-                partial.save(known)
-                tick()
-        report(timeline, 0)
-        axes = _axes(args, pose)
-        states = {index: found.state(axes, limits) for index, found in known.items()}
-        rows_of_table = (_row(timeline, index, known[index], states[index]) for index in sorted(known))
-        save_rows(table, [_COLUMNS, *rows_of_table])
-        ids = rows if pose.cloud.ids is None else pose.cloud.ids[rows].astype(np.int64)
-        save_json(region_file, RigidRegion(np.empty((0, 4)), ids).to_json())
-        found = {
-            "version": __version__,
-            "scan": timeline.name,
-            "unit": timeline.unit,
-            "reference": _facts_of_reference(args, pose),
-            "region": _facts_of_region(args, pose, rows, reference),
-            **_facts_of_motions(known, states, limits, frame),
-            "weak_directions": [
-                {**asdict(one), "words": one.in_words(timeline.unit)}
-                for one in weak_directions(known, axes, limits)
-            ],
-        }
-        save_json(facts, found)
-        partial.end()
-        _tell(found, timeline)
-    for path in (table, facts, region_file):
+        paths = run_dense(args, timeline, _reference_pose) if args.dense else _stabilised(args, timeline)
+    for path in paths:
         tell(path)
     return 0
+
+
+def _stabilised(args: Namespace, timeline: Timeline) -> list[Path]:
+    """Find the motions of a region; gives the files that it wrote."""
+    table, facts, region_file = (args.out / name for name in (_TABLE, _REPORT, _REGION))
+    claim([table, facts, region_file], _inputs(args, timeline), args.force)
+    limits = WeakLimits(_millimetres(timeline, _CLOSE))
+    region = RigidRegion.read(args.region) if args.region else None
+    pose, frame = _reference_pose(args, timeline)
+    if region is None:
+        output_folder(args.out)  # an error comes before the search
+        tell("Scan4D looks for a region that stays rigid in all frames")
+        rows = found_region(timeline, pose, frame)
+    else:
+        rows = _rows(args, region, pose, frame)
+    reference = MotionReference.of(pose, rows, frame)
+    output_folder(args.out)
+    partial = PartialMotions(args.out / _PARTIAL, _key(args, timeline, pose.cloud.world()[rows]))
+    known = partial.read()
+    if known:
+        tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")
+    with progress(len(timeline) - len(known)) as tick:
+        for _ in stabilise(timeline, reference, limits.shift, known):
+            partial.save(known)
+            tick()
+    report(timeline, 0)
+    axes = _axes(args, pose)
+    states = {index: found.state(axes, limits) for index, found in known.items()}
+    rows_of_table = (_row(timeline, index, known[index], states[index]) for index in sorted(known))
+    save_rows(table, [_COLUMNS, *rows_of_table])
+    ids = rows if pose.cloud.ids is None else pose.cloud.ids[rows].astype(np.int64)
+    save_json(region_file, RigidRegion(np.empty((0, 4)), ids).to_json())
+    found = {
+        "version": __version__,
+        "scan": timeline.name,
+        "unit": timeline.unit,
+        "reference": _facts_of_reference(args, pose),
+        "region": _facts_of_region(args, pose, rows, reference),
+        **_facts_of_motions(known, states, limits, frame),
+        "weak_directions": [
+            {**asdict(one), "words": one.in_words(timeline.unit)}
+            for one in weak_directions(known, axes, limits)
+        ],
+    }
+    save_json(facts, found)
+    partial.end()
+    _tell(found, timeline)
+    return [table, facts, region_file]
 
 
 def _reference(text: str) -> int | str:

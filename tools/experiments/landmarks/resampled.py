@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -96,7 +97,24 @@ class ResampledDemo(_Anew):
 
     def load(self, index: int) -> PointCloud:
         """Sample one frame."""
-        chance, time, motion = self._chance(index), float(self.times()[index]), self.demo.motion
+        chance = self._chance(index)
+        rest_positions, normals, count = self._rest(chance)
+        albedo = colors.albedo(rest_positions, normals, count)
+        positions, turned = self._moved(rest_positions, normals, count, index)
+        return PointCloud.from_arrays(
+            positions + self._off(turned, chance),
+            colors=np.rint(255 * albedo).astype(np.uint8),
+            origin=np.zeros(3),
+            precise=False,
+        )
+
+    def paths(self, index: int, frames: Sequence[int]) -> NDArray[np.float64]:
+        """Where the points of a frame are in some frames, without noise, (F, N, 3)."""
+        rest_positions, normals, count = self._rest(self._chance(index))
+        return np.array([self._moved(rest_positions, normals, count, frame)[0] for frame in frames])
+
+    def _rest(self, chance: np.random.Generator) -> tuple[Rows, Rows, int]:
+        """The positions (3, N) and normals of the points of a frame at rest, and how many are of the skin."""
         rest = rest_points()
         if self._count is None:
             chosen = np.flatnonzero(chance.random(len(rest.radii)) < _KEPT)
@@ -108,14 +126,18 @@ class ResampledDemo(_Anew):
             _strewn(solid, chosen[rows], chance) for solid, rows in ((head.skin, skin), (head.eyes, ~skin))
         ]
         rest_positions, normals = (np.concatenate(rows, axis=1) for rows in zip(*parts, strict=True))
-        count = int(skin.sum())
-        albedo = colors.albedo(rest_positions, normals, count)
-        moved, turned, _ = move(rest_positions[:, :count], normals[:, :count], time, motion)
-        eyes, eye_normals = turn(rest_positions[:, count:], normals[:, count:], time, motion)
-        positions = np.concatenate([moved, eyes], axis=1).T
-        positions = positions + self._off(np.concatenate([turned, eye_normals], axis=1).T, chance)
-        return PointCloud.from_arrays(
-            positions, colors=np.rint(255 * albedo).astype(np.uint8), origin=np.zeros(3), precise=False
+        return rest_positions, normals, int(skin.sum())
+
+    def _moved(
+        self, rest: Rows, normals: Rows, count: int, index: int
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The positions and normals, both (N, 3), in a frame, of those at rest; `count` are of the skin."""
+        time, motion = float(self.times()[index]), self.demo.motion
+        moved, turned, _ = move(rest[:, :count], normals[:, :count], time, motion)
+        eyes, eye_normals = turn(rest[:, count:], normals[:, count:], time, motion)
+        return (
+            np.concatenate([moved, eyes], axis=1).T,
+            np.concatenate([turned, eye_normals], axis=1).T,
         )
 
 

@@ -9,6 +9,7 @@ long ways and stiffly, then closely and softly.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,6 +40,12 @@ _YIELDS = 0.7  # of the rounds, after which stretched edges yield
 _PREDICTED = 0.01  # weight of positions that the speed predicts, against the body's stiffness
 _STEPS = 60  # of conjugate gradients at most
 _CAPPED = 3.0  # node distances: a longer way counts as this one where poses are compared
+_UNSTRAINED = 0.1  # of a node's edges, that hold its map to a rotation
+_PROBES = 8  # random changes that say how exactly nodes are held
+_PROBING = 2  # threads
+_USUAL = 0.75  # of the nodes, that are strained less: strains are off by a share of this at least
+_SMOOTH = 3  # times that random strains are averaged with those beside them
+_HELD = 1e-6  # a smaller weight of a target holds nothing
 _STRETCH = 3.0  # spacings that count as much as a stretch by the whole length
 
 
@@ -53,6 +60,14 @@ class Grip(NamedTuple):
     weights: Float
     offsets: Float
     turns: Float
+
+
+class NodesAround(NamedTuple):
+    """The nodes (..., k) around positions, their weights, and the way from each, (..., k, 3)."""
+
+    nodes: NDArray[np.intp]
+    weights: Float
+    arms: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +124,7 @@ class DeformableBody:
         self._ones, self._others = np.nonzero(is_beside)
         self._firsts = np.searchsorted(self._ones, np.arange(count + 1))
         self._edges = rest[self._others] - rest[self._ones]
+        self._moments = self._products(rest, np.ones(len(self._edges)))
         self._surface = MomentSurface(some, reach)
         self._normals = normals_at(self._surface.held, rows)
         self.slips = np.zeros(count)
@@ -118,6 +134,15 @@ class DeformableBody:
         """Move it onto the points (P, 3) of the next frame; where there are none it stays.
 
         recurring: points that the frame it is in and the next one have in common; nodes beside them go along.
+        """
+        before, surface = self.pose, self._surface
+        self.go_to(points, recurring)
+        if len(points):
+            returned = self._drawn(self.pose, surface).positions - before.positions
+            self.slips = np.maximum(self.slips, np.linalg.norm(returned, axis=1))
+
+    def go_to(self, points: Float, recurring: RecurringPoints | None = None) -> None:
+        """Move it as `move_to` does, without the way back that tells slips.
 
         It begins both from where it is and from where its speed takes it: the better fit counts.
         """
@@ -128,14 +153,26 @@ class DeformableBody:
         surface = MomentSurface(some, self._spacing_of(points, some))
         targets = some[_spread(some, _TARGETS)[0]]
         known = None if recurring is None else recurring.moved(self.pose.positions, self._spacing)
-        found = [self._drawn(start, surface, known) for start in (self._predicted(before), self.pose)]
-        now = min(found, key=lambda pose: self._misfit(pose, targets))
-        returned = self._drawn(now, self._surface).positions - self.pose.positions
-        self.slips = np.maximum(self.slips, np.linalg.norm(returned, axis=1))
-        self.pose, self._surface = now, surface
+        starts = self._predicted(before), self.pose
+        others = surface.unfitted()  # each thread fits parabolas of its own
+        with ThreadPoolExecutor(1, "scan4d-body") as pool:
+            second = pool.submit(self._drawn, starts[1], others, known)
+            found = [self._drawn(starts[0], surface, known), second.result()]
+        self.pose = min(found, key=lambda pose: self._misfit(pose, targets))
+        self._surface = surface
+
+    def put(self, pose: BodyPose, before: BodyPose) -> None:
+        """Put it where it is in a frame, and was in the one before."""
+        self.pose, self._before = pose, before
 
     def gripped(self, positions: Float) -> Grip:
         """The grip of positions (..., 3) of the body as it is now."""
+        nodes, weights, arms = self.around(positions)
+        turns = self.pose.turns[nodes]
+        return Grip(nodes, weights, np.einsum("...ji,...j->...i", turns, arms), _mean(weights, turns))
+
+    def around(self, positions: Float) -> NodesAround:
+        """The nodes around positions (..., 3) of the body as it is now."""
         from scipy.spatial import cKDTree
 
         nodes = self._around[cKDTree(self.pose.positions).query(positions)[1]]
@@ -144,8 +181,47 @@ class DeformableBody:
         reach = 1.01 * np.maximum(away.max(axis=-1, keepdims=True), self.distance)
         weights = (1 - away / reach) ** 2
         weights /= weights.sum(axis=-1, keepdims=True)
-        turns = self.pose.turns[nodes]
-        return Grip(nodes, weights, np.einsum("...ji,...j->...i", turns, arms), _mean(weights, turns))
+        return NodesAround(nodes, weights, arms)
+
+    def deviations(
+        self, pose: BodyPose, stiffness: float, pulls: Float, noise: float, bending: float
+    ) -> Float:
+        """How far off nodes may be, (N,), root mean square (perturbation sampling: Papandreou and Yuille
+        2010): chance changes what holds them, and they are solved for anew.
+
+        pulls: (N, 3, 3), weights of targets, whose deviation is the noise, scan units. bending: strains are
+        off by this share of what they are around a node, and those of nodes near each other alike.
+        """
+        from .body_kernels import BodyEdges, NodeTargets, settle_nodes
+
+        count = len(pose.positions)
+        sizes, ways = np.linalg.eigh(pulls)
+        loosely = np.where(sizes > _HELD, noise / np.sqrt(np.maximum(sizes, _HELD)), 0.0)
+        strained = self._strained(BodyPose(pose.positions, rotations(pose.turns)))
+        squares = np.zeros(count)
+        np.add.at(squares, self._ones, (strained**2).sum(axis=1))
+        squares /= np.trace(self._moments, axis1=1, axis2=2) + 1e-300
+        usual = bending * np.sqrt(self._mean_around(np.maximum(squares, np.quantile(squares, _USUAL))))
+        edges = BodyEdges(self._firsts, self._others, self._edges, np.ones(len(self._edges)))
+
+        def moved(probe: int) -> Float:
+            chance = np.random.default_rng(probe)
+            wanted = np.einsum("nij,nj->ni", ways, loosely * chance.standard_normal((count, 3)))
+            strains = chance.standard_normal((count, 3, 3))
+            for _ in range(_SMOOTH):
+                strains = self._mean_around(strains)
+            strains *= usual[:, None, None] / max(float(strains.std()), 1e-300)
+            away = np.zeros((count, 3))
+            settle_nodes(edges, strains, stiffness, NodeTargets(pulls, wanted), _STEPS, away)
+            return away
+
+        with ThreadPoolExecutor(_PROBING, "scan4d-body") as pool:
+            squares = np.mean([(away**2).sum(axis=1) for away in pool.map(moved, range(_PROBES))], axis=0)
+        return np.sqrt(self._mean_around(squares))
+
+    def _mean_around(self, values: Float) -> Float:
+        """The means of values of nodes, (N, ...), over each and those beside it."""
+        return values[self._around].mean(axis=1)
 
     def carried(self, grip: Grip, pose: BodyPose | None = None) -> tuple[Float, Float]:
         """The positions that are held, (..., 3), and how each has been turned from when it was gripped, (...,
@@ -165,7 +241,7 @@ class DeformableBody:
         pose = BodyPose(wanted, now.turns @ before.turns.transpose(0, 2, 1) @ now.turns)
         pulls = np.broadcast_to(_PREDICTED * np.eye(3), (len(wanted), 3, 3))
         for _ in range(4):
-            pose = self._settled(pose, 1.0, pulls, wanted)
+            pose = self.settled(pose, 1.0, pulls, wanted)
         return pose
 
     def _drawn(
@@ -182,7 +258,7 @@ class DeformableBody:
             if known is not None:
                 pulls[known[1]], wanted[known[1]] = np.eye(3), known[0][known[1]]
             stiffness = _STIFF[0] ** (1 - share) * _STIFF[1] ** share
-            pose = self._settled(pose, stiffness, pulls, wanted, yields=share > _YIELDS)
+            pose = self.settled(pose, stiffness, pulls, wanted, yields=share > _YIELDS)
         return pose
 
     def _misfit(self, pose: BodyPose, targets: Float) -> float:
@@ -200,31 +276,61 @@ class DeformableBody:
         stretch = np.linalg.norm(edges, axis=1) / np.linalg.norm(self._edges, axis=1) - 1
         return mean(to) + mean(fro) + _STRETCH * float(np.sqrt(np.minimum(stretch**2, 1).mean()))
 
-    def _settled(
+    def settled(
         self, pose: BodyPose, stiffness: float, pulls: Float, wanted: Float, *, yields: bool = False
     ) -> BodyPose:
         """The pose after a step towards positions (N, 3) that are wanted of nodes, with weights (N, 3, 3).
 
         yields: whether stretched edges, as at joints, hold less.
         """
-        from .body_kernels import BodyEdges, NodeTargets, edge_products, settle_nodes
-
-        positions, products = pose.positions.copy(), np.empty_like(pose.turns)
         holds = self._holds(pose) if yields else np.ones(len(self._edges))
+        positions, products = self._moved(pose, stiffness, pulls, wanted, holds)
+        return BodyPose(positions, rotations(products))
+
+    def strained(self, pose: BodyPose, stiffness: float, pulls: Float, wanted: Float) -> BodyPose:
+        """The pose after a step as of `settled`, where strains that are alike around a node cost little.
+
+        Its turns are affine maps (as in embedded deformation: Sumner, Schmid and Pauly 2007): each the one
+        that fits the edges of the node best, drawn to a rotation.
+        """
+        positions, products = self._moved(pose, stiffness, pulls, wanted, np.ones(len(self._edges)))
+        hold = _UNSTRAINED * np.trace(self._moments, axis1=1, axis2=2)[:, None, None] + 1e-300
+        turns = products + hold * rotations(products)
+        return BodyPose(positions, turns @ np.linalg.inv(self._moments + hold * np.eye(3)))
+
+    def _moved(
+        self, pose: BodyPose, stiffness: float, pulls: Float, wanted: Float, holds: Float
+    ) -> tuple[Float, Float]:
+        """The positions of nodes after a step, and the products of their edges, now and at rest, (N, 3, 3).
+
+        holds: (E,), the share of its stiffness that each edge keeps.
+        """
+        from .body_kernels import BodyEdges, NodeTargets, settle_nodes
+
+        positions = pose.positions.copy()
         edges = BodyEdges(self._firsts, self._others, self._edges, holds)
         settle_nodes(edges, pose.turns, stiffness, NodeTargets(pulls, wanted), _STEPS, positions)
-        edge_products(edges, positions, products)
-        return BodyPose(positions, rotations(products))
+        return positions, self._products(positions, holds)
 
     def _holds(self, pose: BodyPose) -> Float:
         """How much of its stiffness each edge keeps, (E,): those that are stretched, as at joints, less."""
-        turns = 0.5 * (pose.turns[self._ones] + pose.turns[self._others])
-        off = (
-            pose.positions[self._others]
-            - pose.positions[self._ones]
-            - np.einsum("eij,ej->ei", turns, self._edges)
-        )
+        off = self._strained(pose)
         return 1 / (1 + (off**2).sum(axis=1) / (_YIELD**2 * (self._edges**2).sum(axis=1)))
+
+    def _products(self, positions: Float, holds: Float) -> Float:
+        """The sums of the products of each node's edges, at positions (N, 3) and at rest, (N, 3, 3)."""
+        from .body_kernels import BodyEdges, edge_products
+
+        products = np.empty((len(positions), 3, 3))
+        edges = BodyEdges(self._firsts, self._others, self._edges, holds)
+        edge_products(edges, positions, products)
+        return products
+
+    def _strained(self, pose: BodyPose) -> Float:
+        """How far each edge is from where its nodes, as they are turned, would have it, (E, 3)."""
+        turns = 0.5 * (pose.turns[self._ones] + pose.turns[self._others])
+        ways = pose.positions[self._others] - pose.positions[self._ones]
+        return ways - np.einsum("eij,ej->ei", turns, self._edges)
 
     def _spacing_of(self, points: Float, some: Float) -> float:
         """The spacing of some of the points, evenly chosen."""

@@ -1,0 +1,171 @@
+"""Where every point of a reference frame goes: paths, and how the surface stretches."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from ...files import reading, whole_file
+from .dense import PointState, TrackedFrame
+
+Float = NDArray[np.float64]
+
+_BESIDE = 24  # points of the reference frame that tell the strain at one of them
+_CARRY = 6  # that tell where a position between them goes
+_FLAT = 1e-9  # of the squared distances: points that are nearer to one line tell no strain
+_CHUNK = 20_000  # points at a time
+_LOST_HINT = "Delete the file and run scan4d motion --dense again"
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceStrain:
+    """How the surface around N points is stretched, (N,) each; NaN where it is not known.
+
+    first, second: principal strains, the larger first: 0.1 is 10 % longer. area: change of the area: 0.1 is
+    10 % larger.
+    """
+
+    first: Float
+    second: Float
+    area: Float
+
+
+@dataclass(frozen=True, eq=False)
+class Displacements:
+    """N points of a reference frame in F frames.
+
+    reference: (N, 3) float64, their positions as scanned. displacement: (F, N, 3) float32, from there, scan
+    units; NaN where a point is lost in a frame that cannot be read. sigma: (F, N) float32, standard
+    deviations of positions, scan units. state: (F, N) uint8, see `PointState`.
+    """
+
+    reference: Float
+    displacement: NDArray[np.float32]
+    sigma: NDArray[np.float32]
+    state: NDArray[np.uint8]
+
+    @classmethod
+    def read(cls, path: Path | str) -> Displacements:
+        """Read displacements.npz. Raises InputError."""
+        with reading(path, "does not hold displacements", _LOST_HINT):
+            try:
+                with np.load(path, allow_pickle=False) as held:
+                    found = cls(*(held[name] for name in ("reference", "displacement", "sigma", "state")))
+            except (KeyError, zipfile.BadZipFile, TypeError) as error:
+                raise ValueError(f"{type(error).__name__}: {error}") from error
+            count = len(found.reference)
+            frames = len(found.displacement)
+            if (
+                found.reference.shape != (count, 3)
+                or found.displacement.shape != (frames, count, 3)
+                or found.sigma.shape != (frames, count)
+                or found.state.shape != (frames, count)
+            ):
+                raise ValueError("the shapes of its arrays do not fit each other")
+            return found
+
+    def path(self, position: Float) -> Float:
+        """The positions of a place of the reference frame, (3,), in all frames, (F, 3); NaN where it is lost.
+
+        It goes along with the points nearest to it, the nearest above all.
+        """
+        away, rows = self._tree.query(position, min(_CARRY, len(self.reference)))
+        away, rows = np.atleast_1d(away), np.atleast_1d(rows)
+        weights = 1 / (away**2 + (0.1 * away.mean()) ** 2 + 1e-300)
+        return np.asarray(position) + self._mean(rows, weights)
+
+    def mean_path(self, rows: NDArray[np.integer]) -> Float:
+        """The mean positions of points of the reference frame, by rows (n,), in all frames, (F, 3): of a
+        region. In each frame all points count that are not lost there; NaN where all are."""
+        return self.reference[rows].mean(axis=0) + self._mean(rows, np.ones(len(rows)))
+
+    def strain(self, frame: int) -> SurfaceStrain:
+        """How the surface is stretched in a frame, against the reference frame.
+
+        Around each point, the map of the tangent plane that fits the moved neighbours best (least squares) is
+        the deformation gradient; its singular values are the principal stretches.
+        """
+        rows, slopes = self._gradients
+        moved = self.reference + self.displacement[frame]
+        moved[self.state[frame] == PointState.LOST] = np.nan
+        first, second = np.empty(len(rows)), np.empty(len(rows))
+        for start in range(0, len(rows), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            ways = moved[rows[part]] - moved[part, None]
+            gradient = np.einsum("nka,nki->nia", slopes[part], ways)
+            squares = np.einsum("nia,nib->nab", gradient, gradient)
+            middle = (squares[:, 0, 0] + squares[:, 1, 1]) / 2
+            apart = np.hypot((squares[:, 0, 0] - squares[:, 1, 1]) / 2, squares[:, 0, 1])
+            first[part] = np.sqrt(middle + apart)
+            second[part] = np.sqrt(np.maximum(middle - apart, 0.0))
+        return SurfaceStrain(first - 1, second - 1, first * second - 1)
+
+    def _mean(self, rows: NDArray[np.integer], weights: Float) -> Float:
+        """The weighted mean displacements of points, (F, 3)."""
+        held = np.where(self.state[:, rows] == PointState.LOST, 0.0, weights)
+        ways = np.where(held[..., None] > 0, self.displacement[:, rows], 0.0)
+        total = held.sum(axis=1, keepdims=True)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.einsum("fn,fnk->fk", held, ways) / total
+
+    @cached_property
+    def _tree(self) -> Any:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.reference)
+
+    @cached_property
+    def _gradients(self) -> tuple[NDArray[np.int32], Float]:
+        """The rows of the neighbours of each point, (N, k), and what each adds to the deformation gradient,
+        along two tangents, (N, k, 2)."""
+        count = len(self.reference)
+        rows = self._tree.query(self.reference, min(_BESIDE + 1, count))[1].reshape(count, -1)
+        rows = rows.astype(np.int32)
+        slopes = np.empty((*rows.shape, 2))
+        for start in range(0, count, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            ways = self.reference[rows[part]] - self.reference[part, None]
+            sizes, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", ways, ways))
+            tangents = axes[:, :, 1:]
+            flat = np.einsum("nki,nia->nka", ways, tangents)
+            squares = np.where(sizes[:, 1:] > _FLAT * sizes[:, 2:], sizes[:, 1:], np.nan)
+            slopes[part] = flat / squares[:, None]
+        return rows, slopes
+
+
+def save_displacements(
+    path: Path, reference: Float, frames: int, frame: Callable[[int], TrackedFrame]
+) -> None:
+    """Write displacements.npz, a frame at a time. frame: gives the points in each of so many frames.
+
+    Raises InputError.
+    """
+    count = len(reference)
+    with whole_file(path) as temporary, zipfile.ZipFile(temporary, "w") as held:
+        _add(held, "reference", np.float64, (count, 3), [reference])
+        parts: dict[str, tuple[DTypeLike, tuple[int, ...]]] = {
+            "displacement": (np.float32, (count, 3)),
+            "sigma": (np.float32, (count,)),
+            "state": (np.uint8, (count,)),
+        }
+        for name, (dtype, shape) in parts.items():
+            arrays = (getattr(frame(index), name) for index in range(frames))
+            _add(held, name, dtype, (frames, *shape), arrays)
+
+
+def _add(
+    held: zipfile.ZipFile, name: str, dtype: DTypeLike, shape: tuple[int, ...], arrays: Iterable[NDArray]
+) -> None:
+    """Add an array that comes in parts, in the format of numpy."""
+    about = {"descr": np.lib.format.dtype_to_descr(np.dtype(dtype)), "fortran_order": False, "shape": shape}
+    with held.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as stream:
+        np.lib.format.write_array_header_1_0(stream, about)
+        for array in arrays:
+            stream.write(np.ascontiguousarray(array, dtype).tobytes())
