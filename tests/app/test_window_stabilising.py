@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from rigid_hills import RigidHills, truth
 from scipy.spatial.transform import Rotation
-from virtual_screen import ROOT, Screen, running_app, wait_until_stored
+from virtual_screen import PANEL, ROOT, Screen, running_app, virtual_screen, wait_until_stored
 
 from viewer.analysis.motion.axes import NAMES as AXES
 from viewer.document.recording import Recording
@@ -100,7 +100,7 @@ def test_from_opening_to_a_stabilised_film_coloured_by_distance_in_eight_actions
         saved = Path(app.told(r"Saved (.+\.png)")[1])
         (entry,) = Recording.load(saved).entries
         assert entry.stabilised is not None
-        assert (entry.stabilised.region, entry.stabilised.reference) == ("found by scan4d", 0)
+        assert (entry.stabilised.region, entry.stabilised.reference) == ("found by Scan4D", 0)
         assert not entry.stabilised.is_gap
         redraw = [sys.executable, "-m", "viewer.cli", "render", "--replay", str(saved), "-o"]
         here = {**os.environ, "PYTHONPATH": str(ROOT)}
@@ -121,4 +121,46 @@ def test_from_opening_to_a_stabilised_film_coloured_by_distance_in_eight_actions
         assert np.linalg.norm(np.radians(turn)) == pytest.approx(wanted, abs=0.01)
         app.press("shift+u")
         assert app.state.document["look"]["color_by"] == "auto"
+        assert "Traceback" not in app.log()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scale", [1, 2])
+def test_a_region_is_painted_shown_and_taken_back(tmp_path: Path, scan: Path, scale: int) -> None:
+    folder = tmp_path / "screen"
+    folder.mkdir()
+    with (
+        virtual_screen(folder, (1024 * scale, 640 * scale), scale) as screen,
+        running_app(screen, tmp_path, scan, before=alone(tmp_path)) as app,
+    ):
+        app.press("Right")
+        app.choose(PANEL, "##region", "###painted")
+        app.act(PANEL, ("item_click", "###paint"))
+        assert app.settle().frame == 0, "painting is in the reference frame"
+        assert app.state.clicking == "stabilising"
+        left, top, width, height = app.view()
+        y = top + height // 2
+        app.drag((left + width * 0.3, y), (left + width * 0.4, y), (left + width * 0.5, y))
+        away = [(left + width * x, y + height * z) for z in (-0.1, 0.1) for x in (0.2, 0.25, 0.3, 0.4, 0.5)]
+        app.drag(*away)
+        (painted,) = app.state.document["parts"].values()
+        assert painted["region"] == "painted"
+        assert len(painted["spheres"]) >= 10
+        assert not app.state.moved or app.state.moved == STILL.tolist()
+        app.do(("mousemove", left + int(width * 0.45), y + height // 12), ("click", 1))
+        more = app.settle().document["parts"]["stabilising"]
+        assert len(more["spheres"]) == len(painted["spheres"]) + 1, "a click paints, too"
+        app.press("ctrl+z")
+        assert app.state.document["parts"]["stabilising"] == painted
+        app.do(("mousemove", left + 5, top + height - 5), ("click", 1))
+        app.told("No surface here")
+        app.press("Escape", "Escape")
+        assert app.state.clicking is None
+        app.press("u")
+        app.act(PANEL, ("item_click", "Show region"))
+        assert app.settle().color_range == [0, 1]
+        app.press("Right", "Right")
+        assert is_back(app.state.moved, 2)
+        cut = {where for where in app.state.cut if "stabilising" in str(where).lower()}
+        assert not cut
         assert "Traceback" not in app.log()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from rigid_hills import RigidHills, opened, truth
 
-from viewer.analysis.motion.distances import distances_from, unknown_distances
+from viewer.analysis.motion.distances import distances_from, in_region, unknown_distances
 from viewer.analysis.motion.stabilise import moment_surface
 from viewer.rigid import STILL
 from viewer.scan.points import PointCloud
@@ -31,3 +31,7 @@ def test_what_moved_as_one_is_near_and_what_rose_is_not() -> None:
     assert np.nanquantile(found[x < 7], 0.9) < 0.1
     assert np.nanmedian(found[x > 13]) > 1.0
     assert np.isnan(unknown_distances(3)).all()
+    rows = np.flatnonzero(reference.world()[:, 0] < 0)
+    told = in_region(surface, reference.origin, cloud, back, rows)
+    assert told[x < -1].min() == 1
+    assert told[x > 1].max() == 0

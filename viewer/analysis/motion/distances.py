@@ -1,4 +1,4 @@
-"""How far the points of a frame, moved to the reference, lie from the surface of the reference frame."""
+"""Points of a frame, moved to the reference: how far they lie from its surface, and which are of a region."""
 
 from __future__ import annotations
 
@@ -32,3 +32,21 @@ def distances_from(
     moved = reference_from_frame.points(cloud.world()) - origin
     heights = heights_over(surface.held, np.ascontiguousarray(moved), _REACH * surface.spacing)
     return np.abs(heights).astype(np.float32)
+
+
+def in_region(
+    surface: MomentSurface,
+    origin: Float,
+    cloud: PointCloud,
+    reference_from_frame: Rigid,
+    rows: NDArray[np.int64],
+) -> NDArray[np.float32]:
+    """Whether each point of a cloud is of a region of the reference, (N,): 1 where the nearest point of the
+    reference is, 0 elsewhere, NaN where there is none near. rows: of the region in the reference."""
+    from .region_kernels import rows_nearest
+
+    moved = reference_from_frame.points(cloud.world()) - origin
+    nearest = rows_nearest(surface.held, np.ascontiguousarray(moved), _REACH * surface.spacing)
+    is_in = np.zeros(len(surface.held.points), np.float32)
+    is_in[rows] = 1.0
+    return np.where(nearest < 0, np.nan, is_in[nearest]).astype(np.float32)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from imgui_bundle import ImVec2
 from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
@@ -22,12 +23,14 @@ from ....output.overlays import NOTHING_DRAWN, DrawnMarks, Stabilised
 from ....rigid import STILL, Rigid
 from ....scan.pose import Pose
 from ...commands import Command
-from ...tool_context import FrameSpan, ToolContext
+from ...scene.canvas import Canvas, ScreenView
+from ...tool_context import Click, FrameSpan, ToolContext
 from ...ui import Ui
 from .._cached import Cached
 from . import panel
 from .choices import Settings, Stabilising
-from .distance_colors import DistanceColors
+from .motion_colors import REGION, MotionColors
+from .painting import Painting
 from .stabiliser import Asked, Stabiliser
 from .words import Facts, facts_of, motion_gap_spans
 
@@ -36,12 +39,17 @@ _COLORED = 4.0  # times the limit of what is close: the distance that has the la
 
 
 class Tool:
-    """The tool that stabilises the scan. stabiliser: has motions found. colors: has distances found."""
+    """The tool that stabilises the scan. stabiliser: has motions found. colors: has numbers found to colour
+    by. painting: the brush that paints the region.
+
+    The class has more than 30 methods because each hook of a tool and each of its commands is one.
+    """
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context
         self.stabiliser = Stabiliser(context)
-        self.colors = DistanceColors(context)
+        self.colors = MotionColors(context)
+        self.painting = Painting(context)
         self._cached = Cached()
         self._laid: tuple[object, ...] = ()
 
@@ -50,9 +58,9 @@ class Tool:
         """The choices about the open scan."""
         return self.context.document.part(Stabilising)
 
-    def choose(self, step: str, **changes: Any) -> None:
-        """Change choices. step: what Undo calls it."""
-        self.context.change(step, replace(self.choices, **changes))
+    def choose(self, step: str, *, merge: bool = False, **changes: Any) -> None:
+        """Change choices. step: what Undo calls it. merge: with the same change just before."""
+        self.context.change(step, self.choices.changed(**changes), merge=step if merge else None)
 
     @property
     def frame(self) -> int:
@@ -73,24 +81,44 @@ class Tool:
         """Whether the colours show distances from the reference."""
         return self.context.document.look.color_by == distances.NAME
 
+    @property
+    def shows_region(self) -> bool:
+        """Whether the colours show the rigid region."""
+        return self.context.document.look.color_by == REGION
+
+    def toggle_region(self) -> None:
+        """Colour the rigid region, for which the scan is stabilised; or as usual."""
+        self._color_by(None if self.shows_region else REGION, "Show region", 1.0)
+
     def toggle_colors(self) -> None:
         """Colour the scan by distances from the reference frame, for which it is stabilised; or as usual.
         Raises InputError for a scan of one frame."""
+        close = self.stabiliser.close
+        high = None if close is None else _COLORED * close
+        self._color_by(None if self.is_colored else distances.NAME, "Colour by distance", high)
+
+    def _color_by(self, name: str | None, step: str, high: float | None) -> None:
+        """Colour by a number of a motion, from 0 to an end; None: as usual."""
         look, usual = self.context.document.look, Look()
-        if self.is_colored:
+        if name is None:
             look = replace(look, color_by=usual.color_by, low=usual.low, high=usual.high)
             self.context.change("Change colours", look=look)
             return
         self._check_frames()
-        close = self.stabiliser.close
-        high = None if close is None else _COLORED * close
-        look = replace(look, color_by=distances.NAME, low=0.0, high=high)
-        self.context.change("Colour by distance", replace(self.choices, is_shown=True), look=look)
+        look = replace(look, color_by=name, low=0.0, high=high)
+        self.context.change(step, self.choices.changed(is_shown=True), look=look)
         self.stabiliser.resume()
 
     def _check_frames(self) -> None:
         if len(self.context.timeline) < 2:
             raise InputError("The scan has one frame, so there is no motion to remove.")
+
+    @property
+    def placed(self) -> list[str]:
+        """The names of the landmarks that the user set in the reference frame, in their order."""
+        frame = self.choices.reference
+        named = self.context.document.part(Landmarks).listed
+        return [one.name for one in named if one.key_at(frame) is not None]
 
     @property
     def _places(self) -> Mapping[str, Vector]:
@@ -104,8 +132,9 @@ class Tool:
         """Have motions found, and the scan shown by them; whether there is something new."""
         choices = self.choices
         asked = Asked.of(self.context.timeline, self.context.unit, choices, self._places)
-        is_new = self.stabiliser.advance(asked, choices.is_shown)
-        self.colors.advance(self.stabiliser.motions, self.is_colored)
+        is_wanted = choices.is_shown and not (self.painting.is_on or choices.is_empty)
+        is_new = self.stabiliser.advance(asked, is_wanted)
+        self.colors.advance(self.stabiliser.motions, self.is_colored or self.shows_region)
         self.context.followed.motion = self._curves()
         return self._lay() or is_new
 
@@ -125,7 +154,7 @@ class Tool:
         return True
 
     def _numbers(self, pose: Pose) -> Mapping[str, NDArray[np.float32]]:
-        return {distances.NAME: self.colors.of(pose)}
+        return self.colors.of(pose)
 
     @property
     def _is_whole(self) -> bool:
@@ -192,6 +221,39 @@ class Tool:
         choices, is_gap = self.choices, self.context.followed.still[frame] is None
         return DrawnMarks(stabilised=Stabilised(choices.words, choices.reference, is_gap))
 
+    def overlay(self, canvas: Canvas, view: ScreenView) -> None:
+        """Draw what is painted, while drags paint."""
+        self.painting.draw(canvas, view)
+
+    def prompt(self) -> str:
+        """The words that say what a drag does."""
+        return self.painting.prompt()
+
+    def on_click(self, click: Click) -> bool:
+        """Paint where the user clicked."""
+        self.painting.take(click, ends=True)
+        return True
+
+    def on_press(self, mouse: ImVec2) -> bool:
+        """Whether a drag paints."""
+        return self.painting.is_on
+
+    def on_drag(self, click: Click, ends: bool) -> None:
+        """Paint over a position."""
+        self.painting.take(click, ends)
+
+    def on_escape(self) -> bool:
+        """Put the brush away; whether it was there."""
+        return self.painting.put_away()
+
+    def is_under_way(self) -> bool:
+        """Whether something is being painted."""
+        return self.painting.is_under_way
+
+    def abandon(self) -> None:
+        """Let go of what is being painted."""
+        self.painting.abandon()
+
     def spans(self) -> list[FrameSpan]:
         """The gaps, while the scan is shown stabilised."""
         known = self.stabiliser.known
@@ -215,3 +277,4 @@ COMMANDS = {
         ),
     )
 }  # fmt: skip
+MOUSE = (("Drag, while painting a region", "Add the surface under the brush to the rigid region"),)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +35,18 @@ class Stabilising(Part, name="stabilising"):
         """The region in words, without names of landmarks."""
         count = {PAINTED: len(self.spheres), LANDMARKS: len(self.landmarks)}.get(self.region, 0)
         what = {PAINTED: "painted spheres", LANDMARKS: f"landmarks, {self.radius:g} around each"}
-        return f"{count} {what[self.region]}" if self.region in what else REGION_WORDS[FOUND].lower()
+        return f"{count} {what[self.region]}" if self.region in what else "found by Scan4D"
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the region has yet to be chosen."""
+        return (self.region == PAINTED and not self.spheres) or (
+            self.region == LANDMARKS and not (self.landmarks and self.radius > 0)
+        )
+
+    def changed(self, **changes: Any) -> Stabilising:
+        """The choices with some others."""
+        return replace(self, **changes)
 
     @property
     def of_motions(self) -> Stabilising:

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from ....scan.times import frame_in_words
 from ... import widgets
 from ...ui import Ui
-from .choices import Settings
+from .choices import LANDMARKS, PAINTED, REGION_WORDS, Settings
 
 if TYPE_CHECKING:
     from . import Tool
@@ -28,12 +28,67 @@ def draw(tool: Tool, ui: Ui) -> None:
         tool.choose("Set reference frame", reference=tool.frame)
     imgui.end_disabled()
     widgets.tooltip("Have the region in all frames stand as it stands in this frame")
+    _draw_region(tool, ui)
     _draw_state(tool, ui)
+
+
+def _draw_region(tool: Tool, ui: Ui) -> None:
+    """The choice of the region, and what it needs."""
+    choices = tool.choices
+    widgets.label("Rigid region", "The part of the subject whose motion Scan4D removes")
+    region = widgets.combo("region", choices.region, list(REGION_WORDS), REGION_WORDS)
+    if region != choices.region:
+        radius = choices.radius or tool.painting.radius
+        tool.choose("Choose region", region=region, radius=radius)
+    if region == PAINTED:
+        row = ui.row(widgets.labelled("Stop painting" if tool.painting.is_on else "Paint", "paint"), "Clear")
+        if row.button():
+            tool.painting.toggle()
+        widgets.tooltip("Drag over the parts that stay rigid, in the reference frame")
+        imgui.begin_disabled(not choices.spheres)
+        if row.button():
+            tool.choose("Clear region", spheres=())
+        imgui.end_disabled()
+        widgets.tooltip("Delete what you have painted. Undo restores it")
+        brush = _draw_radius(tool, "Brush", "Radius of the brush", tool.painting.radius)
+        if brush is not None:
+            tool.painting.radius = brush
+    if region == LANDMARKS:
+        _draw_landmarks(tool)
+
+
+def _draw_landmarks(tool: Tool) -> None:
+    """The landmarks in the reference frame, each with whether the region is around it, and its radius."""
+    choices, placed = tool.choices, tool.placed
+    if not placed:
+        widgets.faint(f"No landmark is placed in {frame_in_words(choices.reference)}.")
+    for number, name in enumerate(placed):
+        label = widgets.labelled(name, f"landmark {number}")
+        changed, is_on = imgui.checkbox(label, name in choices.landmarks)
+        if changed:
+            others = tuple(one for one in choices.landmarks if one != name)
+            tool.choose("Choose region", landmarks=(*others, name) if is_on else others)
+    about = "Radius of the region around each landmark"
+    if (radius := _draw_radius(tool, "Radius", about, choices.radius)) is not None:
+        tool.choose("Set radius of region", merge=True, radius=radius)
+
+
+def _draw_radius(tool: Tool, title: str, about: str, radius: float) -> float | None:
+    """A field for a radius, scan units; None where it is not edited."""
+    scale = tool.context.scale
+    widgets.label(title, about)
+    shown = scale.factor * radius
+    form = widgets.number_format("%.3g", scale.unit)
+    changed, new = imgui.drag_float(f"##{title}", shown, 0.01 * shown or 0.01, 0.0, 1e9, form)
+    return max(float(f"{new / scale.factor:.6g}"), 1e-9) if changed else None
 
 
 def _draw_state(tool: Tool, ui: Ui) -> None:
     """Say how far the motions are known, and what is known of them."""
     motions, stabiliser = tool.stabiliser.motions, tool.stabiliser
+    if tool.choices.is_empty:
+        widgets.faint("The region is empty: paint it, or tick its landmarks.")
+        return
     if motions is None:
         widgets.faint("Scan4D finds the part of the subject that keeps its shape, and removes its motion.")
         return
@@ -50,6 +105,10 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
     ui.tooltip("Colour the scan by its distance from the surface of the reference frame", "distance_colors")
     if changed:
         tool.toggle_colors()
+    changed, _ = imgui.checkbox("Show region", tool.shows_region)
+    widgets.tooltip("Colour the part of the subject that counts as rigid")
+    if changed:
+        tool.toggle_region()
     widgets.faint("Curves of the motion (V plots them):")
     tool.context.settings = widgets.edit(tool.context.settings, Settings())
     for line in facts.lines:

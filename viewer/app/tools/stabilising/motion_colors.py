@@ -1,24 +1,27 @@
-"""Distances from the reference frame, to colour the scan by: found beside the window for frames in memory."""
+"""Numbers to colour the scan by, found beside the window for frames in memory: how far each point is from the
+reference frame, and whether it is of the rigid region."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ....analysis.motion.distances import distances_from, unknown_distances
-from ....rigid import Rigid
+from ....analysis.motion import distances
+from ....analysis.motion.distances import distances_from, in_region, unknown_distances
 from ....scan.pose import Life, Pose
 from ....task import Task
 from ...tool_context import ToolContext
 from .stabiliser import Motions
 
-Values = NDArray[np.float32]
+Values = Mapping[str, NDArray[np.float32]]
+REGION = "rigid region"  # 1 in the region, 0 elsewhere
 
 
-class DistanceColors:
-    """The distances of the frames that are in memory; each goes with its frame."""
+class MotionColors:
+    """The numbers of the frames that are in memory; each goes with its frame."""
 
     def __init__(self, context: ToolContext) -> None:
         self._context = context
@@ -28,11 +31,11 @@ class DistanceColors:
         self._task: Task | None = None
 
     def of(self, pose: Pose) -> Values:
-        """The distances of a pose, by row of its cloud; NaN as long as they are not known."""
+        """The numbers of a pose by name, by row of its cloud; NaN as long as they are not known."""
         if (found := self._found.get(pose.life)) is not None:
             return found
         if (unknown := self._unknown.get(pose.life)) is None:
-            unknown = self._unknown[pose.life] = unknown_distances(len(pose.cloud))
+            unknown = self._unknown[pose.life] = _unknown(pose)
         return unknown
 
     def advance(self, motions: Motions | None, is_wanted: bool) -> None:
@@ -48,12 +51,16 @@ class DistanceColors:
             return
         motion, found = motions.known[pose.index].motion, self._found
         if motion is None:
-            found[pose.life] = unknown_distances(len(pose.cloud))
+            found[pose.life] = _unknown(pose)
             return
-        surface, origin, back = motions.reference.surface, motions.reference.origin, motion.inverse
+        reference, rows, back = motions.reference, motions.rows, motion.inverse
 
-        def find(pose: Pose = pose, back: Rigid = back) -> Values:
-            return distances_from(surface, origin, pose.cloud, back)
+        def find() -> Values:
+            surface, origin, cloud = reference.surface, reference.origin, pose.cloud
+            return {
+                distances.NAME: distances_from(surface, origin, cloud, back),
+                REGION: in_region(surface, origin, cloud, back, rows),
+            }
 
         def take(values: Values) -> None:
             found[pose.life] = values
@@ -69,3 +76,7 @@ class DistanceColors:
             if pose is not None and pose.life not in self._found:
                 return pose
         return None
+
+
+def _unknown(pose: Pose) -> Values:
+    return dict.fromkeys((distances.NAME, REGION), unknown_distances(len(pose.cloud)))
