@@ -181,6 +181,11 @@ class View:
         nearest = middles @ normals.T + halves @ np.abs(normals).T + constants
         return nearest.min(axis=1) >= 0
 
+    @property
+    def eye(self) -> NDArray[np.float64]:
+        """The origin of view space, (3,), along the pose's axes: in perspective, the position of the eye."""
+        return self.origin - self.rotation.T @ self.translation
+
     def faces_away(self, positions: NDArray[np.floating], normals: NDArray[np.floating]) -> NDArray[np.bool_]:
         """Tell which points (N, 3), relative to the origin, have a normal (N, 3) that points away from the
         eye; those without one do not."""

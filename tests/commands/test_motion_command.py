@@ -89,7 +89,9 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
 
     with monkeypatch.context() as patch:
         patch.setattr(stabilise, "register_region", interrupted)
-        assert run(*words, "out").code != 0
+        stopped = run(*words, "out")
+    assert stopped.code != 0
+    assert "out/transforms.partial keeps the frames so far" in stopped.err
     partial = Path("out/transforms.partial")
     whole = partial.read_text()
     assert len(json.loads(whole)["frames"]) == 2

@@ -26,10 +26,8 @@ def visible_ids(request: Request, size: tuple[int, int]) -> NDArray[np.uint32]:
     bounds = pose.drawn_bounds(request.camera)
     view = View.of(request.camera, size, pose.origin, bounds, motion)
     offsets = cloud.positions + (cloud.origin - view.origin)
-    if view.perspective:
-        eye = view.origin - view.rotation.T @ view.translation
-    else:
-        eye = bounds.center + _FAR * (bounds.radius or 1.0) * view.rotation[2]
+    far = _FAR * (bounds.radius or 1.0)
+    eye = view.eye if view.perspective else bounds.center + far * view.rotation[2]
     seen = visible_points(pose, eye, gpu=shared_renderer().gpu)
     inside = view.contains(offsets)
     ids = np.flatnonzero(inside).astype(np.uint32) if cloud.ids is None else cloud.ids[inside]

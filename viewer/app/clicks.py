@@ -17,7 +17,7 @@ from ..rigid import STILL, Rigid
 from ..scan.pose import Pose
 from .scene.viewport import Viewport
 
-_FILLED = "Click beside the hole, or zoom in and click at a point."
+_FILLED = "Click beside the hole, or zoom in and click on a point."
 _MAY_FILL = "Zoom in, or tick 'Allow clicks on filled holes'."
 _DOUBTFUL = "Click here again to use it anyway, or turn the view to see the surface from its front."
 _SAME = 3.0  # pixels, within which two clicks are in one place

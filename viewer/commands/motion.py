@@ -96,9 +96,13 @@ def _stabilised(args: Namespace, timeline: Timeline) -> list[Path]:
     if known:
         tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")
     with progress(len(timeline) - len(known)) as tick:
-        for _ in stabilise(timeline, reference, limits.shift, known):
-            partial.save(known)
-            tick()
+        try:
+            for _ in stabilise(timeline, reference, limits.shift, known):
+                partial.save(known)
+                tick()
+        except KeyboardInterrupt:
+            warn(f"{partial.path} keeps the frames so far. To continue, run the same command again")
+            raise
     report(timeline, 0)
     axes = _axes(args, pose)
     states = {index: found.state(axes, limits) for index, found in known.items()}

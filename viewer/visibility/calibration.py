@@ -58,7 +58,7 @@ def directions_of(cloud: PointCloud, origin: NDArray[np.float64], view: View) ->
     of the cloud are relative to on the GPU."""
     body = body_of(cloud)
     if view.perspective:
-        eye = _snapped(view.origin - view.rotation.T @ view.translation, body)
+        eye = _snapped(view.eye, body)
         return Sectors.around(body.center, body.radius, eye, origin), body
     return Sectors.along(body.center, body.radius, -view.rotation[2], origin), body
 

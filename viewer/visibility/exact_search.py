@@ -43,11 +43,7 @@ def find_on_cpu(
     """
     sectors, body = directions_of(cloud, view.origin, view)
     far = _FAR * body.radius
-    eye = (
-        view.origin - view.rotation.T @ view.translation
-        if view.perspective
-        else body.center + far * view.rotation[2]
-    )
+    eye = view.eye if view.perspective else body.center + far * view.rotation[2]
     if radius is None and searched:
         if not view.perspective:
             raise InputError(

@@ -215,10 +215,9 @@ class OctreeCuts:
 
 def sight_of(view: View) -> Sight:
     """The view as a cut has to know it."""
-    eye = view.origin - view.rotation.T @ view.translation
     (width, height), (right, down) = view.size, view.shift
     size = (width + 2 * math.ceil(abs(right)), height + 2 * math.ceil(abs(down)))
-    return Sight(eye, view.rotation, view.scale, size, view.near, view.far, view.perspective)
+    return Sight(view.eye, view.rotation, view.scale, size, view.near, view.far, view.perspective)
 
 
 def _unlike(octree: Octree, cut: Cut, origin: NDArray[np.float64]) -> NDArray[np.float32]:
