@@ -1,6 +1,7 @@
 // The plane through a neighborhood by linear regression (Preiner 2012, 6), and its splat.
 #include "common/cell_reach.glsl"
 #include "common/color.glsl"
+#include "common/flat_reach.glsl"
 #include "auto_splats/eigen.glsl"
 #include "auto_splats/splat.glsl"
 
@@ -96,15 +97,13 @@ vec4 closing(vec4 bounds, float share) {
     return mix(closed, vec4(share), greaterThan(reach, vec4(OPEN * share)));
 }
 
-// How far a splat may reach, in radii of the neighborhood. At tips and on horns, points lie on no plane: a splat that
-// is wider than they are would stand out of the surface. Noise makes no tip.
-float flat_reach(Extent extent, vec3 values, int count, float scale) {
+// In radii of the neighborhood. Noise makes no tip.
+float reach_of_plane(Extent extent, vec3 values, int count, float scale) {
     float blur = noise * unit * scale, thickness = values.x - NOISY * blur * blur * float(count);
     float spread = sqrt(2.0 * values.y / float(count)), flatness = FLAT * values.y / max(thickness, 1e-9);
     float close = 0.0;  // by no index that compilers do not know, as the array would go to memory
     for (int k = 1; k <= CLOSE; ++k) close = k < extent.count ? near_squared[k] : close;
-    float halfway = 0.5 * LEANING * scale * sqrt(close);
-    return max(halfway, spread * max(flatness, 1.0));
+    return flat_reach(0.5 * LEANING * scale * sqrt(close), spread, flatness);
 }
 
 // The radius of a splat: how far the places reach that are nearer to the point than to any other one, its Voronoi cell in
@@ -132,7 +131,7 @@ float splat_radius(Extent extent, int count, vec3 values, vec3 normal, float cro
         vec4 four = max(closing(highest[part], share), closing(-lowest[part], share));
         reach = max(reach, max(max(four.x, four.y), max(four.z, four.w)));
     }
-    return radius * min(reach, flat_reach(extent, values, count, scale));
+    return radius * min(reach, reach_of_plane(extent, values, count, scale));
 }
 
 // Returns how far lines beside it are looked for where all neighbors are on a line, scan units; else 0.

@@ -185,6 +185,44 @@ def test_they_are_those_that_are_plainly_computed(renderer: Renderer) -> None:
     assert max(wrong.values()) <= 0.04 * len(splats), wrong
 
 
+def plain_limit(positions: NDArray[np.float64], normal: NDArray[np.float64], row: int) -> float:
+    """How far the disc of a point may reach as points around it lie on no plane."""
+    d = np.delete(positions - positions[row], row, axis=0)
+    distance = np.linalg.norm(d, axis=1)
+    third = np.sort(distance)[2]
+    d = d[distance <= 2 * third]
+    u = np.cross((0.0, 1.0, 0.0), normal)
+    u /= np.linalg.norm(u)
+    across = d @ np.stack([u, np.cross(normal, u)], axis=1) @ directions(8).T
+    narrow = np.maximum(across, 0).max(axis=0)
+    narrow = 0.5 * (narrow + np.roll(narrow, 4)).min()
+    heights = np.append(d @ normal, 0)
+    return float(max(0.85 * third, narrow * max(1.5 * narrow**2 / np.ptp(heights) ** 2, 1)))
+
+
+def test_with_estimated_normals_discs_are_small_where_points_lie_on_no_plane(renderer: Renderer) -> None:
+    along, turn = np.random.default_rng(7).random((2, 300))
+    around = np.stack([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn)], axis=1)
+    width = 0.06 * np.sqrt(along)[:, None]
+    pose = renderer.resident(
+        Pose(0, 0.0, "needle", PointCloud.from_arrays(np.column_stack([width * around, along])))
+    )
+    normals = np.column_stack([around, np.zeros(300)])
+    pose.add_estimates({"normals": normals.astype(np.float32)})
+    gaps, radii = GapRadii(pose), []
+    for fits in (False, True):
+        assert gaps.find(pose, wait=True, fits=fits)
+        radii.append(np.frombuffer(gaps.buffers["radii"].buffer.read(), np.float32))
+    gaps.release()
+    positions = pose.cloud.positions.astype(np.float64)
+    limits = np.array([plain_limit(positions, normals[row], row) for row in range(300)])
+    smaller = radii[1] < radii[0]
+    assert 30 < np.count_nonzero(smaller) < 270
+    other = ~np.isclose(radii[1], limits, rtol=1e-3)
+    assert np.count_nonzero(smaller & other) <= 8  # whose gaps are as large as a cell of the grid
+    assert np.count_nonzero(~smaller & (limits < 0.99 * radii[0])) < 15  # in rows
+
+
 def test_order_and_copies_change_nothing(renderer: Renderer) -> None:
     cloud = random_torus(2000)
     gaps = [renderer.resident(Pose(0, 0.0, "a", cloud)).cached(GapRadii)]

@@ -58,6 +58,9 @@ _FIT = {
     "BELOW": 0.06,  # sine of the angle by which these lie below the splat's plane at least
     "SLACK": 0.13,  # radii that a splat may rise over their planes
     "LEAST_CUT": 0.05,  # radii that it would rise higher
+    "AROUND_CLOSE": 2.0,  # times as far as the third neighbour: points that tell whether they lie on a plane
+    "FLAT": 1.5,  # squared half-widths, up to which squared thicknesses are those of a plane
+    "BESIDE": 0.85,  # distances to the third neighbour that a disc reaches elsewhere
 }
 _ENOUGH = 100.0  # points on a square as wide as a cell, in squared radii of one: denser ones are thinned out
 _STRAY = 4.0  # usual radii: what is farther from all others is beside the surface

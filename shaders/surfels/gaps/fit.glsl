@@ -1,6 +1,8 @@
 // Makes a splat of a point's cell where a disc would reach too far: an ellipse around the corners of the cell, whose middle
 // need not be the point, and the planes of neighbours that end it. Lengths are in cells of the grid.
-// The plain version is `plain` in tests/splatting/test_fitted.py.
+// LIMITED: where the nearest points lie on no plane, a small disc. The plain version is `plain` in
+// tests/splatting/test_fitted.py.
+#include "common/flat_reach.glsl"
 #include "surfels/cell.glsl"
 
 layout(std430, binding = STORAGE_CELL_AXES) writeonly buffer Axes { vec4 cell_axes[]; };
@@ -165,6 +167,38 @@ vec3 packed_planes(float turn, float longer) {
     return words;
 }
 
+float limit = UNKNOWN;  // how far a splat may reach
+
+#if LIMITED
+vec3 close = vec3(UNKNOWN);  // squared distances of the nearest, ascending, no two the same
+float lowest_height = 0.0, highest_height = 0.0;
+vec4 least_along = vec4(0.0), most_along = vec4(0.0);  // in four directions of the tangent plane
+
+// Whatever the order, and however often the same.
+void take_close(float squared) {
+    if (squared == 0.0 || squared == close.x || squared == close.y || squared >= close.z) return;
+    if (squared < close.x) close = vec3(squared, close.xy);
+    else close.yz = squared < close.y ? vec2(squared, close.y) : vec2(close.y, squared);
+}
+
+// Of points a little farther than the nearest: how far they lie along the normal and across.
+void take_extent(vec3 d, float squared, vec3 n, vec3 u, vec3 v) {
+    if (squared > AROUND_CLOSE * AROUND_CLOSE * close.z) return;
+    float height = dot(d, n), x = dot(d, u), y = dot(d, v);
+    lowest_height = min(lowest_height, height);
+    highest_height = max(highest_height, height);
+    vec4 along = vec4(x, y, 0.70710678 * (x + y), 0.70710678 * (x - y));
+    least_along = min(least_along, along);
+    most_along = max(most_along, along);
+}
+
+float limit_of_plane() {
+    vec4 wide = 0.5 * (most_along - least_along);
+    float narrow = min(min(wide.x, wide.y), min(wide.z, wide.w)), thick = max(highest_height - lowest_height, 1e-9);
+    return flat_reach(BESIDE * sqrt(close.z), narrow, FLAT * (narrow / thick) * (narrow / thick));
+}
+#endif
+
 // How far sides reach. One that does not end near the rough ellipse counts as little more than that, so that splats do
 // not fill holes. inverse: one over twice how far they reach.
 vec4 ended(vec4 inverse) {
@@ -187,9 +221,10 @@ void store_fit(uint row, vec3 place, vec3 n) {
     }
     Ellipse found = ellipse_round(corners, ROUNDS);
     float area = found.lengths.x * found.lengths.y, farthest = length(found.middle) + found.lengths.x;
-    if (area > ROUND_SHARE * fit_radius * fit_radius && farthest < ROUND_FAR * fit_radius) {
+    bool is_round = area > ROUND_SHARE * fit_radius * fit_radius && farthest < ROUND_FAR * fit_radius;
+    if (is_round || limit < fit_radius) {
         cell_axes[row] = vec4(0.0);
-        cells[row] = vec4(0.0, packed_planes(-rough.turn, fit_radius));
+        cells[row] = vec4(0.0, packed_planes(-rough.turn, min(fit_radius, limit)));
         return;
     }
     vec2 along = turned_by(found.turn);

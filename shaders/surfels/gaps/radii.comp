@@ -6,7 +6,7 @@
 // as far to opposite sides, points lie in rows that are far apart: it counts up to ROWS times as far.
 // LISTED: invocations are of the points in the list, else of slots. ENDED: no radius at a border or on a line. What
 // cells cannot tell stays 0. FITTED: ellipses and planes as well (surfels/gaps/fit.glsl);
-// TRUSTED: also of points in rows, as the scan stores normals.
+// TRUSTED: also of points in rows, as the scan stores normals; else LIMITED, where points lie on no plane.
 //
 // A point that lies off much denser ones, almost alone, is no surface: its disc is no larger than theirs. Rounds of the
 // search find it after these (LISTED). LAST: a point whose cell never ends is as large as the nearest that is found.
@@ -24,6 +24,7 @@ layout(binding = TEXTURE_STARTS) uniform usamplerBuffer starts;
 layout(binding = TEXTURE_NORMALS) uniform samplerBuffer normals;
 layout(std430, binding = STORAGE_RADII) buffer Radii { float radii[]; };
 #if FITTED
+#define LIMITED !TRUSTED
 #include "surfels/gaps/fit.glsl"
 #endif
 
@@ -138,6 +139,9 @@ void main() {
                 vec4 other = texelFetch(slots, j);
                 vec3 d = (other.xyz - place) / cell_size;
                 float squared = dot(d, d);
+#if LIMITED
+                take_close(squared);
+#endif
                 bound_cell(vec2(dot(d, u), dot(d, v)) / max(squared, 1e-30));
             }
         }
@@ -183,10 +187,17 @@ void main() {
                 vec4 other = texelFetch(slots, j);
                 vec3 d = (other.xyz - place) / cell_size;
                 float squared = dot(d, d);
+#if LIMITED
+                take_extent(d, squared, n, u, v);
+#endif
                 take_corner(d, squared);
                 take_neighbor(d, squared, n, j);
             }
         }
+#if LIMITED
+    limit = limit_of_plane();
+    radii[row] = min(reach, limit / SPARE) * cell_size;
+#endif
     store_fit(row, place, n);
 #endif
 }
