@@ -8,7 +8,8 @@
 #if HAS_COLORS
 layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #endif
-layout(std430, binding = STORAGE_EXTENTS) buffer Extents { float extents[]; };  // radii of neighborhoods, by row
+// By row: the radius of the neighborhood, and how far the mean of its points lies above the point; 0 without a plane.
+layout(std430, binding = STORAGE_EXTENTS) buffer Extents { vec2 extents[]; };
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
 const int LEAST_COUNT = 6;  // points that tell of a surface
@@ -69,8 +70,8 @@ int count_of_plane(Extent extent) {
 }
 #endif
 
-vec3 fit_plane(int count, out mat3 vectors) {
-    vec3 mean = vec3(0.0);
+vec3 fit_plane(int count, out mat3 vectors, out vec3 mean) {
+    mean = vec3(0.0);
     for (int k = 0; k < K; ++k) mean += k < count ? near_offsets[k] : vec3(0.0);
     mean /= float(count);
     vec3 squares = vec3(0.0), products = vec3(0.0);
@@ -142,7 +143,7 @@ float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     count = count_of_plane(extent);
 #endif
     mat3 vectors;
-    vec3 values = max(fit_plane(count, vectors), 0.0), to_eye = seen_from(row);
+    vec3 mean, values = max(fit_plane(count, vectors, mean), 0.0), to_eye = seen_from(row);
     vec3 normal = vectors[0];
     if (values.y <= COLLINEAR * values.z) {
         // Of points on a line, or one: what faces the eye most.
@@ -157,7 +158,8 @@ float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     float splat = splat_radius(extent, count, values, normal, CROWDED * pixel * unit, most * unit) / unit;
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     bool on_line = extent.count >= LEAST_COUNT && values.y < LINE * values.z;
-    extents[row] = radius;
+    bool has_plane = values.y > COLLINEAR * values.z && !outlier && !on_line;
+    extents[row] = vec2(radius, has_plane ? dot(mean, normal) * radius : 0.0);
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(max(splat, LEAST));
     splats[3u * row + 2u] = pack_axes(normal, vectors[2], ELLIPTICAL && values.z > 0.0 ? values.y / values.z : 1.0);

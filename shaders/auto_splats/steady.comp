@@ -9,7 +9,7 @@
 #include "auto_splats/splat.glsl"
 
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of those that are searched
-layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { float extents[]; };
+layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { vec2 extents[]; };
 layout(std430, binding = STORAGE_NEXT) readonly buffer Next { float next[]; };  // below 0: lines.comp finds the plane
 layout(std430, binding = STORAGE_PLACES) writeonly buffer Places { float places[]; };  // of splats, by row
 uniform uint first;
@@ -63,7 +63,7 @@ void main() {
     uint row = slot.w >> 1;
     vec3 position = texelFetch(positions, int(row)).xyz;
     put(row, position);
-    float radius = widening * extents[row];
+    float radius = widening * extents[row].x;
     if (next[n] < 0.0 || !(radius * unit > 0.0)) return;
     scale = 1.0 / (radius * unit);
     weights = 0;

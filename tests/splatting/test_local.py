@@ -144,7 +144,20 @@ def test_noise_does_not_move_the_surface(
     assert abs(bias("local")) < most
 
 
-@pytest.mark.parametrize(("name", "params"), SPLATS)
+@pytest.mark.backend("auto_splats")
+def test_without_noise_auto_splats_move_onto_round_bodies(draw: Draw) -> None:
+    """Discs at the points lie outside of it."""
+    cloud = replace(sphere(COUNT), radii=None, normals=None)
+    camera, bias = looking_at(cloud), {}
+    for surface in ("nearest", "local"):
+        drawn = draw(cloud, camera, SIZE, "auto_splats", params={"surface": surface})
+        true = true_depths(drawn.view)
+        both = np.isfinite(true) & np.isfinite(drawn.depth)
+        bias[surface] = float(np.median(drawn.depth[both] - true[both])) / typical_spacing(cloud)
+    assert -0.05 < bias["nearest"] < 2 * bias["local"] < 0, bias
+
+
+@pytest.mark.parametrize(("name", "params"), [each for each in SPLATS if each.id.split()[0] != "auto_splats"])
 def test_without_noise_it_is_the_nearest_splat(draw: Draw, name: str, params: dict[str, object]) -> None:
     cloud = sphere(COUNT)
     cloud = replace(cloud, radii=None, normals=None if name in BARE else cloud.normals)

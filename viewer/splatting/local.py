@@ -132,7 +132,7 @@ def surface_param(default: str, group: str, **declared: Any) -> Any:
         default,
         "Depth of a pixel. nearest: the depth of the nearest splat; local: the mean depth of all splats "
         "of the front layer, so that noise does not move the surface forwards. Without noise, both "
-        "depths are the same",
+        "depths are the same, but auto_splats moves its splats onto curved surfaces",
         choices=SURFACES,
         group=group,
         **declared,

@@ -217,7 +217,7 @@ def test_other_planes_are_those_of_neighborhoods(
     draw: Callable[..., Surface], noise: float, params: dict[str, Any]
 ) -> None:
     cloud = bare(sphere(6000), noise)
-    found = drawn(draw, cloud, **params)
+    found = drawn(draw, cloud, **params, surface="nearest")
     plain = viewer.estimate_normals(cloud, camera_of(cloud), size=SIZE, search=NormalSearch(**params))
     _, at, there = np.intersect1d(found.rows, plain.rows, return_indices=True)
     assert len(at) > 0.9 * len(plain.rows)

@@ -200,7 +200,7 @@ class AutoSplats(Backend):
             give_value(found, surface, params.radius_scale)
             return surface.stats.share < 1 or not is_own
         instancing, scale = params.instancing, params.radius_scale
-        is_moved = search.widening > 1 and params.surface == LOCAL
+        is_moved = params.surface == LOCAL
         if not found.is_whole:
             draw_depths(_points(pose, found, is_moved), surface, instancing=instancing, radius_scale=scale)
             found.find_late(pose, surface, search)
@@ -208,7 +208,7 @@ class AutoSplats(Backend):
             surface.stats.chosen["adaptive"] = (
                 f"fitted to all points within {search.widening:.2g} radii, because the points are noisy"
             )
-        left = _LEFT if is_moved else 1.0
+        left = _LEFT if is_moved and search.widening > 1 else 1.0
         layer = layer_of(pose, frame, surface, blends=params.passes == "two", left=left)
         draw_splats(
             _points(pose, found, is_moved),
@@ -232,7 +232,7 @@ def _noise_of(pose: GpuPose, frame: FrameView) -> NoiseEstimate:
 
 def _points(pose: GpuPose, found: Neighborhoods, is_moved: bool) -> Points:
     """The points whose neighborhoods were found, with their splats. is_moved: whether splats lie where the
-    fits of noisy points put them, in place of at their points."""
+    fits put them, in place of at their points."""
     buffers = {name: found[name] for name in ("splats", "looks")}
     if is_moved:
         buffers["positions"] = found["places"]
@@ -259,6 +259,7 @@ def search_of(params: Params, pose: GpuPose, noise: Noise) -> Search:
         by_scanner=params.orient == "scanner" and bool(pose.views),
         widening=_widening(noise, params.k),
         noise=noise.deviation,
+        raises=params.surface == LOCAL,
     )
 
 

@@ -38,7 +38,7 @@ from .grids import COARSEST, FINEST_COARSE, Grids, foresee_border
 from .kept import KeptNeighbors
 
 # Bytes of a pose's row, of a participant, of a point that is seen.
-_SPLAT, _LOOK, _PLACE, _SLOT, _FOUND = 12, 8, 12, 16, 16
+_SPLAT, _LOOK, _EXTENT, _PLACE, _SLOT, _FOUND = 12, 8, 8, 12, 16, 16
 _FIRST_BALL = 0.56  # that is searched, in usual radii: most neighborhoods are within
 _DIRECTIONS = 24  # in which the cells of points are measured
 _LANES = 32  # that search together for one point, of the few that are left
@@ -67,7 +67,8 @@ class Search:
     through as few of the nearest as noise allows. elliptical: whether splats are longer where neighbors are
     farther apart; else only those of lines of points are no discs. widening: radius of the ball
     whose points determine a plane, in radii of the neighborhood; up to 1: the neighborhood determines it.
-    noise: standard deviation of the points along the normals, scan units.
+    noise: standard deviation of the points along the normals, scan units. raises: whether splats move from
+    their points onto the surface that neighborhoods tell, where widening is up to 1.
     """
 
     k: int = 10
@@ -81,6 +82,12 @@ class Search:
     elliptical: bool = False
     widening: float = 1.0
     noise: float = 0.0
+    raises: bool = False
+
+    @property
+    def moves(self) -> bool:
+        """Whether it tells other places of splats than their points."""
+        return self.raises or self.widening > 1
 
 
 @dataclass(frozen=True)
@@ -94,8 +101,8 @@ class Neighborhoods:
     """The neighborhoods of points that a picture shows, and their splats.
 
     Buffers by name, as texels. By the pose's row: "splats" and "looks", as `Points.buffers` has them;
-    "extents", the radius of the neighborhood in the last picture that found one, 0: none; "places", where the
-    centres of splats lie whose planes go through wider balls than neighborhoods. Of the points
+    "extents", the radius of the neighborhood in the last picture that found one, 0: none, and how far the
+    mean of its points lies above the point; "places", where the centres of splats lie that move. Of those
     whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan units,
     0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots": the
     participants, positions and rows.
@@ -204,10 +211,10 @@ class Neighborhoods:
         if visible:
             self._divide(search, visible, pose, border)
             self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
-            if self._reserve("extents", 4 * len(pose.cloud), gl.R32F):
+            if self._reserve("extents", _EXTENT * len(pose.cloud), gl.RG32F):
                 self._gpu.clear(self["extents"].buffer, 0)
             self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
-            if search.widening > 1:
+            if search.moves:
                 self._reserve("places", _PLACE * len(pose.cloud), gl.RGB32F)
             for name, nbytes, texel in (
                 ("drawn", 4, gl.R32UI),
@@ -377,8 +384,8 @@ class Neighborhoods:
                 with self._gpu.timers.measure("unknown"):
                     list_flagged(self._gpu, "auto_splats/unknown.glsl", self.count, listed, self._bind_next)
             self._run_search(pose, search, first, listed)
-        if search.widening > 1:
-            self._steady_normals(pose, search, first)
+        if search.moves:
+            self._move_splats(pose, search, first)
         self._join_lines(pose, search)
 
     def read_rounds(self) -> dict[str, int]:
@@ -425,13 +432,22 @@ class Neighborhoods:
             else:
                 listed.run(program)
 
-    def _steady_normals(self, pose: GpuPose, search: Search, first: int) -> None:
-        """Fit planes to wider balls than neighborhoods, for those listed from `first` on."""
-        defines = {"LANES": 1, "ELLIPTICAL": str(search.elliptical).lower()}
-        with self._gpu.timers.measure("steady"):
-            program = self._searching("auto_splats/steady.comp", pose, search, defines)
+    def _move_splats(self, pose: GpuPose, search: Search, first: int) -> None:
+        """Move splats listed from `first` on onto the surface that their neighborhoods tell. Where points are
+        noisy, wider balls tell it, and the planes too."""
+        steadies = search.widening > 1
+        with self._gpu.timers.measure("steady" if steadies else "raise"):
+            if steadies:
+                defines = {"LANES": 1, "ELLIPTICAL": str(search.elliptical).lower()}
+                program = self._searching("auto_splats/steady.comp", pose, search, defines)
+                self._gpu.set(program, widening=search.widening)
+            else:
+                program = self._gpu.compute("auto_splats/raise.comp")
+                pose.array("positions").bind(Texture.POSITIONS)
+                self["drawn"].bind(Texture.DRAWN_ROWS)
+                self._bind_storage(splats=Storage.SPLATS, extents=Storage.EXTENTS)
             self._bind_storage(places=Storage.PLACES)
-            self._gpu.set(program, first=first, widening=search.widening)
+            self._gpu.set(program, first=first)
             self._gpu.dispatch(program, self.count - first)
 
     def _join_lines(self, pose: GpuPose, search: Search) -> None:
