@@ -9,11 +9,12 @@ import pytest
 from virtual_screen import PANEL, PATIENCE, RunningApp, Screen, running_app, stored_of
 
 from viewer import cli
-from viewer.app.panel.reading import as_text, choices, explanation, other_facts, words_on_assumed
+from viewer.app.panel.reading import _AUTOMATIC, as_text, choices, explanation, other_facts, words_on_assumed
 from viewer.document.document import Document
 from viewer.document.saved_session import SavedSession
 from viewer.scan.open import open_scan
-from viewer.scan.reading.record import Aside, Decision, Reading, Take
+from viewer.scan.points import ORIENTATIONS
+from viewer.scan.reading.record import Aside, Decision, Reading, Take, words_of_value
 
 
 def test_an_assumption_is_explained_with_its_alternatives() -> None:
@@ -46,6 +47,15 @@ def test_a_list_offers_the_alternatives_first_and_no_value_twice() -> None:
     record = Reading(takes=(Take("anna", "anna*", 2), Take("bert", "bert*", 2)))
     assert choices(take, record) == ["bert", "all"]
     assert choices(Decision("normals", "stored"), Reading()) == ["none"]
+
+
+def test_the_list_of_normal_orientations_begins_all_names_alike() -> None:
+    decision = Decision("orientation", "quick", "assumed", alternatives=ORIENTATIONS[1:])
+    texts = choices(decision, Reading())
+    assert set(texts) == set(ORIENTATIONS) - {"auto", "quick"}
+    names = [words_of_value("orientation", text) for text in texts]
+    assert names == ["Fine", *(f"{name}, flipped" for name in (_AUTOMATIC, "Quick", "Fine"))]
+    assert words_of_value("orientation", "auto") == _AUTOMATIC
 
 
 def test_values_are_shown_in_words_and_typed_as_the_command_line_takes_them() -> None:

@@ -90,7 +90,7 @@ def test_normals_face_a_scanner_that_the_file_states_unless_the_user_says_else(t
         assert (decision.value, decision.source, decision.shown) == (
             "viewpoint",
             "file",
-            "towards the scanner",
+            "Towards the scanner",
         )
         towards = pose.cloud.normals
     for orientation, expected in (("auto", towards), ("auto-flipped", -towards)):  # type: ignore[operator]

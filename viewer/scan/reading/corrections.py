@@ -134,7 +134,11 @@ CORRECTED = {
     "encoding": _words("utf-8, utf-16 or latin-1", "utf-8", "utf-16", "latin-1"),
     "colors": _words("the largest value 1, 255 or 65535, or none", "1", "255", "65535", "none"),
     "normals": _words("stored or none", "stored", "none"),
-    "orientation": _words("auto, quick or fine, each also with -flipped", *ORIENTATIONS),
+    "orientation": Key(
+        _one_of(*ORIENTATIONS),
+        "auto, quick or fine, each also with -flipped",
+        ORIENTATIONS[1:],  # "auto" is what Scan4D does without a correction
+    ),
     "missing": Key(_missing, "none, three numbers such as 0,0,0, or one number", ("none", "0,0,0")),
     "texture": Key(_texture, "vertices, dense, dense:500000 or none", ("vertices", "dense", "none")),
     "splats": _words("yes or no", "yes", "no"),

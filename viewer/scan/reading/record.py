@@ -54,11 +54,13 @@ _WORDS = {  # as people read them: values of keys
     },
     "unit": {"units": "not known"},
     "orientation": {
-        "auto": "automatic",
-        "auto-flipped": "automatic, flipped",
-        "quick-flipped": "quick, flipped",
-        "fine-flipped": "fine, flipped",
-        "viewpoint": "towards the scanner",
+        "auto": "Automatic",  # the list of every decision has this word
+        "quick": "Quick",
+        "fine": "Fine",
+        "auto-flipped": "Automatic, flipped",
+        "quick-flipped": "Quick, flipped",
+        "fine-flipped": "Fine, flipped",
+        "viewpoint": "Towards the scanner",
     },
     "axes": {"unknown": "not known"},
     "take": {"all": "all, as one scan"},
