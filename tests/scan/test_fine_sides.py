@@ -109,6 +109,19 @@ def test_contradicting_links_are_unsure() -> None:
     assert not fine_sides.is_unsure(np.empty(0))
 
 
+def test_winding_numbers_of_groups_sum_to_that_of_all_points() -> None:
+    """One group has many parts, and another none of the points."""
+    points, normals = lens(1500, 0.5)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    near = np.argsort(np.linalg.norm(points[:, None] - points, axis=2), axis=1)[:, :20].astype(np.int32)
+    field = fine_sides._Field(points, normals, near)
+    group = np.where(points[:, 0] > 0.8, 0, 2)
+    fields = field.of_groups(group, 3)
+    assert not fields[:, 1].any()
+    assert fields.sum(axis=1) == pytest.approx(field.whole(), abs=0.005)
+    assert np.median(field.whole()) == pytest.approx(0.5, abs=0.06)
+
+
 def test_contraction_is_that_of_a_list_of_bonds() -> None:
     rng = np.random.default_rng(4)
     bonds = np.triu(rng.normal(size=(30, 30)), 1)

@@ -28,6 +28,7 @@ def contract(strength: NDArray[np.float64]) -> NDArray[np.float64]:
     count = len(strength)
     alive, signs = np.ones(count, np.bool_), np.ones(count)
     best, size = np.empty(count, np.int64), np.empty(count)
+    weaker = np.zeros(count, np.bool_)  # rows whose strongest bond became weaker: size is a bound
     gone, kept_by, agrees = np.empty(count, np.int64), np.empty(count, np.int64), np.empty(count)
     for row in range(count):
         best[row], size[row] = _strongest(strength, alive, row)
@@ -39,6 +40,10 @@ def contract(strength: NDArray[np.float64]) -> NDArray[np.float64]:
                 first, most = row, size[row]
         if first < 0:
             break
+        if weaker[first]:
+            best[first], size[first] = _strongest(strength, alive, first)
+            weaker[first] = False
+            continue
         kept, lost = min(first, best[first]), max(first, best[first])
         sign = 1.0 if strength[kept, lost] >= 0.0 else -1.0
         alive[lost] = False
@@ -48,14 +53,12 @@ def contract(strength: NDArray[np.float64]) -> NDArray[np.float64]:
             if alive[row] and row != kept:
                 strength[kept, row] += sign * strength[lost, row]
                 strength[row, kept] = strength[kept, row]
+                if abs(strength[row, kept]) > size[row]:
+                    best[row], size[row], weaker[row] = kept, abs(strength[row, kept]), False
+                elif best[row] == kept or best[row] == lost:
+                    weaker[row] = True
         best[kept], size[kept] = _strongest(strength, alive, kept)
-        for row in range(count):
-            if not alive[row] or row == kept:
-                continue
-            if best[row] == kept or best[row] == lost:
-                best[row], size[row] = _strongest(strength, alive, row)
-            elif abs(strength[row, kept]) > size[row]:
-                best[row], size[row] = kept, abs(strength[row, kept])
+        weaker[kept] = False
     for n in range(joined - 1, -1, -1):
         signs[gone[n]] = agrees[n] * signs[kept_by[n]]
     return signs

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..task import checkpoint
 from ..threads import together
 from .patches import patches_of, summed
-from .winding import clusters_of
+from .winding import WindingField, clusters_of
 
 Vectors = NDArray[np.float64]  # (N, 3)
 
@@ -36,6 +36,8 @@ _SPACING_OF = 6  # neighbours that tell the distance between points
 # What two sheets explain: below the first, one is as good; from the second, two are sure.
 _TWO_SHEETS = 0.85, 0.95
 _TRUSTED = 2.0  # so that half of the trust decides a link
+_FAR = 3.0  # radii of a patch, the distance from which its cluster stands for its points
+_PART = 128  # points of a group whose cluster stands for them, at most
 _AT_ONCE = 1 << 8  # targets of one call of a compiled loop
 _ROWS = 1 << 13  # points of one
 _TURNS = 20  # rounds in which points turn, one by one
@@ -153,6 +155,10 @@ class _Field:
         """The number of points that each target stands for."""
         return len(self.points) / len(self.targets)
 
+    def whole(self) -> NDArray[np.float64]:
+        """The winding number of all points at the targets, (T,)."""
+        return WindingField(self.points, self.vectors).at(self.points[self.targets], self.soft)
+
     def of_groups(
         self, group: NDArray[np.integer], count: int, signs: NDArray[np.integer] | None = None
     ) -> NDArray[np.float32]:
@@ -162,17 +168,29 @@ class _Field:
 
         order = group.argsort(kind="stable")
         cuts = np.searchsorted(group[order], np.arange(count + 1))
+        first, part_of = _parts(cuts)
         vectors = self.vectors if signs is None else self.vectors * signs[:, None]
-        groups = Groups(self.points, vectors, order, np.column_stack([cuts[:-1], cuts[1:]]))
-        clusters, found = clusters_of(groups), np.empty((len(self.targets), count), np.float32)
+        groups = Groups(self.points, vectors, order, np.column_stack([first[:-1], first[1:]]))
+        clusters, found = clusters_of(groups), np.zeros((len(self.targets), count), np.float32)
 
         def part(start: int) -> None:
             checkpoint()
             some = slice(start, start + _AT_ONCE)
-            fields(groups, clusters, self.targets[some], self.soft[some], found[some])
+            fields(groups, clusters, self.targets[some], self.soft[some], part_of, found[some], _FAR)
 
         together(len(self.points), [partial(part, start) for start in range(0, len(found), _AT_ONCE)])
         return found
+
+
+def _parts(cuts: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """First rows of parts of groups, and the end, (P + 1,), and the group of each part, (P,).
+
+    Only near parts are looked at point by point. cuts: (C + 1,), first rows of groups, and the end.
+    """
+    parts = -(-np.diff(cuts) // _PART)
+    part_of = np.repeat(np.arange(len(parts)), parts)
+    number = np.arange(len(part_of)) - np.repeat(np.cumsum(parts) - parts, parts)
+    return np.append(cuts[part_of] + number * _PART, cuts[-1]), part_of
 
 
 def _of_all_patches(field: _Field, bonds: Bonds) -> NDArray[np.int8]:
@@ -256,6 +274,6 @@ def _accepted(field: _Field, bonds: Bonds, signs: NDArray[np.int8]) -> NDArray[n
 
 def _gain(field: _Field, group: NDArray[np.integer], count: int) -> NDArray[np.float64]:
     """How much less the winding number is off 1/2, squared, over all points, if one group turns: (count,)."""
-    whole = field.of_groups(np.arange(len(group)) * _PATCHES // len(group), _PATCHES).sum(axis=1)[:, None]
+    whole = field.whole()[:, None]
     alone = field.of_groups(group, count)
     return field.scale * ((whole - 0.5) ** 2 - (whole - 2 * alone - 0.5) ** 2).sum(axis=0, dtype=np.float64)

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from ..compiled import compiled
 from .plane_kernels import fit_plane
 
-_TERMS = 7  # of a quadric, and the distance between two sheets
+_TERMS = 6  # of a quadric
 _LEAST = 4  # points of a sheet
 _ROUNDS = 4  # in which points move from sheet to sheet
-_RIDGE = 1e-9
+_NO_MORE = 1e-6  # of the length of a term, what earlier ones leave of it at least
+_FLAT = 1e-9  # of the squared distance to the farthest neighbour, the mean square below which one sheet fits
 _FEWEST, _PLANE_OF = 6, 12  # points on one side that a plane goes through
 _BETTER = 0.1  # of the variance about the former plane, what a plane through one side leaves at most
 _LINE = 0.02  # of the squared widths of points, the ratio below which they lie in a line
@@ -49,16 +50,29 @@ def _split(off: NDArray[np.float64], side: NDArray[np.float64]) -> None:
 
 
 @compiled
-def _fit(
-    terms: NDArray[np.float64], heights: NDArray[np.float64], off: NDArray[np.float64]
-) -> NDArray[np.floating]:
-    """The coefficients, (C,), of terms (K, C) that fit heights (K,) best. Gets their errors, off, (K,)."""
-    products = terms.T @ terms
-    for term in range(len(products)):
-        products[term, term] += _RIDGE
-    found = np.linalg.solve(products, terms.T @ heights)
-    off[:] = heights - terms @ found
-    return found
+def _orthogonal(terms: NDArray[np.float64], kept: NDArray[np.bool_]) -> None:
+    """Make terms, (C, K), of K points orthogonal to each other, of length 1; kept, (C,), tells those that say
+    more than the ones before."""
+    for term in range(len(terms)):
+        before = np.sqrt((terms[term] * terms[term]).sum())
+        for _ in range(2):  # the second time for what rounding left
+            _without(terms[:term], kept, terms[term])
+        length = np.sqrt((terms[term] * terms[term]).sum())
+        kept[term] = length > _NO_MORE * before
+        if kept[term]:
+            terms[term] /= length
+
+
+@compiled
+def _without(terms: NDArray[np.float64], kept: NDArray[np.bool_], values: NDArray[np.float64]) -> None:
+    """Take away from values, (K,), what orthogonal terms, (C, K), fit of them."""
+    for term in range(len(terms)):
+        if kept[term]:
+            share = 0.0
+            for k in range(len(values)):
+                share += terms[term, k] * values[k]
+            for k in range(len(values)):
+                values[k] -= share * terms[term, k]
 
 
 @compiled
@@ -78,28 +92,38 @@ def split_in_sheets(
     """
     count = near.shape[1]
     u, v, offset = np.empty(3), np.empty(3), np.empty(3)
-    terms, heights, off, side = np.ones((count, _TERMS)), np.empty(count), np.empty(count), np.empty(count)
+    terms, kept = np.empty((_TERMS, count)), np.empty(_TERMS, np.bool_)
+    one, off, side, across = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
     for i in range(rows[0], rows[1]):
         _tangents(normals[i], u, v)
         farthest = points[near[i, count - 1]] - points[i]
         scale = 1.0 / np.sqrt((farthest * farthest).sum())
         for k in range(count):
-            offset[:] = (points[near[i, k]] - points[i]) * scale
-            x, y = (offset * u).sum(), (offset * v).sum()
-            heights[k] = (offset * normals[i]).sum()
-            terms[k, 1], terms[k, 2], terms[k, 3], terms[k, 4], terms[k, 5] = x, y, x * x, x * y, y * y
-        _fit(np.ascontiguousarray(terms[:, : _TERMS - 1]), heights, off)
-        one, two = (off * off).sum(), 0.0
+            x, y, one[k] = 0.0, 0.0, 0.0
+            for axis in range(3):
+                offset[axis] = (points[near[i, k], axis] - points[i, axis]) * scale
+                x += offset[axis] * u[axis]
+                y += offset[axis] * v[axis]
+                one[k] += offset[axis] * normals[i, axis]
+            terms[0, k], terms[1, k], terms[2, k] = 1.0, x, y
+            terms[3, k], terms[4, k], terms[5, k] = x * x, x * y, y * y
+        _orthogonal(terms, kept)
+        _without(terms, kept, one)
+        off[:] = one
         for _ in range(_ROUNDS):
             _split(off, side)
-            terms[:, _TERMS - 1] = side
-            apart = _fit(terms, heights, off)[_TERMS - 1]
-            two = (off * off).sum()
-            off += apart * side
+            across[:] = side
+            _without(terms, kept, across)
+            squared = (across * across).sum()
+            apart = (across * one).sum() / squared if squared > _FLAT else 0.0
+            for k in range(count):
+                off[k] = one[k] + apart * (side[k] - across[k])
             if apart <= 0.0:
                 break
-        is_flat = one <= _RIDGE * count
-        explained[i] = 0.0 if is_flat else 1.0 - two / (count - _TERMS) / (one / (count - _TERMS + 1))
+        around_one = (one * one).sum()
+        around_two = around_one - apart * apart * squared
+        of_each = (count - _TERMS) / (count - _TERMS - 1)
+        explained[i] = 0.0 if around_one <= _FLAT * count else 1.0 - of_each * around_two / around_one
         for k in range(count):
             sides[i, k] = np.int8(side[k])
 

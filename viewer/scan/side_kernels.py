@@ -136,3 +136,32 @@ def settle(
                 is_settled = False
         if is_settled:
             break
+
+
+@compiled
+def see(
+    x: NDArray[np.float32],
+    y: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    side: int,
+    little: np.float32,
+    front: NDArray[np.float32],
+    back: NDArray[np.float32],
+) -> None:
+    """Fill how far points are seen from the front and from the back of a view, 0 to 1, both (N,).
+
+    x, y, depth: (N,), in cells of a view of side x side; a point with more depth is nearer to the front.
+    little: so far behind the first point of its cell a point is not seen.
+    """
+    nearest = np.full(side * side, -np.inf, np.float32)
+    farthest = np.full(side * side, np.inf, np.float32)
+    cell = np.empty(len(x), np.int64)
+    none, half, last = np.float32(0), np.float32(side / 2), np.float32(side - 1)
+    for i in range(len(x)):
+        row, column = min(max(y[i] + half, none), last), min(max(x[i] + half, none), last)
+        cell[i] = np.int64(row) * side + np.int64(column)
+        nearest[cell[i]] = max(nearest[cell[i]], depth[i])
+        farthest[cell[i]] = min(farthest[cell[i]], depth[i])
+    for i in range(len(x)):
+        front[i] = max(np.float32(1) - (nearest[cell[i]] - depth[i]) / little, none)
+        back[i] = max(np.float32(1) - (depth[i] - farthest[cell[i]]) / little, none)

@@ -219,19 +219,14 @@ def _visible(
     points: in cells. A view looks at side x side cells; in each the first point is seen, and those behind it
     the less the farther they are: of the two sides of something thin, the one in front counts more.
     """
+    from . import side_kernels
+
     across = np.cross(axis, np.eye(3, dtype=np.float32)[np.abs(axis).argmin()])
     across /= np.linalg.norm(across)
     x, y, depth = (points @ np.stack([across, np.cross(axis, across), axis], axis=1)).T
-    column, row = (np.clip(v + np.float32(side / 2), 0, side - 1).astype(np.intp) for v in (x, y))
-    at = row * side + column
-    nearest, farthest = (np.full(side * side, none, np.float32) for none in (-np.inf, np.inf))
-    np.maximum.at(nearest, at, depth)
-    np.minimum.at(farthest, at, depth)
-    little = np.float32(_DEPTH / _CELL)
-    return (
-        np.maximum(1 - (nearest[at] - depth) / little, 0),
-        np.maximum(1 - (depth - farthest[at]) / little, 0),
-    )
+    front, back = np.empty(len(points), np.float32), np.empty(len(points), np.float32)
+    side_kernels.see(x, y, depth, side, np.float32(_DEPTH / _CELL), front, back)
+    return front, back
 
 
 def _half_sphere(count: int) -> Vectors:

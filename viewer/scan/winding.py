@@ -64,16 +64,18 @@ class WindingField:
         self._nodes = Groups(points, vectors, order, _halves(len(points)))
         self._clusters = clusters_of(self._nodes)
 
-    def at(self, places: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The winding number at places (Q, 3), (Q,)."""
+    def at(self, places: NDArray[np.float64], soft: NDArray[np.float64] | None = None) -> NDArray[np.float64]:
+        """The winding number at places (Q, 3), (Q,). soft: (Q,), squared distances that are added to those
+        between places and points; None: 0."""
         from . import winding_kernels
 
         found = np.empty(len(places))
+        added = np.zeros(len(places)) if soft is None else soft
 
         def part(start: int) -> None:
             checkpoint()
             some = slice(start, start + _PART)
-            winding_kernels.field(self._nodes, self._clusters, places[some], found[some], _FAR)
+            winding_kernels.field(self._nodes, self._clusters, places[some], added[some], found[some], _FAR)
 
         together(len(places), [partial(part, start) for start in range(0, len(places), _PART)])
         return found

@@ -11,8 +11,7 @@ from ..compiled import compiled
 
 _FOUR_PI = 4.0 * np.pi
 _DEEPEST = 64  # levels of a tree: as many as a stack holds
-_FAR_GROUP = 3.0  # radii of a group, the distance from which its cluster stands for its points
-_FAR_SOFT = 100.0  # and that in the softening of distances, squared
+_FAR_SOFT = 100.0  # in the softening of distances, squared: so far, it does not count
 
 
 class Groups(NamedTuple):
@@ -142,13 +141,14 @@ def field(
     nodes: Groups,
     clusters: Clusters,
     queries: NDArray[np.float64],
+    soft: NDArray[np.float64],
     found: NDArray[np.float64],
     far: float,
 ) -> None:
     """Fill the winding numbers, (Q,), at queries (Q, 3) by a tree.
 
-    nodes: the children of node c are 2c + 1 and 2c + 2; leaves have none. far: in radii of a node, the
-    distance from which its cluster stands for its points.
+    nodes: the children of node c are 2c + 1 and 2c + 2; leaves have none. soft: (Q,), as in `fields`. far: in
+    radii of a node, the distance from which its cluster stands for its points.
     """
     points, vectors, order, borders = nodes
     stack = np.empty(_DEEPEST, np.int64)
@@ -160,14 +160,14 @@ def field(
             c = stack[held]
             x, y, z = clusters.centers[c] - queries[q]
             reach = far * clusters.radii[c]
-            if x * x + y * y + z * z > reach * reach:
+            if x * x + y * y + z * z > reach * reach + _FAR_SOFT * soft[q]:
                 total += _from_afar(clusters, c, x, y, z)
             elif 2 * c + 2 < len(borders):
                 stack[held], stack[held + 1] = 2 * c + 1, 2 * c + 2
                 held += 2
             else:
                 rows = order[borders[c, 0] : borders[c, 1]]
-                total += _from_near(points, vectors, rows, queries[q], 0.0)
+                total += _from_near(points, vectors, rows, queries[q], soft[q])
         found[q] = total / _FOUR_PI
 
 
@@ -177,21 +177,24 @@ def fields(
     clusters: Clusters,
     targets: NDArray[np.int64],
     soft: NDArray[np.float64],
+    sum_of: NDArray[np.int64],
     found: NDArray[np.float32],
+    far: float,
 ) -> None:
-    """Fill the winding number of each group alone at some of the points, (T, C).
+    """Add the winding number of each group alone at some of the points to sums, found (T, S).
 
-    targets: (T,), rows. soft: (T,), squared distances that are added to those between points: below these,
-    nothing is known of the surface.
+    targets: (T,), rows. sum_of: (C,), the sum of each group. soft: (T,), squared distances that are added to
+    those between points: below these, nothing is known of the surface. far: in radii of a group, as in
+    `field`.
     """
     points, vectors, order, borders = groups
     for t in range(len(targets)):
         place = points[targets[t]]
         for c in range(len(borders)):
             x, y, z = clusters.centers[c] - place
-            reach = _FAR_GROUP * clusters.radii[c]
+            reach = far * clusters.radii[c]
             if x * x + y * y + z * z > reach * reach + _FAR_SOFT * soft[t]:
                 total = _from_afar(clusters, c, x, y, z)
             else:
                 total = _from_near(points, vectors, order[borders[c, 0] : borders[c, 1]], place, soft[t])
-            found[t, c] = total / _FOUR_PI
+            found[t, sum_of[c]] += total / _FOUR_PI
