@@ -56,7 +56,11 @@ ivec2 measured_under(RangeView v, int level, ivec2 uv, vec2 pixel) {
 
 vec3 normal_of(RangeView v, int index) {
 #if NORMAL || BLEND
+#if RANGE_WIDE
+    uint word = texelFetch(range_normals, index >> 2)[index & 3];
+#else
     uint word = texelFetch(range_normals, index).r;
+#endif
     return word == 0u ? vec3(0.0) : turned(v.screen, unpack_normal(word));
 #else
     return vec3(0.0);

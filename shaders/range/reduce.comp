@@ -5,7 +5,7 @@
 #include "common/color.glsl"
 #include "range/samples.glsl"
 
-// The level that is written.
+// A part of the level that is written.
 layout(std430, binding = STORAGE_RANGE_DEPTHS) writeonly buffer Depths { float out_depths[]; };
 layout(std430, binding = STORAGE_RANGE_LOOKS) writeonly buffer Looks { uint out_looks[]; };
 #if RANGE_HAS_XY
@@ -16,6 +16,7 @@ uniform int number;  // of the view
 uniform int level;   // that is read
 uniform int run;     // samples of a row that an invocation makes
 uniform uint first;  // run that is made by this call
+uniform int page;    // the first sample of those that are bound
 
 const float taps[] = TAPS;
 const int REACH = COUNT * COUNT;
@@ -54,7 +55,7 @@ void reduce(RangeView view, RangeLevel fine, ivec2 at, int i) {
     }
     float depth = nearest;
 #if RANGE_HAS_XY
-    vec2 place = texelFetch(range_xy, chosen).xy;
+    vec2 place = sample_xy(chosen);
 #endif
 #if !NEAREST
     // Relative to the nearest, so that what is the same everywhere stays the same.
@@ -69,7 +70,7 @@ void reduce(RangeView view, RangeLevel fine, ivec2 at, int i) {
         farther += weights[k] * (depths[k] - nearest);
         light += weights[k] * to_linear(colors[k]);
 #if RANGE_HAS_XY
-        aside += weights[k] * (texelFetch(range_xy, indices[k]).xy - place);
+        aside += weights[k] * (sample_xy(indices[k]) - place);
 #endif
     }
     depth += farther / weight;
@@ -92,5 +93,5 @@ void main() {
     int runs = (coarse.size.x + run - 1) / run, which = int(first + item());
     ivec2 at = ivec2(run * (which % runs), which / runs);
     int end = min(at.x + run, coarse.size.x);
-    for (; at.x < end; ++at.x) reduce(view, fine, at, at.y * coarse.size.x + at.x);
+    for (; at.x < end; ++at.x) reduce(view, fine, at, at.y * coarse.size.x + at.x - page);
 }

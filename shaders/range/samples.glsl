@@ -7,17 +7,24 @@
 
 #include "common/split.glsl"
 
-layout(binding = TEXTURE_RANGE_DEPTHS) uniform samplerBuffer range_depths;
-layout(binding = TEXTURE_RANGE_LOOKS) uniform samplerBuffer range_looks;  // sRGB; alpha 0: no sample
-layout(binding = TEXTURE_RANGE_XY) uniform samplerBuffer range_xy;
-layout(binding = TEXTURE_RANGE_VIEWS) uniform usamplerBuffer range_views;
 
 // What the views of a pose have, so that nothing is computed for what none has: RangeSamples.defines.
 #ifndef RANGE_KINDS
 #define RANGE_KINDS (RANGE_Z | RANGE_ALONG_RAY | RANGE_HEIGHT)
 #define RANGE_LENS_STEPS 9
 #define RANGE_HAS_XY 1
+#define RANGE_WIDE 0
 #endif
+
+// RANGE_WIDE: a driver limits the number of texels, so a texel holds several samples: four; of x and y, two.
+layout(binding = TEXTURE_RANGE_DEPTHS) uniform samplerBuffer range_depths;
+#if RANGE_WIDE
+layout(binding = TEXTURE_RANGE_LOOKS) uniform usamplerBuffer range_looks;
+#else
+layout(binding = TEXTURE_RANGE_LOOKS) uniform samplerBuffer range_looks;
+#endif
+layout(binding = TEXTURE_RANGE_XY) uniform samplerBuffer range_xy;
+layout(binding = TEXTURE_RANGE_VIEWS) uniform usamplerBuffer range_views;
 
 const int GRID_STEPS = 2;
 #define NO_PLACE uintBitsToFloat(NO_DEPTH | 1u)  // NaN
@@ -107,13 +114,30 @@ ivec4 sample_at(int index, int view_count) {
     return found;
 }
 
+#if RANGE_WIDE
+float sample_depth(int index) { return texelFetch(range_depths, index >> 2)[index & 3]; }
+
+vec2 sample_xy(int index) {
+    vec4 two = texelFetch(range_xy, index >> 1);
+    return (index & 1) == 0 ? two.xy : two.zw;
+}
+
+// Colour (sRGB) and alpha; 0: no sample.
+vec4 sample_look(int index) {
+    uint word = texelFetch(range_looks, index >> 2)[index & 3];
+    return vec4(uvec4(word) >> uvec4(0, 8, 16, 24) & 0xFFu) * (1.0 / 255.0);
+}
+#else
 float sample_depth(int index) { return texelFetch(range_depths, index).r; }
 
-// Colour (sRGB) and alpha.
+vec2 sample_xy(int index) { return texelFetch(range_xy, index).xy; }
+
+// Colour (sRGB) and alpha; 0: no sample.
 vec4 sample_look(int index) { return texelFetch(range_looks, index); }
+#endif
 
 // Whether there is a sample, of which more than such a part is known.
-bool is_sample(int index, float least) { return texelFetch(range_looks, index).a > least; }
+bool is_sample(int index, float least) { return sample_look(index).a > least; }
 
 bool is_sample(int index) { return is_sample(index, 0.0); }
 
@@ -202,7 +226,7 @@ vec3 sample_place(RangeView v, RangeLevel found, int level, vec2 uv, float depth
 #if RANGE_HAS_XY
     if (v.has_xy) {
         ivec2 nearest = clamp(ivec2(floor(uv + 0.5)), ivec2(0), found.size - 1);
-        return vec3(texelFetch(range_xy, sample_index(found, nearest)).xy, -depth);
+        return vec3(sample_xy(sample_index(found, nearest)), -depth);
     }
 #endif
     return pixel_place(v, level_to_pixel(v, level, uv), depth);
@@ -261,11 +285,11 @@ vec2 on_grid(RangeView v, vec2 xy, vec2 guess) {
         int above = sample_under(level, middle - vec2(0, 1)), below = sample_under(level, middle + vec2(0, 1));
         vec2 apart = vec2(ivec2(left >= 0, above >= 0) + ivec2(right >= 0, below >= 0));
         if (min(apart.x, apart.y) == 0.0) return vec2(NO_PLACE);
-        precise vec2 along = texelFetch(range_xy, right < 0 ? index : right).xy;
-        precise vec2 down = texelFetch(range_xy, below < 0 ? index : below).xy;
-        along = (along - texelFetch(range_xy, left < 0 ? index : left).xy) / apart.x;
-        down = (down - texelFetch(range_xy, above < 0 ? index : above).xy) / apart.y;
-        precise vec2 missed = xy - texelFetch(range_xy, index).xy;
+        precise vec2 along = sample_xy(right < 0 ? index : right);
+        precise vec2 down = sample_xy(below < 0 ? index : below);
+        along = (along - sample_xy(left < 0 ? index : left)) / apart.x;
+        down = (down - sample_xy(above < 0 ? index : above)) / apart.y;
+        precise vec2 missed = xy - sample_xy(index);
         precise float area = along.x * down.y - along.y * down.x;
         if (area == 0.0) return vec2(NO_PLACE);
         precise vec2 moved = vec2(missed.x * down.y - missed.y * down.x, along.x * missed.y - along.y * missed.x);

@@ -669,7 +669,7 @@ def test_far_from_the_world_s_zero_nothing_is_lost(renderer: Renderer) -> None:
 
 
 def test_too_many_samples_are_told(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(renderer.gpu, "max_points", 2000)
+    monkeypatch.setattr(renderer.gpu, "max_points", 600)
     with pytest.raises(InputError, match="the range views of one pose have 2,433 pixels, which is too many"):
         held(renderer.gpu, VIEWS)
     with pytest.raises(ValueError, match="at most 8"):

@@ -57,6 +57,7 @@ _SLICE = 1 << 17  # samples uploaded, or read by what is made of them, at a time
 _LOOKED_AT = 17  # pixels along either edge that tell how a lens is undone
 _LAST_STEP = 1e-4  # at depth 1: what is missing after it is below float32's rounding
 _MOST_STEPS = 9
+_MOST_SAMPLES = 1 << 29  # of which shaders count eight parts each in 32 bits
 _SOFTWARE_RUN = 16  # samples of a row that an invocation makes where it is invocations that take long
 
 
@@ -117,7 +118,8 @@ class RangeSamples:
 
     depths: R32F, of level 0 the bits that were read. looks: RGBA8, sRGB; alpha 0: no sample, else 1 to 255 by
     the confidence relative to the view's largest. xy: RG32F, measured x and y in the pod's camera space, None
-    where no view has such. tiles: RGBA32F, bounds of 16 x 16 samples of a level each, for
+    where no view has such. Where a driver takes no so many texels, each of these holds four samples, or x
+    and y of two. tiles: RGBA32F, bounds of 16 x 16 samples of a level each, for
     shaders/range/tiles.glsl. view_levels: of each view, of each level, where its samples are. levels: of each
     view; level k has 2^k times fewer columns and rows, rounded up. defines: macros for programs that include
     range/samples.glsl: what the views have, so that nothing is computed for what none has.
@@ -141,9 +143,10 @@ class RangeSamples:
         self.view_levels, self._total, self.tile_count = _view_levels(self._pods, self.levels)
         self._check_size()
         has_xy = any(pod.has_xy for pod in self._pods)
-        self.depths = self._texels(gl.R32F, 4 * self._total)
-        self.looks = self._texels(gl.RGBA8, 4 * self._total)
-        self.xy = self._texels(gl.RG32F, 8 * self._total) if has_xy else None
+        self._wide = self._total > gpu.max_points
+        self.depths = self._texels(gl.RGBA32F if self._wide else gl.R32F, 4 * self._total)
+        self.looks = self._texels(gl.RGBA32UI if self._wide else gl.RGBA8, 4 * self._total)
+        self.xy = self._texels(gl.RGBA32F if self._wide else gl.RG32F, 8 * self._total) if has_xy else None
         self.tiles = self._texels(gl.RGBA32F, 16 * RANGE_TILE_TEXELS * self.tile_count)
         self._table = self._texels(gl.RGBA32UI, 16 * RANGE_ENTRY * len(views))
         self._run = _SOFTWARE_RUN if gpu.software else 1
@@ -152,6 +155,7 @@ class RangeSamples:
             "RANGE_KINDS": int(np.bitwise_or.reduce([pod.kind for pod in self._pods])),
             "RANGE_LENS_STEPS": max(pod.lens_steps for pod in self._pods),
             "RANGE_HAS_XY": int(has_xy),
+            "RANGE_WIDE": int(self._wide),
             "RANGE_COUNT": len(views),
         }
         self.spacing = max(_spacing(view) for view in views)
@@ -203,7 +207,8 @@ class RangeSamples:
     def heights(self, axis: tuple[float, ...], origin: NDArray[np.float64]) -> gl.BufferTexture:
         """Texels of the height along an axis, (3,) in the world, of each sample of level 0 by its id, scan
         units, relative to an origin, (3,); any number where there is no sample. Those of the last axis and
-        origin are cached."""
+        origin are cached. Raises InputError where a driver takes no texel for each."""
+        check_values(self._gpu, self.count)
         if self._heights is not None and self._heights_of == (axis, origin.tobytes()):
             return self._heights
         self._gpu.discard(self._heights)
@@ -241,7 +246,7 @@ class RangeSamples:
         gpu = self._gpu
         if self._normals is None:
             self._normals = _Normals(
-                self._texels(gl.R32UI, 4 * self._total),
+                self._texels(gl.RGBA32UI if self._wide else gl.R32UI, 4 * self._total),
                 gpu.buffer(reserve=4 * RANGE_TILE * self.tile_count),
             )
         known = self._normals
@@ -281,10 +286,9 @@ class RangeSamples:
         return gl.BufferTexture(self._gpu.buffer(reserve=nbytes), texel_format)
 
     def _check_size(self) -> None:
-        """Raise InputError for more samples than a driver takes, in all or of a level that shaders write."""
-        sample = 8 if any(pod.has_xy for pod in self._pods) else 4
-        written = max((sample * levels[1].count for levels in self.view_levels if self.levels > 1), default=0)
-        if self._total > self._gpu.max_points or written > self._gpu.max_storage_bytes:
+        """Raise InputError for more samples than a driver's texels hold, or than shaders count."""
+        a_texel = 2 if any(pod.has_xy for pod in self._pods) else 4
+        if self._total > min(a_texel * self._gpu.max_points, _MOST_SAMPLES):
             count = sum(levels[0].count for levels in self.view_levels)
             raise InputError(
                 f"the range views of one pose have {count:,} pixels, which is too many for this graphics "
@@ -337,6 +341,9 @@ class RangeSamples:
             "range/reduce.comp", {**self.defines, **taken, "NEAREST": int(how.nearest)}
         )
         self._bind_read()
+        runs = -(-made.size[0] // self._run)
+        page = first // runs * made.size[0] // _ALIGNED * _ALIGNED
+        end = min(-(-(first + count) // runs), made.size[1]) * made.size[0]
         for texels, storage, nbytes in (
             (self.depths, Storage.RANGE_DEPTHS, 4),
             (self.looks, Storage.RANGE_LOOKS, 4),
@@ -344,9 +351,9 @@ class RangeSamples:
         ):
             if texels is not None:
                 texels.buffer.bind_to_storage_buffer(
-                    storage, offset=nbytes * made.first, size=nbytes * made.count
+                    storage, offset=nbytes * (made.first + page), size=nbytes * (end - page)
                 )
-        self._gpu.set(program, number=number, level=level, first=first, run=self._run)
+        self._gpu.set(program, number=number, level=level, first=first, run=self._run, page=page)
         with self._gpu.timers.measure("reduce"):
             self._gpu.dispatch(program, count)
 
@@ -410,6 +417,16 @@ class RangeSamples:
         to_view[:3, :3] = view.rotation
         to_view[:3, 3] = view.translation - view.rotation @ view.origin
         return to_view @ np.linalg.inv(pod.world_to_camera)
+
+
+def check_values(gpu: Gpu, count: int) -> None:
+    """Raise InputError where a driver takes no texel of its own for a number of each sample."""
+    if count > gpu.max_points:
+        raise InputError(
+            f"cannot colour {count:,} pixels of range views by a number on this graphics driver, "
+            f"which takes {gpu.max_points:,}",
+            hint="Choose another colour, such as the scan's own, or reduce the size of its images",
+        )
 
 
 def _spacing(view: RangeView) -> float:

@@ -13,6 +13,7 @@ from ..gpu import gl
 from ..gpu.arrays import as_float32
 from ..gpu.chunks import Chunks
 from ..gpu.pose import GpuPose, PosePart
+from ..gpu.range_samples import check_values
 from ..scan.points import PointCloud
 from ..scan.range_points import RangePoints
 from ..scan.rays import Ray, rows_along
@@ -250,6 +251,7 @@ class SampleRows(PointRows):
         return name == "normal" or self.pose.overview.colors is not None
 
     def scalar_texels(self, name: str, zero: float) -> gl.BufferTexture:
+        check_values(self.pose.gpu, sum(view.depth.size for view in self.pose.views))
         return self.pose.packed(_sample_scalar, name, zero, of=self._samples)
 
     def _by_row(self, values: NDArray, zero: float) -> NDArray[np.float32]:
