@@ -25,7 +25,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
     Path("seq").mkdir()
     for frame in range(3):
-        x, y = np.random.default_rng(frame).uniform(-SIDE / 2, SIDE / 2, (2, 1600))
+        x, y = np.random.default_rng(frame).uniform(-SIDE / 2, SIDE / 2, (2, 800))
         points = moved(np.column_stack([x, y, hills(x, y)]), frame)
         formats.write(f"seq/f{frame}.npz", PointCloud.from_arrays(points))
     return tmp_path
@@ -36,7 +36,7 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
     assert whole.code == 0, whole.err
     assert whole.out.endswith("whole/displacements.npz\nwhole/report.json\n")
     found = Displacements.read("whole/displacements.npz")
-    assert found.displacement.shape == (3, 1600, 3)
+    assert found.displacement.shape == (3, 800, 3)
     assert found.reference.dtype == np.float64
     report = json.loads(Path("whole/report.json").read_text())
     assert report["states"]["seen"]["share"] > 0.9

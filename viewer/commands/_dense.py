@@ -49,9 +49,14 @@ def run_dense(args: Namespace, timeline: Timeline, reference_pose: ReferencePose
             tick()
     report(timeline, 0)
     save_displacements(file, points.reference, len(timeline), kept.read)
-    states = np.array([np.bincount(kept.read(n).state, minlength=3) for n in range(len(timeline))])
-    shares = states / len(points.points)
-    is_exact = all(kept.read(n).pose is None for n in range(len(timeline)))
+    shares, bodies = [], 0
+    for index in range(len(timeline)):
+        one = kept.read(index)
+        shares.append(np.bincount(one.state, minlength=3) / len(one.state))
+        bodies += one.pose is not None
+    states = np.array(shares)
+    others = np.delete(states, [] if frame is None else frame, axis=0)
+    is_exact = not bodies and bool((others[:, PointState.LOST] < 1).any())
     found = {
         "version": __version__,
         "scan": timeline.name,
@@ -60,13 +65,13 @@ def run_dense(args: Namespace, timeline: Timeline, reference_pose: ReferencePose
         "points": len(points.points),
         "same_points_in_file": is_exact,
         "states": {
-            state.name.lower(): {"share": float(shares[:, state].mean()), "frames": shares[:, state].tolist()}
+            state.name.lower(): {"share": float(states[:, state].mean()), "frames": states[:, state].tolist()}
             for state in PointState
         },
     }
     save_json(facts, found)
     kept.end()
-    _tell(shares, is_exact, len(points.points))
+    _tell(states, is_exact, len(points.points))
     return [file, facts]
 
 

@@ -18,7 +18,7 @@ from viewer.errors import InputError
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline
 
-POINTS, FRAMES = 1600, 4
+POINTS, FRAMES = 1600, 3
 Float = NDArray[np.float64]
 
 
@@ -69,7 +69,7 @@ def sampled_anew() -> tuple[Kept, list[Float]]:
 
 def test_points_are_followed_where_frames_share_none(sampled_anew: tuple[Kept, list[Float]]) -> None:
     kept, where = sampled_anew
-    for frame in (0, 2, 3):
+    for frame in (0, 2):
         error, seen = off(kept[frame], where[1], frame, 1), kept[frame].state == PointState.SEEN
         assert seen.mean() > 0.9
         assert np.median(error[seen]) < 0.1
@@ -120,6 +120,41 @@ def test_points_that_a_file_names_are_exact_and_missing_ones_lost() -> None:
     assert np.isnan(found.displacement[:10]).all()
     assert not found.sigma[10:].any()
     assert off(found, where, 1)[10:].max() < 1e-4
+
+
+def test_frames_without_colors_are_followed_by_their_shape() -> None:
+    where = [places(seed) for seed in range(3)]
+    clouds = [frame_of(each, frame) for frame, each in enumerate(where)]
+    source = KeptFrames("hills", [clouds[0], *(replace(c, colors=None) for c in clouds[1:])], np.arange(3.0))
+    kept = followed(Timeline(source, source.times(), "mm"))
+    assert np.median(off(kept[2], where[0], 2)) < 0.3
+
+
+@pytest.mark.parametrize("count", [1, 3, 30])
+def test_a_few_points_are_lost_or_followed(count: int) -> None:
+    where = places(0)[:count]
+    kept = followed(scan([where, where]))
+    assert kept[1].displacement.shape == (count, 3)
+    assert np.isfinite(kept[1].displacement[kept[1].state != PointState.LOST]).all()
+
+
+class Torn(KeptFrames):
+    """A source that cannot read one frame."""
+
+    def load(self, index: int) -> PointCloud:
+        if index == 1:
+            raise InputError("is torn")
+        return super().load(index)
+
+
+def test_a_frame_that_cannot_be_read_is_lost_and_the_next_one_is_not() -> None:
+    where = [places(seed) for seed in range(3)]
+    clouds = [frame_of(each, frame) for frame, each in enumerate(where)]
+    source = Torn("hills", clouds, np.arange(3.0))
+    kept = followed(Timeline(source, source.times(), "mm"))
+    assert (kept[1].state == PointState.LOST).all()
+    assert np.isnan(kept[1].displacement).all()
+    assert np.median(off(kept[2], where[0], 2)) < 0.1
 
 
 def test_frames_are_kept_in_a_folder(tmp_path: Path, sampled_anew: tuple[Kept, list[Float]]) -> None:

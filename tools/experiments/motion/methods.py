@@ -22,6 +22,9 @@ _NEIGHBORS = 20  # that normals are of
 _ROUNDS = 50
 _REACHES = 8.0, 3.0, 1.5  # mm, of one ICP after the other
 _REACH = 4.0  # mm, of small_gicp
+_DRIFTS = 60  # rounds of coherent point drift
+_STRAY = 0.1  # share of points that it takes for strays
+_LEAST_VARIANCE = 1e-7  # of its residuals, in units of its own
 _TUKEY = 0.5  # mm, from which on Tukey's weights are 0
 
 
@@ -76,3 +79,32 @@ def _rigid(matrix: Float) -> Rigid:
     """A motion whose rotation is exact again."""
     rotation = best_rotation(np.eye(3), np.asarray(matrix)[:3, :3].T)
     return Rigid(rigid_matrix(rotation, np.asarray(matrix)[:3, 3]))
+
+
+def coherent_point_drift(points: Float, targets: Float, *, wide: float = 2.0, smooth: float = 3.0) -> Float:
+    """Coherent point drift, non-rigid (Myronenko and Song 2010), plainly: gives the moved points, (N, 3).
+
+    targets: (M, 3). wide: width of the motion's kernel, and smooth: its weight, after both clouds were scaled
+    to unit variance, as the paper has them.
+    """
+    middle, scale = targets.mean(axis=0), targets.std()
+    y, x = (points - middle) / scale, (targets - middle) / scale
+    kernel = np.exp(-_squares(y, y) / (2 * wide**2))
+    ways = np.zeros_like(y)
+    variance = _squares(y, x).mean() / 3
+    for _ in range(_DRIFTS):
+        moved = y + kernel @ ways
+        chances = np.exp(-_squares(moved, x) / (2 * variance))
+        stray = (2 * np.pi * variance) ** 1.5 * _STRAY / (1 - _STRAY) * len(y) / len(x)
+        chances /= chances.sum(axis=0) + stray
+        weights, wanted = chances.sum(axis=1), chances @ x
+        system = weights[:, None] * kernel + smooth * variance * np.eye(len(y))
+        ways = np.linalg.solve(system, wanted - weights[:, None] * y)
+        moved = y + kernel @ ways
+        variance = max(float((chances * _squares(moved, x)).sum() / weights.sum() / 3), _LEAST_VARIANCE)
+    return moved * scale + middle
+
+
+def _squares(one: Float, other: Float) -> Float:
+    """The squared distances of points, (N, M)."""
+    return ((one[:, None] - other[None]) ** 2).sum(axis=2)

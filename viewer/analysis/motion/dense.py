@@ -249,6 +249,8 @@ class DensePoints:
         from .dense_kernels import PlaceMatches, carry_places, find_beside, fit_surface, match_places
 
         count, channels = held.colors.shape
+        if now.held.colors.shape[1] != channels:  # one of the frames has no colours
+            channels = 0
         found = PlaceMatches(
             np.empty((count, 3)),
             np.empty(count, np.int64),
