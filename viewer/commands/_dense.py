@@ -97,4 +97,4 @@ def _tell(shares: np.ndarray, is_exact: bool, count: int) -> None:
     tell(f"Of {count:,} points, {seen:.1%} are seen, {hidden:.1%} hidden, {lost:.1%} lost")
     poor = int((shares[:, PointState.SEEN] < _POOR).sum())
     if poor:
-        warn(f"In {poor} frames, fewer than half of the points are seen")
+        warn(f"Fewer than half of the points are seen in {poor} of {len(shares)} frames")
