@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from ....scan.times import frame_in_words
 from ... import widgets
 from ...ui import Ui
-from .choices import LANDMARKS, PAINTED, REGION_WORDS, Settings
+from .choices import FOUND, LANDMARKS, PAINTED, REGION_WORDS, Settings
 
 if TYPE_CHECKING:
     from . import Tool
@@ -90,7 +90,8 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
         widgets.faint("The region is empty: paint it, or tick its landmarks.")
         return
     if motions is None:
-        widgets.faint("Scan4D finds the part of the subject that keeps its shape, and removes its motion.")
+        if tool.choices.region == FOUND:
+            widgets.faint("Scan4D finds the part of the subject that keeps its shape in all frames.")
         return
     if motions.problem:
         widgets.faint(motions.problem)
@@ -101,6 +102,15 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
         if stabiliser.is_stopped and ui.row("Continue").button():
             stabiliser.resume()
     facts = tool.facts
+    for line in facts.lines:
+        widgets.faint(line)
+    for warning in facts.warnings:
+        imgui.text_wrapped(warning)
+    _draw_colors(tool, ui)
+
+
+def _draw_colors(tool: Tool, ui: Ui) -> None:
+    """What shows motions: colours on the subject, and curves."""
     changed, _ = imgui.checkbox("Colour by distance", tool.is_colored)
     ui.tooltip("Colour the scan by its distance from the surface of the reference frame", "distance_colors")
     if changed:
@@ -111,7 +121,3 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
         tool.toggle_region()
     widgets.faint("Curves of the motion (V plots them):")
     tool.context.settings = widgets.edit(tool.context.settings, Settings())
-    for line in facts.lines:
-        widgets.faint(line)
-    for warning in facts.warnings:
-        imgui.text_wrapped(warning)
