@@ -110,7 +110,7 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
 
 
 def _draw_colors(tool: Tool, ui: Ui) -> None:
-    """What shows motions: colours on the subject, and curves."""
+    """The colours of motions on the subject, and the choice of their curves."""
     changed, _ = imgui.checkbox("Colour by distance", tool.is_colored)
     ui.tooltip("Colour the scan by its distance from the surface of the reference frame", "distance_colors")
     if changed:
