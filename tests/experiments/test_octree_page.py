@@ -52,7 +52,17 @@ TREE = {
     "ms": {work: spread(8.0) for work in ("build", "attributes", "cut", "leaves")} | {"sort": spread(0.5)},
     "sorts": {work: spread(15.5) for work in ("build", "attributes", "cut", "leaves")}, **WHERE,
 }  # fmt: skip
-SIZE = Sizes("crane", 88_315, "2 %", 10, 87_504, 0.01, 71.0, {"intra": 7.42, "draco": 8.75})
+SIZE = Sizes(
+    "crane",
+    88_315,
+    "2 %",
+    10,
+    87_504,
+    0.01,
+    71.0,
+    {"intra": 7.42, "draco": 8.75},
+    {"encode": 2.5, "decode": 2.25},
+)
 
 
 def digest(drawn: list[Row], trees: list[Row], sizes: list[Row]) -> StoredRun:
@@ -112,7 +122,7 @@ def test_levels_have_time_and_error() -> None:
 
 def test_sizes_are_told_once() -> None:
     text = page([measured(), measured()])
-    assert len(lines(text, "7.42", "8.75")) == 1
+    assert len(lines(text, "7.42", "8.75", "2.25")) == 1
 
 
 def test_the_parameters_are_those_that_all_have_in_common() -> None:

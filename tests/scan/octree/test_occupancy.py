@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -40,36 +41,31 @@ def stored(octree: Octree, before: Octree | None = None) -> list[bytes]:
     return levels
 
 
+def levels(octree: Octree, deepest: int) -> Iterator[kernels.Occupied]:
+    """Levels of an octree from the root on, with what is around their nodes as the kernels find it."""
+    around = np.where(np.arange(27) == 13, 0, 1).astype(np.int32)[None]
+    beside = np.array([1 << 13], np.int32)
+    for masks in octree.masks[: deepest + 1]:
+        padded = np.append(masks, np.uint8(0))
+        counts = np.bitwise_count(padded)
+        level = kernels.Occupied(padded, np.cumsum(counts, dtype=np.int32) - counts, around, beside)
+        yield level
+        beside = np.empty(level.first[-1], np.int32)
+        around = np.empty((level.first[-1], 27), np.int32)
+        kernels.look_around(level, (0, len(masks)), beside)
+        kernels.go_down(level, beside, (0, len(masks)), around)
+
+
 def test_what_is_around_nodes_is_found() -> None:
     """Found again by looking up every octant."""
     octree = sphere(3000, depth=5)
-    around = np.where(np.arange(27) == 13, 0, -1).astype(np.int32)[None]
-    above = np.ones(1, np.uint8), np.zeros(1, np.int32)
-    moves = np.indices((3, 3, 3)).reshape(3, 27).T - 1
-    for level, masks in enumerate(octree.masks):
-        found = kernels.Surroundings.empty(len(masks))
-        kernels.survey(*above, around, (0, len(above[0])), found)
-        cells = octree.cells(level)
-        number = {tuple(cell): node for node, cell in enumerate(cells.tolist())}
-        for node, cell in enumerate(cells):
-            there = np.array([number.get(tuple(cell + move), -1) for move in moves])
-            there = there.reshape(3, 3, 3)  # x, y, z
-            lower = [there[1 - (i & 1), 1 - (i >> 1 & 1), 1 - (i >> 2)] for i in range(1, 8)]
-            assert found.before[node].tolist() == lower
-            faces = there.transpose().ravel()[[4, 10, 12, 14, 16, 22]] >= 0
-            assert found.faces[node] == faces @ (1 << np.arange(6))
-            for child in range(8):
-                to = np.array([child & 1, child >> 1 & 1, child >> 2]) * 2 - 1
-                sides = [np.array([i & 1, i >> 1 & 1, i >> 2]) * to for i in range(1, 8)]
-                near, far = (
-                    sum(bool(there[tuple(1 + sign * side)] >= 0) << bit for bit, side in enumerate(sides))
-                    for sign in (1, -1)
-                )
-                assert found.sides[node, child] == near << 7 | far
-        below = np.empty((len(masks), 27), np.int32)
-        kernels.go_down(*above, around, (0, len(above[0])), below)
-        counts = np.bitwise_count(masks)
-        above, around = (masks, np.cumsum(counts, dtype=np.int32) - counts), below
+    moves = np.indices((3, 3, 3))[::-1].reshape(3, 27).T - 1  # x fastest
+    for number, level in enumerate(levels(octree, 4)):
+        cells = octree.cells(number)
+        nodes = {tuple(cell): node for node, cell in enumerate(cells.tolist())}
+        around = np.array([[nodes.get(tuple(cell + move), len(cells)) for move in moves] for cell in cells])
+        assert np.array_equal(level.around, around)
+        assert np.array_equal(level.beside, (around < len(cells)) @ (1 << np.arange(27)))
 
 
 def test_planes_are_found() -> None:
@@ -78,22 +74,18 @@ def test_planes_are_found() -> None:
     flat = np.random.default_rng(2).uniform(-1, 1, (40_000, 3))
     flat -= (flat @ normal)[:, None] * normal
     octree = build(PointCloud.from_arrays(flat), Stop(rule="depth", depth=6), CUBE, attributes=False)
-    parents = octree.masks[3]
-    counts = np.bitwise_count(parents)
-    nodes = {tuple(cell): node for node, cell in enumerate(octree.cells(3).tolist())}
-    moves = np.indices((3, 3, 3))[::-1].reshape(3, 27).T - 1  # x fastest
-    around = np.array([[nodes.get(tuple(cell + move), -1) for move in moves] for cell in octree.cells(3)])
-    found = kernels.Surroundings.empty(len(octree.masks[4]))
-    first = np.cumsum(counts, dtype=np.int32) - counts
-    kernels.survey(parents, first, around.astype(np.int32), (0, len(parents)), found)
-    children = octree.centers(4)[:, None] + octree.size(5) * (
-        np.array([[child & 1, child >> 1 & 1, child >> 2] for child in range(8)]) - 0.5
-    )
-    true = np.abs(children @ normal) / octree.size(4)
-    told = (found.planes >> 8) / 20
-    is_near = (found.planes & 15 > 0) & (true < 1)
-    assert is_near.mean() > 0.8
-    assert np.abs(told - true)[is_near].mean() < 0.2
+    *_, parents = levels(octree, 3)
+    planes = np.empty((5, len(octree.masks[3])), np.int32)
+    kernels.fit_planes(parents, (0, planes.shape[1]), planes)
+    found = planes[:3] / np.linalg.norm(planes[:3], axis=0).clip(1)
+    is_found = planes[4] > 0
+    assert is_found.mean() > 0.9
+    assert np.abs(found[:, is_found].T @ normal).mean() > 0.99
+    edge = octree.size(4)
+    off = np.abs(octree.centers(3) @ normal) / edge
+    told = np.abs(planes[3]) / (4 * np.linalg.norm(planes[:3], axis=0).clip(1))
+    is_near = is_found & (off < 1)
+    assert np.abs(told - off)[is_near].mean() < 0.2
 
 
 @pytest.mark.parametrize("cores", [1, 3])

@@ -233,6 +233,7 @@ def _size_columns(rows: Sequence[Row]) -> list[Column]:
         Column("scene", left=True), Column("points"), Column("stop", left=False), Column("depth", form="{}"),
         Column("leaves"), Column("loss", lambda row: f"{100 * row['loss']:.1f} %"),
         Column("D1, dB", "psnr", "{:.1f}"), *_bits_columns(rows[0]["bits"] if rows else ()),
+        Column("encode, M/s", "speeds.encode", "{:.2f}"), Column("decode, M/s", "speeds.decode", "{:.2f}"),
     ]  # fmt: skip
 
 

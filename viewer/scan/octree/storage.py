@@ -24,7 +24,7 @@ from .occupancy import OccupancyCoder
 from .octree import DEEPEST, Attributes, Octree
 
 MAGIC = b"\x8dSVO"
-VERSION = 3
+VERSION = 4
 _FREE = 1 << 22  # nodes of any tree: some 300 MB as points
 MOST_BEFORE = 255  # trees that have to be read before one
 
