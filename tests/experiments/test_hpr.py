@@ -177,7 +177,7 @@ def view() -> JudgedView:
 def test_all_methods_judge_a_sphere(
     renderer: Renderer, view: JudgedView, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(accuracy, "PAPER_SECTORS", 40_000)  # what suits so few points
+    monkeypatch.setattr(verdicts, "PAPER_SECTORS", 40_000)  # what suits so few points
     found = {(method, radius): row for method, radius, row in accuracy.judged(renderer.gpu, view)}
     assert {radius for method, radius in found if method == EXACT} == {BEST, AUTOMATIC, KATZ}
     for method in (EXACT, *MODES):
@@ -227,7 +227,7 @@ def test_pictures_show_what_is_wrong(renderer: Renderer, view: JudgedView, tmp_p
 
 def test_every_model_of_the_suite_is_known() -> None:
     assert set(verdicts.SCENES) <= set(catalog.scene_names(None))
-    assert accuracy.PAPER_SECTORS in growth.COUNTS
+    assert verdicts.PAPER_SECTORS in growth.COUNTS
 
 
 # --- tables ---------------------------------------------------------------------------

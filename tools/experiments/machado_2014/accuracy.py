@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from experiments.machado_2014 import peers
 from experiments.machado_2014.shown import ERROR_PICTURE, error_row, save_picture
@@ -14,28 +13,22 @@ from experiments.machado_2014.verdicts import (
     AUTOMATIC,
     BEST,
     EXACT,
-    HULL,
-    HULL_AT_4M,
     KATZ,
-    MOST_PER_POINT,
-    OF_PAPER,
-    OF_PAPER_AT_4M,
     SCENES,
     JudgedView,
     Verdicts,
+    called_on_gpu,
     views,
 )
 from experiments.suite import row_of, subjects
 from experiments.tables import Row
 from viewer.bench.run import Bench
 from viewer.gpu.context import Gpu
-from viewer.scan.pose import Pose
 from viewer.visibility.exact import Kernel, flipping, katz_radius, searched_decades
-from viewer.visibility.search import MODES, calibrated, visible_points
+from viewer.visibility.search import calibrated
 
 NOISES = (0.0, 0.001, 0.005, 0.01)  # standard deviations, in diameters of the model
 MOST_NOISY = 200_000  # points of scans that noise is added to: the search for the best radius takes minutes
-PAPER_SECTORS = 4_000_000  # of the paper's experiment
 _LOW, _HIGH = (
     2.0,
     5.0,
@@ -74,20 +67,9 @@ def judged(gpu: Gpu, view: JudgedView) -> Iterator[tuple[str, str, Row]]:
         radii[KATZ] = katz_radius(view.cloud, view.eye)
     for name, radius in radii.items():
         yield EXACT, name, _row(view.hull(flipping(view.seen, radius)), view, radius)
-        for method, rows in _on_gpu(gpu, view, radius):
+        for method, rows in called_on_gpu(gpu, view, radius):
             yield method, name, _row(view.verdicts(rows), view, radius)
     yield from _peers(view, best)
-
-
-def _on_gpu(gpu: Gpu, view: JudgedView, radius: float) -> Iterator[tuple[str, NDArray[np.uint32]]]:
-    """Yield what the operator by sectors calls visible, in each mode, and with the paper's sectors."""
-    pose = Pose(0, 0.0, "", view.cloud)
-    half_filled = calibrated(pose, view.eye, radius).sectors.count  # eq. 5
-    wanted = {mode: (mode, half_filled if mode == OF_PAPER else None) for mode in MODES}
-    if MOST_PER_POINT * len(view.cloud) >= PAPER_SECTORS:
-        wanted |= {HULL_AT_4M: (HULL, PAPER_SECTORS), OF_PAPER_AT_4M: (OF_PAPER, PAPER_SECTORS)}
-    for method, (mode, sectors) in wanted.items():
-        yield method, visible_points(pose, view.eye, radius=radius, sectors=sectors, mode=mode, gpu=gpu)
 
 
 def best_radius(view: JudgedView, kernel: Callable[[float], Kernel]) -> float:

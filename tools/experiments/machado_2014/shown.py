@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.machado_2014.verdicts import EXACT, HULL, JudgedView
+from experiments.machado_2014.verdicts import EXACT, HULL, JudgedView, called_on_gpu
 from viewer.backends import backend
 from viewer.bench.report.pictures import Image, titled_row
 from viewer.bench.scenes.subjects import with_rows
@@ -36,12 +36,8 @@ def error_row(renderer: Renderer, view: JudgedView) -> Image:
     """Points called visible at the automatic radius: missed ones red, extra ones blue, others grey."""
     pose = Pose(0, 0.0, "", view.cloud)
     radius = calibrated(pose, view.eye).radius
-    called = {
-        EXACT: exact_visible_points(pose, view.eye, radius),
-        **{
-            mode: visible_points(pose, view.eye, radius=radius, mode=mode, gpu=renderer.gpu) for mode in MODES
-        },
-    }
+    called = {EXACT: exact_visible_points(pose, view.eye, radius)}
+    called |= {name: rows for name, rows in called_on_gpu(renderer.gpu, view, radius) if name in MODES}
     look, drawn = Look(light="flat", eye_dome=False, background="#ffffff"), {}
     for name, rows in called.items():
         verdicts = view.verdicts(rows)

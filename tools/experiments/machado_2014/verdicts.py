@@ -17,9 +17,12 @@ from experiments.papers import figures
 from viewer.bench.report.results import Row
 from viewer.bench.scenes.subjects import Moment
 from viewer.camera import Camera
+from viewer.gpu.context import Gpu
 from viewer.mesh.reference import visible
 from viewer.scan.points import PointCloud
+from viewer.scan.pose import Pose
 from viewer.visibility.exact import Kernel, SeenPoints, hull_rows
+from viewer.visibility.search import MODES, calibrated, visible_points
 
 PAPER = figures("machado_2014")  # counts and Table 1
 SCENES = ("armadillo", "igea", "dragon")
@@ -27,6 +30,7 @@ BEST, AUTOMATIC, KATZ = "best", "automatic", "Katz's search"  # radii
 EXACT, HULL, COMBINED, OF_PAPER = "exact", "hull", "combined", "paper"
 HULL_AT_4M, OF_PAPER_AT_4M = "hull, k = 4e6", "paper, k = 4e6"
 
+PAPER_SECTORS = 4_000_000  # of the paper's experiment
 MOST_PER_POINT = 1000  # sectors: with more, propagation takes too many steps
 _AZIMUTH, _ELEVATION = 30.0, 10.0  # of the first view, degrees
 
@@ -111,3 +115,14 @@ def views(moment: Moment, count: int, noise: float = 0.0, seed: int = 0) -> Iter
 def pooled(by_view: Sequence[Row]) -> Verdicts:
     """The verdicts of all views of a row together."""
     return Verdicts(*(sum(view[name] for view in by_view) for name in ("missed", "extra", "correct")))
+
+
+def called_on_gpu(gpu: Gpu, view: JudgedView, radius: float) -> Iterator[tuple[str, NDArray[np.uint32]]]:
+    """Yield what the operator by sectors calls visible, in each mode, and with the paper's sectors."""
+    pose = Pose(0, 0.0, "", view.cloud)
+    half_filled = calibrated(pose, view.eye, radius).sectors.count  # eq. 5
+    wanted = {mode: (mode, half_filled if mode == OF_PAPER else None) for mode in MODES}
+    if MOST_PER_POINT * len(view.cloud) >= PAPER_SECTORS:
+        wanted |= {HULL_AT_4M: (HULL, PAPER_SECTORS), OF_PAPER_AT_4M: (OF_PAPER, PAPER_SECTORS)}
+    for method, (mode, sectors) in wanted.items():
+        yield method, visible_points(pose, view.eye, radius=radius, sectors=sectors, mode=mode, gpu=gpu)
