@@ -54,7 +54,7 @@ def test_each_pixel_has_the_number_of_its_point(
 ) -> None:
     numbers = expected(cloud)
     for name, kind in VALUES.items():
-        params = {"radius_scale": SCALE, "cull": cull}
+        params = {"radius_scale": SCALE, "cull": cull, "surface": "nearest"}  # splats at their points
         surface = draw(cloud, CAMERA, SIZE, "auto_splats", Look(color_by=name, light="flat"), params)
         seen = surface.row != NOTHING
         assert seen.sum() > 5000
