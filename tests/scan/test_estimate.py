@@ -123,9 +123,9 @@ def test_normals_of_real_bodies_point_out(data_dir: Path, model: str) -> None:
         pytest.param(
             "horse_gallop_48",
             0.002,
-            marks=pytest.mark.xfail(strict=True, reason="3.2 %: rings round thin legs"),
+            marks=pytest.mark.xfail(strict=True, reason="2.2 %: rings round thin legs"),
         ),
-        pytest.param("crane_175", 0.002, marks=pytest.mark.xfail(strict=True, reason="0.5 % are wrong")),
+        pytest.param("crane_175", 0.002, marks=pytest.mark.xfail(strict=True, reason="0.4 % are wrong")),
     ],
 )
 def test_normals_of_moving_bodies_point_out(data_dir: Path, folder: str, wanted: float) -> None:

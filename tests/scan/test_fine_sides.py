@@ -178,6 +178,20 @@ def test_planes_on_something_thin_go_through_the_points_of_one_side() -> None:
     assert np.array_equal(fine_sides.one_sided_normals(one_sheet, same, near), same)
 
 
+def test_normals_that_lean_to_the_wrong_side_follow_the_winding_number() -> None:
+    points, truth = lens(1500, 1.0)
+    near = np.argsort(np.linalg.norm(points[:, None] - points, axis=2), axis=1)[:, :20].astype(np.int32)
+    normals = truth.astype(np.float32)
+    assert np.array_equal(fine_sides.steered_normals(points, normals, near, 9), normals)
+    across = np.cross(truth[::50], [0.6, 0.8, 0])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    normals[::50] = across * np.cos(0.3) - truth[::50] * np.sin(0.3)
+    steered = fine_sides.steered_normals(points, normals, near, 9)
+    assert np.linalg.norm(steered, axis=1) == pytest.approx(1, abs=1e-5)
+    assert np.mean(np.einsum("ij,ij->i", steered, truth) > np.cos(np.radians(20))) > 0.99
+    assert np.einsum("ij,ij->i", steered, truth).min() > 0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("folder", "least"), [("horse_gallop_48", 0.002), ("crane_175", 0.0)])
 def test_fine_sides_of_moving_bodies_are_never_worse(data_dir: Path, folder: str, least: float) -> None:

@@ -37,6 +37,9 @@ _SPACING_OF = 6  # neighbours that tell the distance between points
 _TWO_SHEETS = 0.85, 0.95
 _TRUSTED = 2.0  # so that half of the trust decides a link
 _FAR = 3.0  # radii of a patch, the distance from which its cluster stands for its points
+_OPPOSITE = -0.8  # cosine from which normals are those of two flat sides, whose planes are good
+_STEERS = 5  # rounds in which normals follow the winding number
+_STEERED_SOFT = 0.4  # in distances between points
 _PART = 128  # points of a group whose cluster stands for them, at most
 _AT_ONCE = 1 << 8  # targets of one call of a compiled loop
 _ROWS = 1 << 13  # points of one
@@ -105,6 +108,31 @@ def one_sided_normals(
 
     together(len(points), [partial(fit, start) for start in range(0, len(points), _ROWS)])
     return fitted
+
+
+def steered_normals(
+    points: Vectors, normals: NDArray[np.float32], near: NDArray[np.int32], linked: int
+) -> NDArray[np.float32]:
+    """The normals, (N, 3), where one of the nearest leans to the other side: those along which the winding
+    number of the neighbours falls fastest (Lin et al. 2024), since a plane through both sides says nothing.
+
+    points, normals: (N, 3). near: (N, K), each point and its nearest others. linked: how many are nearest.
+    """
+    from .winding_kernels import fall_fastest
+
+    if near.shape[1] <= _AREA_OF:
+        return normals
+    cosines = np.einsum("ij,ikj->ik", normals, normals[near[:, :linked]])
+    rows = np.flatnonzero(((cosines < 0) & (cosines > _OPPOSITE)).any(axis=1))
+    area = np.pi * np.linalg.norm(points[near[:, _AREA_OF]] - points, axis=1) ** 2 / (_AREA_OF + 0.5)
+    soft = (_STEERED_SOFT * np.linalg.norm(points[near[rows, _SPACING_OF]] - points[rows], axis=1)) ** 2
+    steered = normals.astype(np.float64)
+    directions = np.empty((len(rows), 3))
+    for _ in range(_STEERS):
+        checkpoint()
+        fall_fastest(points, steered * area[:, None], near, rows, soft, directions)
+        steered[rows] = directions
+    return steered.astype(np.float32)
 
 
 def _told_apart(

@@ -78,7 +78,7 @@ def facing_out(
         refitted = fine_sides.one_sided_normals(points, oriented, near)
         oriented, bonds = _linked_sides(points, refitted, linked, seen_from)
         turned = fine_sides.better_sides(points, oriented, near, bonds)
-        oriented *= turned[:, None]
+        oriented = fine_sides.steered_normals(points, oriented * turned[:, None], near, LINKED)
         held = bonds.weights * turned[bonds.links].prod(axis=1)
     is_doubtful = np.zeros(len(points), bool)
     is_doubtful[bonds.links[held < -_DOUBTFUL]] = True

@@ -198,3 +198,35 @@ def fields(
             else:
                 total = _from_near(points, vectors, order[borders[c, 0] : borders[c, 1]], place, soft[t])
             found[t, sum_of[c]] += total / _FOUR_PI
+
+
+@compiled
+def fall_fastest(
+    points: NDArray[np.float64],
+    vectors: NDArray[np.float64],
+    near: NDArray[np.int32],
+    rows: NDArray[np.integer],
+    soft: NDArray[np.float64],
+    directions: NDArray[np.float64],
+) -> None:
+    """Fill the directions in which the winding number of neighbours falls fastest at some points, (R, 3).
+
+    near: (N, K), each point and its neighbours. rows: (R,). soft: (R,), as in `fields`.
+    """
+    falling = np.empty(3)
+    for n in range(len(rows)):
+        i = rows[n]
+        falling[:] = 0.0
+        for k in range(near.shape[1]):
+            j, along, squared = near[i, k], 0.0, soft[n]
+            for axis in range(3):
+                step = points[j, axis] - points[i, axis]
+                along += step * vectors[j, axis]
+                squared += step * step
+            cubed = squared * np.sqrt(squared)
+            for axis in range(3):
+                step = points[j, axis] - points[i, axis]
+                falling[axis] += (vectors[j, axis] - 3.0 * step * along / squared) / cubed
+        length = np.sqrt((falling * falling).sum())
+        for axis in range(3):
+            directions[n, axis] = falling[axis] / length
