@@ -34,7 +34,6 @@ from ..splatting.subpixel import average, splat_subpixel, subpixel_share
 from ..splatting.tiles import FALLBACK, most_listed, splat
 from . import AT_EDGES, Backend, FrameView, Limit, Suited, share_param, with_levels
 
-_SORTED = {"passes": ("sorted",)}
 _SEEN_THROUGH = (
     "each pixel shows a mean of overlapping splats; radii, the number of copies and rounding decide the "
     "weight of each splat"
@@ -50,6 +49,12 @@ _RADIUS_PER_SPACING = 1.5
 # Factor on the radius in previews of some points, which lie less evenly than all do: of the demo's pixels in
 # the coarsest preview, 0.01 % show what is behind, 0.4 % without it.
 _UNEVEN = 1.3
+
+
+def _blended(**pixels: float) -> tuple[Limit, ...]:
+    """Limits of the values of `passes` that blend in an order. pixels: of `sorted`, and of `printed`."""
+    values = {"sorted": "sorted", "printed": AS_PRINTED}
+    return tuple(Limit(share, _SEEN_THROUGH, {"passes": (values[name],)}) for name, share in pixels.items())
 
 
 @dataclass(frozen=True)
@@ -141,25 +146,28 @@ class Surfels(Backend):
     blends = True
     fills = True
     limits = {
+        "rotated by a quarter turn": _blended(printed=0.0),
+        "rotated by 37 degrees": _blended(printed=0.0003),
+        "zoomed in to 1/1000 of the scan's width": _blended(printed=0.0003),
         "zoomed in to a millionth of the scan's width": (
-            Limit(0.0, _SEEN_THROUGH, _SORTED),
+            *_blended(sorted=0.0),
             Limit(0.0, _SEEN_THROUGH),
         ),
-        "zoomed in to 1/1000 of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
-        "zoomed in to a millionth of a splat's width": Limit(0.0, _SEEN_THROUGH, _SORTED),
-        "each point 1000 times in a row": Limit(0.5, _SEEN_THROUGH, _SORTED),
-        "the list of points 1000 times": Limit(0.5, _SEEN_THROUGH, _SORTED),
-        "a body, each point 1000 times": Limit(0.21, _SEEN_THROUGH, _SORTED),
+        "zoomed in to 1/1000 of a splat's width": _blended(sorted=0.0, printed=0.0),
+        "zoomed in to a millionth of a splat's width": _blended(sorted=0.0, printed=0.0),
+        "each point 1000 times in a row": _blended(sorted=0.5, printed=0.3),
+        "the list of points 1000 times": _blended(sorted=0.5, printed=0.3),
+        "a body, each point 1000 times": _blended(sorted=0.21, printed=0.26),
         "each point 1000 times, without radii": (
-            Limit(0.56, _SEEN_THROUGH, _SORTED),
+            *_blended(sorted=0.56, printed=0.24),
             Limit(0.01, AT_EDGES, {"passes": _TWO}),  # lists of tiles have no room: these are rasterised
         ),
-        "one point x1000": Limit(0.03, _SEEN_THROUGH, _SORTED),
-        "collinear points, viewed along their line, perspective": Limit(0.002, _SEEN_THROUGH, _SORTED),
-        "collinear points, viewed along their line, orthographic": Limit(0.002, _SEEN_THROUGH, _SORTED),
-        "zero radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
-        "negative radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
-        "NaN radii": Limit(0.75, _SEEN_THROUGH, _SORTED),
+        "one point x1000": _blended(sorted=0.03, printed=0.11),
+        "collinear points, viewed along their line, perspective": _blended(sorted=0.002, printed=0.006),
+        "collinear points, viewed along their line, orthographic": _blended(sorted=0.002, printed=0.006),
+        "zero radii": _blended(sorted=0.75, printed=0.0),
+        "negative radii": _blended(sorted=0.75, printed=0.0),
+        "NaN radii": _blended(sorted=0.75, printed=0.0),
     }
     default_reasons = {
         "cull_back": "the camera can see the inside of an open scan: without splats that face away, 2.2 % "
