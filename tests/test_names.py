@@ -6,9 +6,10 @@ import ast
 import re
 import subprocess
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 import source_code
@@ -71,6 +72,13 @@ def test_no_two_public_classes_share_a_name(modules: list[tuple[str, ast.Module]
 def test_no_two_public_functions_share_a_name(modules: list[tuple[str, ast.Module]]) -> None:
     shared = shared_names(ast.FunctionDef, modules)
     assert shared.keys() <= FUNCTIONS_BY_PROTOCOL, shared
+
+
+def test_no_two_test_files_share_a_name() -> None:
+    """Tests are in no packages, so pytest imports a file by its name alone."""
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    names = Counter(file.name for file in files if file.name != "conftest.py")
+    assert not [name for name, count in names.items() if count > 1]
 
 
 @pytest.mark.parametrize(

@@ -114,7 +114,7 @@ struct Given {
     bool closed;
 };
 
-const vec2 NO_SPAN = vec2(uintBitsToFloat(NO_DEPTH));
+#define NO_SPAN vec2(uintBitsToFloat(NO_DEPTH))
 
 Given given_by(ivec2 pixel, int level) {
     Given given = Given(NO_SPAN, NO_SPAN, false);

@@ -47,6 +47,7 @@ def app(screen: Screen, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ru
     keys.parent.mkdir(parents=True)
     keys.write_text(
         '[keys]\nkeys = "F1 Shift+U"\nsave_session_as = "Ctrl+Shift+S Alt+M"\nexport = "Ctrl+E U"\n'
+        'stabilise = "F8"\ndistance_colors = "F7"\n'  # U and Shift+U are theirs
     )
     with running_app(screen, home, folder) as app:
         yield app

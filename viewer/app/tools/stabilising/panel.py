@@ -78,8 +78,10 @@ def _draw_radius(tool: Tool, title: str, about: str, radius: float) -> float | N
     scale = tool.context.scale
     widgets.label(title, about)
     shown = scale.factor * radius
-    form = widgets.number_format("%.3g", scale.unit)
-    changed, new = imgui.drag_float(f"##{title}", shown, 0.01 * shown or 0.01, 0.0, 1e9, form)
+    speed = 0.01 * shown or 0.01
+    changed, new = imgui.drag_float(
+        f"##{title}", shown, speed, 0.0, 1e9, widgets.number_format("%.3g", scale.unit)
+    )
     return max(float(f"{new / scale.factor:.6g}"), 1e-9) if changed else None
 
 
