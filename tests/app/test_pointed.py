@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -27,6 +29,9 @@ def test_it_says_where_what_and_how_it_was_seen() -> None:
         "frame 3/25",
         "temperature 36.6123",
     ], "colours show the temperature"
+    far = replace(picked, scalars={"distance from reference": 0.0015})
+    words = describe_pick(far, "", Scale.of("m", "mm"), 0.15, "distance from reference")
+    assert words[-1] == "distance from reference 1.5 mm"
     assert point_details(picked, "temperature") == [
         "point 7",
         "label 4",

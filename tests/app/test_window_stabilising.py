@@ -83,6 +83,7 @@ def test_from_opening_to_a_stabilised_film_coloured_by_distance_in_eight_actions
     actions = 1  # the scan is opened
     with running_app(screen, tmp_path, scan, before=alone(tmp_path)) as app:
         app.press("shift+u")
+        assert "to colour by" not in app.log(), "no message that its numbers are not known yet"
         app.press("ctrl+e")
         actions += 2
         for field, item in (("what", "###frames"), ("format", "###mp4")):

@@ -132,6 +132,7 @@ def test_numbers_have_the_digits_that_matter(value: float, span: float, text: st
 
 def test_lengths_have_the_unit_and_scalars_their_name() -> None:
     assert quantity(Look(color_by="depth"), "mm") == "Depth (mm)"
+    assert quantity(Look(color_by="distance from reference"), "mm") == "Distance from reference (mm)"
     assert quantity(Look(color_by="temperature"), "mm") == "temperature"
     found = Look(color_by="splat_radius")
     assert quantity(found, "mm", ValueKind("", is_length=True)) == "Splat radius (mm)"

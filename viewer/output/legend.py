@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.motion import distances
 from ..camera import Camera
 from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from ..params import describe, param
@@ -19,6 +20,7 @@ from .overlays import DrawnPlot, Overlay
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 
 _MEASURED: Color = (150, 150, 150, 255)
+LENGTHS = ("depth", "height", distances.NAME)  # numbers in the scan's unit, as looks colour by them
 _BAR_SHARE = 1 / 6  # of the picture's width that a scale bar takes at most
 _MOST_DIGITS = 15  # that a float64 holds
 
@@ -118,7 +120,7 @@ def quantity(look: Look, unit: str, kind: ValueKind | None = None) -> str:
 
 def shows_length(look: Look, kind: ValueKind | None) -> bool:
     """Whether the number that the look colours by is one in the scan's unit. kind: as for `quantity`."""
-    return look.color_by in ("depth", "height") if kind is None else kind.is_length
+    return look.color_by in LENGTHS if kind is None else kind.is_length
 
 
 def number(value: float, span: float) -> str:

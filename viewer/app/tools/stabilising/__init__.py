@@ -108,6 +108,7 @@ class Tool:
         look = replace(look, color_by=name, low=0.0, high=high)
         self.context.change(step, self.choices.changed(is_shown=True), look=look)
         self.stabiliser.resume()
+        self._lay()  # the numbers, not known yet, are there before the next picture asks for them
 
     def _check_frames(self) -> None:
         if len(self.context.timeline) < 2:
@@ -143,13 +144,14 @@ class Tool:
         known, pose = self.stabiliser.known, self.context.playback.pose
         is_shown = self.choices.is_shown and bool(known)
         self.context.followed.still = self._still() if is_shown else None
-        values = self.colors.of(pose) if known and pose is not None else None
+        has_numbers = bool(known) or self.is_colored or self.shows_region
+        values = self.colors.of(pose) if has_numbers and pose is not None else None
         now = (known.get(self.frame), self._is_whole) if is_shown else None
         wanted = (self.context.timeline, now, values is not None and id(values))
         if wanted == self._laid:
             return False
         self._laid = wanted
-        numbers = self._numbers if known else None
+        numbers = self._numbers if has_numbers else None
         self.context.lay(numbers, self._motion if is_shown else None)
         return True
 
