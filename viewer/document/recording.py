@@ -117,9 +117,9 @@ class Entry:
     labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
     the scan says which it is. reading: corrections of how Scan4D reads the scan, as documents have them.
-    record: how Scan4D read it (see `Reading.to_json`), for information only. average: frames that points are
-    means of at most; 0: each frame is drawn as scanned. at: seconds since the recording
-    began; entries that differ in it alone are equal.
+    record: how Scan4D read it (see `Reading.to_json`), for information only: it grows while frames are read.
+    average: frames that points are means of at most; 0: each frame is drawn as scanned. at: seconds since the
+    recording began. Entries that differ in `record` and `at` alone are equal.
     """
 
     scan: ScanName | None
@@ -147,7 +147,7 @@ class Entry:
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
     reading: CorrectedTexts = field(default_factory=dict)
-    record: Values = field(default_factory=dict)
+    record: Values = field(default_factory=dict, compare=False)
     average: AverageFrames = 0
     at: Stamp = field(default=0.0, compare=False)
 
@@ -287,7 +287,7 @@ class Entry:
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
         """A JSON object, without `at`. before: leave out what is as it was there."""
-        changed = (f.name for f in fields(self) if f.compare)
+        changed = (f.name for f in fields(self) if f.name != "at")
         if before is not None:
             changed = (name for name in changed if getattr(self, name) != getattr(before, name))
         return {name: plain(getattr(self, name)) for name in changed}
@@ -395,12 +395,10 @@ class Recorder:
         Returns what has changed, as the recording's file will have it; None where nothing has.
         """
         before = self._entries[-1] if self._entries else None
-        if before is not None:
-            completed = replace(before, record=entry.record)
-            if entry == replace(completed, hash=before.hash or entry.hash):
-                # Nothing has changed, but Scan4D may have found facts of the scan meanwhile, such as sides.
-                self._entries[-1] = completed
-                return None
+        if before is not None and entry == replace(before, hash=before.hash or entry.hash):
+            # Nothing, or what is found while the picture stays: the hash, and how the scan was read.
+            self._entries[-1] = replace(before, record=entry.record)
+            return None
         self._entries.append(replace(entry, at=self._since(now)))
         return _change(self._entries[-1], before)
 
