@@ -35,7 +35,6 @@ LEAST, LEAST_SLITS = 0.02, 0.05  # percent of the subject: a pixel or two more a
 # Scenes where automatic radii are worse by a few pixels: mistakes to mend.
 WORSE = {
     ("ramp 1:100", "torus"): "0.08 % slits, of own radii none",
-    ("noise 0.3", "armadillo"): "0.052 % slits, of own radii none",
     ("noise 0.6", "horse"): "0.18 % more faults than own radii: open 1.5 % in place of 0.6 %",
 }
 Draw = Callable[[dict[str, Any]], Errors]

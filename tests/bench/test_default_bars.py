@@ -31,7 +31,7 @@ MISSED = {
     "closed_percent": {},
     "wrong_layer_percent": {
         "bunny": 2.1, "bunny-bare": 2.5, "bunny-ramp": 3.3, "bunny-ramp-bare": 4.2,
-        "armadillo-ramp": 1.02, "armadillo-ramp-bare": 2.3, "horse-ramp-bare": 1.006,
+        "armadillo-ramp": 1.02, "armadillo-ramp-bare": 2.3,
     },
     "normal_median": {"bunny-ramp-bare": 3.9, "armadillo-ramp-bare": 7.8},
     "depth_median_px": {
