@@ -125,6 +125,8 @@ class Tool:
     def _places(self) -> Mapping[str, Vector]:
         """The places of the region's landmarks in the reference frame, as far as the user set them there."""
         choices = self.choices
+        if not choices.landmarks:  # this is asked in each turn of the window
+            return {}
         named = {one.name: one for one in self.context.document.part(Landmarks).all}
         keys = {name: named[name].key_at(choices.reference) for name in choices.landmarks if name in named}
         return {name: key.position for name, key in keys.items() if key is not None}

@@ -34,10 +34,11 @@ def facts_of(motions: Motions, known: Mapping[int, FrameMotion], axes: np.ndarra
     if motions.reference is None or pose is None:
         return Facts()
     share = len(motions.rows) / max(pose.count, 1)
-    frame = frame_in_words(motions.asked.choices.reference)
-    lines = [f"The region has {len(motions.rows):,} points, {share:.0%} of {frame}."]
+    reference = motions.asked.choices.reference
+    lines = [f"The region has {len(motions.rows):,} points, {share:.0%} of {frame_in_words(reference)}."]
     warnings = []
-    shares = {frame: one.within for frame, one in known.items() if one.motion is not None}
+    others = {frame: one for frame, one in known.items() if frame != reference}  # its own share says nothing
+    shares = {frame: one.within for frame, one in others.items() if one.motion is not None}
     if shares:
         close = f"±{scale.factor * motions.limits.shift:.3g} {scale.unit}"
         least = min(shares, key=lambda frame: shares[frame])
