@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from command_line import Run
 from disks import small_disk
-from moving_hills import SIDE, hills
+from hill_folders import TURN, turning_hills
+from moving_hills import SIDE
 from scipy.spatial.transform import Rotation
 
 from viewer.analysis.landmarks import Landmark
@@ -23,19 +24,13 @@ from viewer.document.saved_session import SavedSession, known_as, store
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
-TURN = Rotation.from_rotvec([0.02, -0.03, 0.015])
-
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working directory: three frames of a patch that turns, and a region in its middle."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
-    Path("seq").mkdir()
-    for frame in range(3):
-        x, y = np.random.default_rng(frame).uniform(-SIDE / 2, SIDE / 2, (2, 2500))
-        points = (TURN**frame).apply(np.column_stack([x, y, hills(x, y)])) + np.array([0.5 * frame, 0, 0])
-        formats.write(f"seq/f{frame}.npz", PointCloud.from_arrays(points))
+    turning_hills("seq", 2500)
     Path("region.json").write_text('{"spheres": [[0, 0, 0, 16]]}')
     return tmp_path
 
@@ -55,8 +50,9 @@ def test_the_table_and_the_report_are_written(run: Run) -> None:
     assert np.allclose(shift, [1, 0, 0] - TURN.apply([0.5, 0, 0]), atol=0.05)
     report = json.loads(Path("out/report.json").read_text())
     assert report["reference"]["frame"] == 2
+    report = report["rigid"]
     assert report["region"]["source"] == "region.json"
-    assert report["within_half_mm"]["mean"] > 0.99
+    assert report["within"]["mean"] > 0.99
     assert report["states"] == {"ok": 3, "weak": 0, "gap": 0}
     again = run("motion", "seq", "--unit", "mm", "--region", "out/region.json", "--reference", "1", "-o", "b")
     assert again.code == 0, again.err
@@ -69,8 +65,8 @@ def test_a_scan_can_be_the_reference_of_another(run: Run) -> None:
     assert done.code == 0, done.err
     report = json.loads(Path("out/report.json").read_text())
     assert report["reference"]["scan"] == "seq/f1.npz"
-    assert report["region"]["source"] == "found"
-    assert report["states"]["gap"] == 0
+    assert report["rigid"]["region"]["source"] == "found"
+    assert report["rigid"]["states"]["gap"] == 0
 
 
 def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -91,7 +87,7 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
         patch.setattr(stabilise, "register_region", interrupted)
         stopped = run(*words, "out")
     assert stopped.code != 0
-    assert "out/transforms.partial keeps the frames so far" in stopped.err
+    assert "out keeps the frames so far" in stopped.err
     partial = Path("out/transforms.partial")
     whole = partial.read_text()
     assert len(json.loads(whole)["frames"]) == 2
@@ -119,12 +115,24 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
     assert Path("out/transforms.csv").read_bytes() == Path("whole/transforms.csv").read_bytes()
 
 
+def test_without_a_known_unit_a_point_spacing_counts_as_close(run: Run) -> None:
+    done = run("motion", "seq", "--region", "region.json", "-o", "out")
+    assert done.code == 0, done.err
+    assert "State it with --unit" in done.err
+    spacing = json.loads(Path("out/report.json").read_text())["rigid"]["limits"]["length"]
+    assert 0.5 * SIDE / 50 < spacing < 1.5 * SIDE / 50
+
+
 def test_a_frame_without_points_is_a_gap(run: Run) -> None:
     formats.write("seq/f1.npz", PointCloud.from_arrays(np.full((5, 3), np.nan)))
     done = run("motion", "seq", "--unit", "mm", "--region", "region.json", "-o", "out")
     assert done.code == 0, done.err
     assert "Scan4D finds no motion in 1 of 3 frames, such as frame 2: " in done.err
-    assert json.loads(Path("out/report.json").read_text())["states"] == {"ok": 2, "weak": 0, "gap": 1}
+    assert json.loads(Path("out/report.json").read_text())["rigid"]["states"] == {
+        "ok": 2,
+        "weak": 0,
+        "gap": 1,
+    }
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no small disk can be mounted")
@@ -150,7 +158,7 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
     words = ("motion", "seq", "--unit", "mm", "--region", "nose.json", "-o", "out", "--reference")
     done = run(*words, "1")
     assert done.code == 0, done.err
-    report = json.loads(Path("out/report.json").read_text())
+    report = json.loads(Path("out/report.json").read_text())["rigid"]
     assert report["states"]["ok"] == 3
     assert np.allclose(report["region"]["middle"][:2], [0.5, 0.0], atol=1.5)
     elsewhere = run(*words, "0", "--force")
@@ -161,7 +169,6 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
 @pytest.mark.parametrize(
     ("words", "what"),
     [
-        (("seq", "-o", "out"), "State the unit of the scan, such as --unit mm"),
         (("seq", "--unit", "mm", "--reference", "7", "-o", "out"), "no pose 7"),
         (("seq", "--unit", "mm", "--reference", "-1", "-o", "out"), "no pose -1"),
         (("seq", "--unit", "mm", "--region", "none.json", "-o", "out"), "none.json"),
@@ -170,6 +177,7 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
             "points.json: the reference frame has",
         ),
         (("seq", "--unit", "mm", "--region", "far.json", "-o", "out"), "the region has 0 points"),
+        (("seq", "--dense", "--region", "far.json", "-o", "out"), "the region has 0 points"),
         (("seq/f0.npz", "--unit", "mm", "--region", "region.json", "-o", "out"), "has only one frame"),
         (("seq", "--unit", "mm", "-o", "region.json"), "a part of the path is not a folder"),
     ],

@@ -33,10 +33,14 @@ _SEEN = 0.5  # of the frames, in which a place must have surface
 _LEAST = 0.05  # of the points, that a region must have
 
 
+class NoRigidRegion(InputError):
+    """A scan in which Scan4D finds no region that stays rigid."""
+
+
 def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[np.int64]:
     """The rows of a pose that stay rigid, increasing. frame: the pose's in the scan; None: of another scan.
 
-    Raises InputError where there is no such region.
+    Raises NoRigidRegion where there is none, and InputError where no other frame can be read.
     """
     from scipy.spatial import cKDTree
 
@@ -45,7 +49,7 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
     every = np.arange(len(surface.held.points))
     whole = RegionSurface.of(surface, every)
     if whole is None:
-        raise InputError("has too few points", pose.label)
+        raise NoRigidRegion("has too few points for a rigid region", pose.label)
     around = cKDTree(whole.patch.local).query(whole.patch.local, _AROUND)[1]
     moments = _moments(timeline, origin, frame)
     if not moments:
@@ -85,9 +89,9 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
     return np.flatnonzero(kept[nearest])
 
 
-def _none(timeline: Timeline) -> InputError:
+def _none(timeline: Timeline) -> NoRigidRegion:
     what = "Scan4D finds no region that stays rigid over all frames"
-    return InputError(what, timeline.name, "Name the region with --region")
+    return NoRigidRegion(what, timeline.name, "Name the region with --region")
 
 
 def _moments(timeline: Timeline, origin: Float, frame: int | None) -> dict[int, MomentSurface]:

@@ -39,10 +39,6 @@ class PartialMotions:
         """Write the motions by frame, in one step. Raises InputError."""
         save_json(self.path, {"key": self._key, "frames": {n: _values(one) for n, one in known.items()}})
 
-    def end(self) -> None:
-        """Delete the file: all is written elsewhere."""
-        self.path.unlink(missing_ok=True)
-
 
 def _values(found: FrameMotion) -> dict[str, Any]:
     """A motion as plain JSON; a gap has its reason alone."""

@@ -19,12 +19,14 @@ from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
 from ...scan.timeline import Timeline
+from ...scan.units import conversion
 from ...task import checkpoint
 from ..tracking.surface import MomentSurface
 from .registration import FEWEST, LEVELS, RegionSurface, RegisteredRegion, distances, register_region
 
 Float = NDArray[np.float64]
 
+_CLOSE = 0.5  # mm
 _LEAST_MATCHED = 0.35  # of a region, by weights
 _TOLD, _SURE = 1.96, 3.0  # standard deviations: of what is told, and that errors hardly ever exceed
 _BACK = 3.0  # standard deviations, and
@@ -47,6 +49,13 @@ class WeakLimits:
 
     shift: float
     degrees: float = 0.5
+
+    @classmethod
+    def of(cls, unit: str, spacing: float) -> WeakLimits:
+        """Half a degree and half a millimetre. spacing: between points, which stands for the latter where the
+        unit of the scan is no known length."""
+        factor = conversion("mm", unit)
+        return cls(spacing if factor is None else _CLOSE * factor)
 
     def exceeded(self, spreads: Float) -> Float:
         """How many times spreads (..., 6), see `FrameMotion.spread`, exceed the limits."""

@@ -1,0 +1,205 @@
+"""`scan4d motion`: the motion of a rigid region, such as the head, in each frame."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.motion.axes import anatomical_axes, weak_directions
+from ..analysis.motion.found import NoRigidRegion, found_region
+from ..analysis.motion.partial import PartialMotions
+from ..analysis.motion.region import RigidRegion
+from ..analysis.motion.stabilise import FrameMotion, MotionReference, MotionState, WeakLimits, stabilise
+from ..csv_text import cell
+from ..document.landmarks import Landmarks
+from ..document.saved_session import known_as, stored
+from ..errors import InputError
+from ..files import output_folder
+from ..scan.spacing import typical_spacing
+from ..scan.timeline import Timeline
+from ..scan.times import frame_in_words
+from ..scan.units import conversion
+from ._console import progress, tell, warn
+from ._reference import StartOfMotion, key_of_partial
+
+_COLUMNS = (
+    "frame", "time", "qw", "qx", "qy", "qz", "tx", "ty", "tz",
+    "sigma_rx", "sigma_ry", "sigma_rz", "sigma_tx", "sigma_ty", "sigma_tz", "state",
+)  # fmt: skip
+_RIGID = 0.95  # of distances: a region of which fewer are close changes its shape
+_WORLD = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidPart:
+    """The motions of a region.
+
+    region: None where Scan4D finds none. rows: of the region in the reference pose. axes: of the subject,
+    (3, 3) by row. known: by frame; without a region, all are gaps.
+    """
+
+    timeline: Timeline
+    reference: StartOfMotion
+    region: MotionReference | None
+    rows: NDArray[np.int64]
+    limits: WeakLimits
+    axes: NDArray[np.float64]
+    known: Mapping[int, FrameMotion]
+
+    @cached_property
+    def states(self) -> dict[int, MotionState]:
+        """The states of the motions, by frame."""
+        return {index: self.known[index].state(self.axes, self.limits) for index in sorted(self.known)}
+
+    def table(self) -> list[Sequence[object]]:
+        """The rows of transforms.csv."""
+        return [_COLUMNS, *map(self._row, self.states)]
+
+    def points(self) -> RigidRegion:
+        """The region as a file holds it."""
+        ids = self.reference.pose.cloud.ids
+        return RigidRegion(np.empty((0, 4)), self.rows if ids is None else ids[self.rows].astype(np.int64))
+
+    def facts(self, source: object) -> dict[str, Any]:
+        """The facts for the report. source: of the region."""
+        pose, known = self.reference.pose, self.known
+        region = None
+        if self.region is not None:
+            region = {
+                "source": str(source),
+                "points": len(self.rows),
+                "share_of_points": len(self.rows) / pose.count,
+                "middle": self.region.middle.tolist(),
+            }
+        shares = {  # the reference frame agrees with itself
+            index: found.within
+            for index, found in known.items()
+            if found.motion and index != self.reference.frame
+        }
+        least = min(shares, key=lambda index: shares[index]) if shares else None
+        return {
+            "region": region,
+            "within": {
+                "mean": float(np.mean(list(shares.values()))) if shares else None,
+                "least": None if least is None else shares[least],
+                "least_in_frame": None if least is None else least + 1,
+            },
+            "states": {state.value: list(self.states.values()).count(state) for state in MotionState},
+            "limits": {"degrees": self.limits.degrees, "length": self.limits.shift},
+            "gaps": {str(i + 1): known[i].reason for i in self.states if known[i].motion is None},
+            "weak_directions": [
+                {**asdict(one), "words": one.in_words(self.timeline.unit)}
+                for one in weak_directions(known, self.axes, self.limits)
+            ],
+        }
+
+    def _row(self, index: int) -> Sequence[object]:
+        """The row of a frame."""
+        from scipy.spatial.transform import Rotation
+
+        found = self.known[index]
+        if found.motion is None:
+            numbers: list[float | None] = [None] * 13
+        else:
+            x, y, z, w = Rotation.from_matrix(found.motion.rotation).as_quat(canonical=True)
+            shift, sigmas = found.motion.matrix[:3, 3], found.deviations(_WORLD)
+            numbers = [cell(value) for value in (w, x, y, z, *shift, *sigmas)]
+        return [index + 1, float(self.timeline.times[index]), *numbers, self.states[index].value]
+
+
+def rigid_part(args: Namespace, timeline: Timeline, reference: StartOfMotion, partial: Path) -> RigidPart:
+    """Find the motions of the region, and keep them in a file as they are found.
+
+    Raises InputError, also where Scan4D finds no region, unless all points are followed as well.
+    """
+    pose = reference.pose
+    limits = WeakLimits.of(timeline.unit, typical_spacing(pose.cloud))
+    if conversion("mm", timeline.unit) is None:
+        close = f"one point spacing, {limits.shift:.3g}, in place of 0.5 mm"
+        warn(f"The unit of the scan is no known length. Scan4D uses {close}. State it with --unit")
+    axes = anatomical_axes(args.up) if args.up else anatomical_axes(pose.upright.up, pose.upright.front)
+    known: dict[int, FrameMotion] = {}
+    try:
+        rows = _rows(args, timeline, reference)
+    except NoRigidRegion as error:
+        if not args.dense:
+            raise
+        warn(f"{error}. Each frame in transforms.csv is a gap")
+        known |= dict.fromkeys(range(len(timeline)), FrameMotion.gap(error.what))
+        return RigidPart(timeline, reference, None, np.empty(0, np.int64), limits, axes, known)
+    region = MotionReference.of(pose, rows, reference.frame)
+    output_folder(args.out)
+    kept = PartialMotions(partial, key_of_partial(args, timeline, pose.cloud.world()[rows]))
+    known |= kept.read()
+    if known:
+        tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")
+    with progress(len(timeline) - len(known)) as tick:
+        for _ in stabilise(timeline, region, limits.shift, known):
+            kept.save(known)
+            tick()
+    return RigidPart(timeline, reference, region, rows, limits, axes, known)
+
+
+def tell_rigid(found: Mapping[str, Any], timeline: Timeline) -> None:
+    """The facts of the motions in words."""
+    region, within = found["region"], found["within"]
+    if region is None:
+        return
+    tell(
+        f"The region has {region['points']:,} points, {region['share_of_points']:.0%} of the reference frame"
+    )
+    close = f"within ±{found['limits']['length']:.3g} {timeline.unit} of the surface"
+    if within["mean"] is not None:
+        tell(f"On average, {within['mean']:.1%} of the region lies {close} of a frame")
+    for one in found["weak_directions"]:
+        warn(f"{one['words']} (in {one['frames']} of {len(timeline)} frames)")
+    if found["gaps"]:
+        number, reason = next(iter(found["gaps"].items()))
+        share = f"{len(found['gaps'])} of {len(timeline)} frames"
+        warn(f"Scan4D finds no motion in {share}, such as {_frame(number)}: {reason}")
+    if within["least"] is not None and within["least"] < _RIGID:
+        share = f"in {_frame(within['least_in_frame'])}, only {within['least']:.1%} of it lies"
+        warn(f"The region does not stay rigid: {share} {close}. Name another region with --region")
+
+
+def region_rows(args: Namespace, file: Path, reference: StartOfMotion) -> NDArray[np.int64]:
+    """The rows of the reference in the region of a file. Raises InputError, which names that file."""
+    region = RigidRegion.read(file)
+    try:
+        places = _places(args, reference) if region.landmarks else {}
+        return region.rows(reference.pose.cloud, places)
+    except InputError as error:
+        raise InputError(error.what, file, error.hint) from None
+
+
+def _rows(args: Namespace, timeline: Timeline, reference: StartOfMotion) -> NDArray[np.int64]:
+    """The rows of the region that counts as rigid. Raises InputError."""
+    if args.region:
+        return region_rows(args, args.region, reference)
+    output_folder(args.out)  # an error comes before the search
+    tell("Scan4D looks for a region that stays rigid in all frames")
+    return found_region(timeline, reference.pose, reference.frame)
+
+
+def _places(args: Namespace, reference: StartOfMotion) -> dict[str, NDArray[np.float64]]:
+    """The positions of landmarks in the reference frame, by name. Raises InputError."""
+    if reference.frame is None:
+        raise InputError("names landmarks, but the reference is another scan")
+    session = stored(known_as(args.scan))
+    if session is None:
+        hint = "Open the scan in the window and place landmarks"
+        raise InputError("names landmarks, but the scan has no saved session", hint=hint)
+    placed = {one.name: one.key_at(reference.frame) for one in session.document.part(Landmarks).all}
+    return {name: np.array(key.position) for name, key in placed.items() if key is not None}
+
+
+def _frame(number: int | str) -> str:
+    """The words for a frame, of its number in the report."""
+    return frame_in_words(int(number) - 1)
