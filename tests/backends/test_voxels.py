@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenes import NOTHING, looking_down_z, rarely_together, sphere, sphere_hits
 from scipy import ndimage
 from scipy.ndimage import distance_transform_edt
+from scipy.spatial import cKDTree
 from splat_scenes import assert_agree
 
 from viewer.analysis.pick import pick
@@ -30,7 +31,7 @@ from viewer.mesh.reference import trace
 from viewer.picture.surface import Surface
 from viewer.scan import formats
 from viewer.scan.octree import Octree
-from viewer.scan.octree.build import Stop
+from viewer.scan.octree.build import Stop, build
 from viewer.scan.octree.storage import from_bytes
 from viewer.scan.octree.stored import octree_of
 from viewer.scan.open import open_scan
@@ -251,7 +252,9 @@ def test_octants_are_numbered_and_a_pick_gives_their_first_point(draw: Draw, ren
 def test_ids_are_those_of_the_file(draw: Draw) -> None:
     """Points that were dropped count."""
     positions = np.concatenate([np.full((7, 3), np.nan), CLOUD.world()])
-    cloud = PointCloud.from_arrays(positions, normals=np.concatenate([np.zeros((7, 3)), CLOUD.normals]))  # type: ignore[list-item]
+    normals = np.concatenate([np.zeros((7, 3)), CLOUD.normals])  # type: ignore[list-item]
+    radii = np.concatenate([np.zeros(7), CLOUD.radii])  # type: ignore[list-item]
+    cloud = PointCloud.from_arrays(positions, normals=normals, radii=radii)
     one, other = (voxels(draw, each, CAMERAS["perspective"]) for each in (CLOUD, cloud))
     np.testing.assert_array_equal(one.octant, other.octant)
     seen = one.id != NOTHING
@@ -330,7 +333,7 @@ def test_what_faces_away_is_left_out_where_it_is_asked_for(draw: Draw) -> None:
 
 
 def test_octants_out_of_view_cost_nothing(draw: Draw) -> None:
-    surface = voxels(draw, CLOUD, CAMERAS["close"])
+    surface = voxels(draw, replace(CLOUD, radii=None), CAMERAS["close"])
     assert "octants out of view" in surface.stats.skipped
     assert len(surface.pose.cloud) < len(CLOUD) / 3
 
@@ -504,12 +507,70 @@ def test_without_colours_normals_and_radii(draw: Draw) -> None:
     assert backend("voxels").needs(Pose(0, 0.0, "", bare), Params(shape="flat_cubes")) == ()
 
 
-@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf, 2e38, 5.0])
-def test_radii_of_the_scan_change_nothing(draw: Draw, radius: float) -> None:
+@pytest.mark.parametrize("radius", [0.0, -1.0, np.nan, np.inf, 1e-6])
+def test_radii_that_say_nothing_or_leave_gaps_change_nothing(draw: Draw, radius: float) -> None:
     odd = replace(CLOUD, radii=np.full(len(CLOUD), radius, np.float32))
     bare = replace(CLOUD, radii=None)
     shown, expected = (voxels(draw, cloud, CAMERAS["perspective"]) for cloud in (odd, bare))
     np.testing.assert_array_equal(shown.depth, expected.depth)
+
+
+def test_discs_cover_what_the_radii_of_their_points_say(draw: Draw) -> None:
+    """As surfels draw them, which leave gaps of the same kind; not where the spacing is asked for."""
+    radius = np.float32(3 * typical_spacing(CLOUD))
+    large = replace(CLOUD, radii=np.full(len(CLOUD), radius, np.float32))
+    options = {"passes": "one", "surface": "nearest"}
+    shown = voxels(draw, large, CAMERAS["perspective"], pixel_threshold=0.25, **options)
+    leaves = shown.pose.cloud
+    assert leaves.radii is not None
+    tree = build(large)
+    assert (leaves.radii >= radius).all()
+    assert (leaves.radii <= radius + np.sqrt(3) * tree.size(tree.depth)).all()
+    discs = draw(large, CAMERAS["perspective"], SIZE, "surfels", params={**options, "radius": "own"})
+    uncovered = (discs.row != NOTHING) & (shown.row == NOTHING)
+    assert uncovered.sum() <= 1e-3 * (discs.row != NOTHING).sum()
+    by_spacing = voxels(draw, large, CAMERAS["perspective"], radius="spacing")
+    bare = voxels(draw, replace(CLOUD, radii=None), CAMERAS["perspective"])
+    np.testing.assert_array_equal(by_spacing.depth, bare.depth)
+
+
+def test_radii_that_another_backend_asked_for_change_nothing(renderer: Renderer) -> None:
+    pose = Pose(0, 0.0, "", replace(CLOUD, radii=None))
+
+    def depth(name: str, **params: object) -> NDArray:
+        surface, chosen = Surface(renderer.gpu, SIZE), backend(name).params(params)
+        render_frame(renderer, Request(pose, CAMERAS["perspective"], name, chosen), surface)
+        return surface.depth.copy()
+
+    expected = depth("voxels")
+    depth("surfels", radius="own")
+    np.testing.assert_array_equal(depth("voxels", occupancy=9), expected, "another key, the same octree")
+
+
+@pytest.mark.parametrize("large", [False, True])
+def test_octree_files_keep_radii(draw: Draw, tmp_path: Path, large: bool) -> None:
+    """Up to 7 % larger; of a coarser octree, whose leaves stand for more points, they say nothing."""
+    spacing = np.float32(typical_spacing(CLOUD))
+    radii = np.linspace(2, 4, len(CLOUD), dtype=np.float32) * spacing if large else None
+    cloud = replace(CLOUD, radii=radii)
+    formats.write_poses(tmp_path / "a.svo", iter([Pose(0, 0.0, "a", cloud)]), "mm")
+    scan = open_scan(tmp_path / "a.svo")
+    found = scan.pose(0).cloud
+    octree = octree_of(found)
+    assert octree is not None
+    assert found.radii is not None
+    if radii is None:
+        assert all(each.reach is None for each in octree.attributes)
+        return
+    nearest = cKDTree(cloud.world()).query(found.world())[1]
+    alone = np.bincount(nearest, minlength=len(cloud))[nearest] == 1
+    share = found.radii / radii[nearest]
+    assert (share >= 1 - 1e-6).mean() > 0.95, "a leaf of two points may be nearer to the smaller one"
+    assert (share[alone] <= 1.08 + octree.size(octree.depth) / radii.min()).all()
+    shown = voxels(draw, found, CAMERAS["perspective"], pixel_threshold=0.25)
+    assert shown.pose.cloud.radii.min() > 1.5 * spacing  # type: ignore[union-attr]
+    spaced = voxels(draw, found, CAMERAS["perspective"], pixel_threshold=0.25, radius="spacing")
+    assert spaced.pose.cloud.radii.max() < 2 * shown.pose.cloud.radii.min()  # type: ignore[union-attr]
 
 
 def test_the_depth_says_why_subdivision_ended(draw: Draw) -> None:

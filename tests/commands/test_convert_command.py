@@ -14,6 +14,7 @@ from small_scans import cloud_at, names
 from viewer.drawing.request import backend_for
 from viewer.scan import formats
 from viewer.scan.estimate import estimate
+from viewer.scan.octree.stored import octree_of
 from viewer.scan.open import open_scan
 from viewer.scan.points import PointCloud
 from viewer.scan.pose import Pose
@@ -125,17 +126,20 @@ def test_convert_estimates_no_more_than_is_asked_for_and_lacking(
     np.testing.assert_array_equal(kept.radii, had.radii)
 
 
-def test_convert_puts_estimated_normals_into_octrees(run: Run, tmp_path: Path) -> None:
+def test_convert_puts_estimates_into_octrees(run: Run, tmp_path: Path) -> None:
     formats.write(tmp_path / "bare.npz", bare_at(0))
-    assert run("convert", tmp_path / "bare.npz", tmp_path / "a.svo", "--normals").code == 0
+    assert run("convert", tmp_path / "bare.npz", tmp_path / "a.svo", "--normals", "--radii").code == 0
     with open_scan(tmp_path / "a.svo") as timeline:
         leaves = timeline.pose(0).cloud
     assert leaves.normals is not None
     outward = (leaves.normals * leaves.world()).sum(axis=1) / np.linalg.norm(leaves.world(), axis=1)
     assert np.median(np.abs(outward)) > 0.95
+    octree = octree_of(leaves)
+    assert octree is not None
+    assert octree.attributes[-1].reach is not None
 
 
-@pytest.mark.parametrize(("out", "flag"), [("a.svo", "radii"), ("a.exr", "normals"), ("a.exr", "radii")])
+@pytest.mark.parametrize(("out", "flag"), [("a.exr", "normals"), ("a.exr", "radii")])
 def test_convert_refuses_estimates_that_a_format_does_not_hold(
     out: str, flag: str, refused: Callable[..., str], scans: Path, tmp_path: Path
 ) -> None:

@@ -95,11 +95,10 @@ def run(args: Namespace) -> int:
 def _check_holds(args: Namespace) -> None:
     """Raise InputError where the format of the output holds none of what is to be estimated."""
     suffix = args.out.suffix.lower()
-    if suffix in formats.writable_suffixes():
-        return
+    storing = formats.writable_suffixes() + formats.scan_suffixes()
     for name in _wanted(args):
-        if name == "radii" or suffix not in formats.scan_suffixes():
-            hint = f"Write {', '.join(formats.writable_suffixes())}, or leave out --{name}"
+        if suffix not in storing:
+            hint = f"Write {', '.join(storing)}, or leave out --{name}"
             raise InputError(f"'{suffix}' files cannot store {name}", args.out, hint)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import weakref
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field, replace
 
 from ..backends import Derived
@@ -55,10 +55,13 @@ class Resident:
         """Bytes on the GPU, and of the estimates that it keeps on the CPU."""
         return self.nbytes + self.gpu_pose.estimated_bytes
 
-    @property
-    def current(self) -> Pose:
-        """The pose with the estimates of its points, which this merges."""
-        return self.gpu_pose.pose.with_cloud(self.gpu_pose.cloud)
+    def with_estimates(self, names: Collection[str]) -> Pose:
+        """The pose with the estimates of its points, which this merges. names: where radii are not
+        among them, those that another backend asked for stay out."""
+        found = self.gpu_pose.cloud
+        if "radii" not in names and found.radii is not self.gpu_pose.stored.radii:
+            found = replace(found, radii=None)
+        return self.gpu_pose.pose.with_cloud(found)
 
     def release(self) -> None:
         """End its jobs, and delete what was derived."""

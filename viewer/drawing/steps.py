@@ -32,7 +32,7 @@ def next_step(resident: Resident, request: Request, view: View | None) -> Prepar
         )
     if missing := _missing(gpu_pose, request):
         name = f"Estimating {' and '.join(missing)}"
-        args = lambda: (_bare(resident.current), missing)  # noqa: E731
+        args = lambda: (_bare(resident.with_estimates(())), missing)  # noqa: E731
 
         def take(found: Estimates) -> None:
             gpu_pose.add_estimates(found.arrays)
@@ -60,7 +60,7 @@ def _derive(resident: Resident, request: Request, key: DerivedKey, view: View | 
     gpu_pose, backend, params = resident.gpu_pose, request.backend, request.params
 
     def args() -> tuple[Any, ...]:
-        pose = gpu_pose.pose if request.draws_samples else resident.current
+        pose = gpu_pose.pose if request.draws_samples else resident.with_estimates(request.needs)
         return pose, params, view if backend.derived_by_camera else None
 
     def take(result: Any) -> None:

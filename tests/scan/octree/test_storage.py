@@ -262,12 +262,16 @@ def test_strays_come_back_as_they_are() -> None:
     normals = np.tile([[0.6, 0.0, 0.8]], (len(points), 1))
     colors = np.random.default_rng(2).integers(0, 256, (len(points), 4), np.uint8)
     cloud = PointCloud.from_arrays(points, normals=normals, colors=colors)
-    octree = build(cloud)
+    radii = np.full(len(points), np.inf, np.float32)
+    radii[901] = 3.0
+    cloud = replace(cloud, radii=radii)
+    octree = build(replace(cloud, radii=np.ones(len(points), np.float32)))
     assert octree.strays.tolist() == [7, 901]
     data = to_bytes(octree, strays=Strays.of(octree, cloud))
     back = outside(data)
     np.testing.assert_allclose(back.positions, far, rtol=1e-15)
     assert np.array_equal(back.colors, colors[octree.strays])
+    np.testing.assert_allclose(back.radii, [0, 3.1], rtol=0.04)
     assert (back.normals @ [0.6, 0.0, 0.8]).min() > DEGREE
     assert_same_geometry(from_bytes(data), octree)
     header, size = read_header(data)
@@ -278,6 +282,34 @@ def test_strays_come_back_as_they_are() -> None:
         outside(bytes(broken))
     with pytest.raises(InputError, match="ends within the points outside"):
         outside(data[: size + header.strays.masks - 1])
+
+
+def test_reaches_come_back_a_little_larger_and_coarser_trees_have_none() -> None:
+    cloud = ball()
+    radii = np.geomspace(1e-5, 100, len(cloud)).astype(np.float32)
+    radii[::7] = 0
+    radii[3::7] = np.nan
+    cloud = replace(cloud, radii=radii)
+    octree = build(cloud, cube=CUBE)
+    data = to_bytes(octree)
+    found = from_bytes(data)
+    for one, other in zip(octree.attributes, found.attributes, strict=True):
+        assert ((one.reach > 0) == (other.reach > 0)).all()
+        limited = np.clip(one.reach, CUBE.edge * 2.0**-22, None)
+        share = other.reach[one.reach > 0] / limited[one.reach > 0]
+        assert share.min() > 0.999
+        assert share.max() < 1.073
+    assert to_bytes(found, time=0.0) == data, "bytes that were read are their own"
+    header, size = read_header(data)
+    cut = size + sum(level.masks + level.attributes for level in header.levels[:-1])
+    assert all(each.reach is None for each in from_bytes(data[:cut]).attributes)
+    later = build(replace(ball(turn=0.001), radii=radii), cube=CUBE)
+    told = to_bytes(later, octree)
+    assert read_header(told)[0].before
+    for one, other in zip(
+        from_bytes(to_bytes(later)).attributes, from_bytes(told, found).attributes, strict=True
+    ):
+        np.testing.assert_array_equal(one.reach, other.reach)
 
 
 def test_normals_are_kept_as_bytes_that_are_their_own() -> None:

@@ -7,7 +7,7 @@ has an octant of its own. Of the octree, `voxels` draws the octants that are abo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ...picture.stats import Stats
 from ...picture.surface import Surface
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
-from ...scan.octree.stored import octree_of
+from ...scan.octree.stored import octree_of, without_reach
 from ...scan.octree.traverse import Sight, Traversal
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
@@ -93,6 +93,16 @@ class Params:
         choices=("discs", *_CUBES),
         words={"discs": "Pieces of the surface", "cubes": "Cubes", "flat_cubes": "Flat cubes"},
         basic=True,
+        affects="derive",
+        group="Octants",
+    )
+    radius: str = param(
+        "auto",
+        "Radii of discs. auto: discs cover the radii that the scan stores for the points of their octant; "
+        "if a scan stores none, or if they are smaller than the distance between neighbouring octants, as "
+        "spacing; spacing: the distance between neighbouring octants, enlarged so that discs form a closed "
+        "surface",
+        choices=("auto", "spacing"),
         affects="derive",
         group="Octants",
     )
@@ -206,7 +216,10 @@ class Voxels(Backend):
     def derive(self, pose: Pose, params: Params, view: View | None) -> Octree:
         """The octree of a pose: the one that its file stores, or one built from its points."""
         stored = octree_of(pose.cloud) if params.stop == "auto" else None
-        octree = stored or build(pose.cloud, _stop(params))
+        cloud = pose.cloud
+        if params.radius == "spacing":
+            stored, cloud = stored and without_reach(stored), replace(cloud, radii=None)
+        octree = stored or build(cloud, _stop(params))
         # A process's first cut imports, a machine's first compiles: not while a window draws.
         traversal = Traversal(octree.prefix(1), _ANYWHERE)
         traversal.advance()

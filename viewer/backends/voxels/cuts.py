@@ -203,11 +203,15 @@ class OctreeCuts:
         """The points outside the tree's cube. Their normals are those that the scan has: around them, none
         can be estimated, and without one they face the eye."""
         cloud, rows = pose.cloud, self.octree.strays
-        stored = pose.stored.normals
+        stored, radii = pose.stored.normals, np.full(len(rows), self._usual, np.float32)
+        has_reach = bool(self.octree.attributes) and self.octree.attributes[0].reach is not None
+        if has_reach and pose.stored.radii is not None:
+            own = pose.stored.radii[rows]
+            np.copyto(radii, own, where=(own > 0) & (own < np.inf))
         return StrayPoints(
             rows=rows,
             positions=(cloud.world(rows) - pose.origin).astype(np.float32),
-            radii=np.full(len(rows), self._usual, np.float32),
+            radii=radii,
             normals=np.zeros((len(rows), 3), np.float32) if stored is None else stored[rows],
             colors=None if cloud.colors is None else cloud.colors[rows],
         )

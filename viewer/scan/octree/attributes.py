@@ -41,6 +41,8 @@ def attributes_of(
     works: list[Callable[[], object]] = [partial(_rows, order, found["rows"])]
     found["offsets"] = np.empty((order.nodes, 3), np.uint16)
     found["radii"] = np.empty(order.nodes, np.float32)
+    if cloud.radii is not None and ((cloud.radii > 0) & (cloud.radii < np.inf)).any():
+        found["reach"] = np.zeros(order.nodes, np.float32)
     works.append(partial(_discs, order, cloud, points, grid, edge, masks, found))
     if cloud.colors is not None:
         found["colors"] = np.empty((order.nodes, 4), np.uint8)
@@ -92,12 +94,24 @@ def _discs(
     masks: Sequence[NDArray[np.uint8]],
     found: dict[str, NDArray],
 ) -> None:
-    """Fill the offsets and radii of all nodes."""
+    """Fill the offsets, the radii and, where points store radii, the reach of all nodes."""
     from . import disc_kernels
 
     walk = disc_kernels.CodeOrder(points.rows, points.codes, points.levels, order.ends, order.starts)
     disc_kernels.leaf_offsets(np.ascontiguousarray(cloud.positions), walk, grid, found["offsets"])
-    discs_of(masks, edge, order.by_level(found["offsets"]), order.by_level(found["radii"]))
+    offsets, radii = order.by_level(found["offsets"]), order.by_level(found["radii"])
+    reach: Sequence[NDArray[np.float32] | None] = [None] * len(radii)
+    if "reach" in found and cloud.radii is not None:
+        positions, own = np.ascontiguousarray(cloud.positions), np.ascontiguousarray(cloud.radii)
+        disc_kernels.leaf_reach(positions, own, walk, grid, edge, found["offsets"], found["reach"])
+        reach = levels = order.by_level(found["reach"])
+        for level in reversed(range(len(masks))):
+            inner = masks[level] != 0
+            counts = np.bitwise_count(masks[level][inner])
+            starts = np.cumsum(counts, dtype=np.intp) - counts
+            if len(starts):
+                levels[level][inner] = np.maximum.reduceat(levels[level + 1], starts)
+    discs_of(masks, edge, offsets, radii, reach)
 
 
 def _rows(order: _Order, rows: NDArray[np.uint32]) -> None:

@@ -1,8 +1,9 @@
 """The nodes of an octree as pieces of a surface: where each lies on the mean, and how large a disc there has
 to be to close the surface.
 
-The leaves say how dense the surface is sampled around each of them. The disc of an inner node covers what
-the discs below it cover (as the spheres of QSplat do, Rusinkiewicz and Levoy 2000).
+A leaf whose points store radii reaches as far as these do, where that is at least the distance between
+leaves. Elsewhere the leaves say how dense the surface is sampled around each of them. The disc of an inner
+node covers what the discs below it cover (as the spheres of QSplat do, Rusinkiewicz and Levoy 2000).
 """
 
 from __future__ import annotations
@@ -24,11 +25,13 @@ def discs_of(
     edge: float,
     offsets: Sequence[NDArray[np.uint16]],
     radii: Sequence[NDArray[np.float32]],
+    reach: Sequence[NDArray[np.float32] | None],
 ) -> None:
     """Find offsets and radii of all nodes, as `Attributes` has them, from the offsets of the leaves.
 
     masks: of the levels above the deepest, see `Octree`. edge: of the cube. offsets: of each level, (n, 3);
     those of inner nodes, means over the leaves below, are written. radii: of each level, (n,), are written.
+    reach: of each level, as `Attributes` has it.
     """
     from . import disc_kernels
 
@@ -49,6 +52,9 @@ def discs_of(
     most = _LARGEST * usual_radius(masks, radii)
     for level in range(depth + 1):
         np.minimum(radii[level], np.float32(most), out=radii[level], where=are_leaves[level])
+        if (own := reach[level]) is not None:
+            suffices = are_leaves[level] & (own > 0) & (own * _RADIUS_PER_SPACING >= radii[level])
+            np.copyto(radii[level], own, where=suffices)
     for level in reversed(range(depth)):
         around = offsets[level + 1], radii[level + 1], offsets[level]
         disc_kernels.cover(masks[level], *around, edge / 2**level, radii[level])

@@ -1,8 +1,8 @@
 """SVO files: octrees of all poses, one after another; docs/reference/octree-files.md has the layout.
 
 Each pose is its leaves: a point in the middle of each, with its colour and normal; and the few points far
-outside, as they are. Written are geometry, colours, normals, times and unit. A pose may refer to the one
-before it: then Scan4D reads that, too.
+outside, as they are. Written are geometry, colours, normals, radii, times and unit. A pose may refer to
+the one before it: then Scan4D reads that, too.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _LONGEST = 8  # octrees read for one pose
 _MARGIN = 1 / 8  # around the poses that a cube is made for, of its edge
 _NODE_BYTES = 36  # that decoding takes for a node of the largest level, beside attributes
 _AROUND_BYTES = 108  # the nodes around one, of two levels above those whose masks are decoded
-_HELD_BYTES = 17  # of a node, its mask, colour and normal
+_HELD_BYTES = 21  # of a node, its mask, colour, normal and reach
 _STRAY_BYTES = 200  # that reading a point outside takes
 _LEAF_BYTES = 60  # that points take for a leaf
 _MOST_RATIO = 200  # of memory to the file: leaves of surfaces take 5 bits and more each
@@ -164,14 +164,17 @@ def stored_points(octree: Octree, strays: Strays) -> PointCloud:
 
 
 def _joined(leaves: PointCloud, strays: Strays) -> PointCloud:
-    """Leaves, and behind them points outside, as large as half of the leaves are at most."""
+    """Leaves, and behind them points outside; these are as large as half of the leaves are at most where
+    they have no radius."""
     if not len(strays):
         return leaves
     own = PointCloud.from_arrays(
         strays.positions, colors=strays.colors, normals=strays.normals, origin=leaves.origin
     )
     assert leaves.radii is not None
-    own = replace(own, radii=np.full(len(own), np.median(leaves.radii), np.float32))
+    usual = np.full(len(own), np.median(leaves.radii), np.float32)
+    known = usual if strays.radii is None else np.where(strays.radii > 0, strays.radii, usual)
+    own = replace(own, radii=known)
 
     def both(first: NDArray | None, second: NDArray | None) -> NDArray | None:
         return None if first is None or second is None else np.concatenate([first, second])

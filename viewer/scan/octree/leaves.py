@@ -20,7 +20,7 @@ def leaf_points(octree: Octree, means: bool = True) -> PointCloud:
     """A point for each leaf, with its colour and normal, by level and then by Morton code.
 
     It lies where the surface is in the leaf if `means`, where the tree's attributes tell, else in its middle.
-    Radii are of discs there that close the surface, see `discs_of`.
+    Radii are of discs there, see `discs_of`.
     """
     leaves: dict[int, NDArray[np.bool_] | slice] = {
         level: masks == 0 for level, masks in enumerate(octree.masks) if not masks.all()
