@@ -34,12 +34,6 @@ from .shown import CutCounts
 
 _CUBES = ("cubes", "flat_cubes")  # values of `shape`
 _IN_CUBES = {"shape": _CUBES}
-# Rows of the stability suite that octants cannot hold in principle.
-# A cube around one point has no size: nothing is seen of it where nothing is enlarged to a pixel.
-_NOT_ENLARGED = tuple(
-    Limit(0.0, NO_SPACING, when)
-    for when in ({"instancing": ("gs", "ubo", "tbo", "pull", "tiles")}, {"passes": ("one",)})
-)
 
 _ANYWHERE = Sight(np.zeros(3), np.eye(3), 1.0, (1, 1), 1.0, math.inf, perspective=True)
 
@@ -105,6 +99,7 @@ class Params:
         choices=("auto", "spacing"),
         affects="derive",
         group="Octants",
+        when={"shape": ("discs",)},
     )
     radius_scale: float = param(
         1.0,
@@ -191,14 +186,6 @@ class Voxels(Backend):
         "collinear points": Limit(0.015, AROUND_ALL),
         "collinear points, viewed along their line, perspective": Limit(0.01, NO_SPACING),
         "collinear points, viewed along their line, orthographic": Limit(0.01, NO_SPACING),
-        **dict.fromkeys(
-            (
-                "one point x1000",
-                "zoomed in to 1/1000 of a splat's width",
-                "zoomed in to a millionth of a splat's width",
-            ),
-            _NOT_ENLARGED,
-        ),
     }
     default_reasons = {
         "cull_back": "the camera can see the inside of an open scan: without octants that face away, 1.5 "
@@ -217,7 +204,7 @@ class Voxels(Backend):
         """The octree of a pose: the one that its file stores, or one built from its points."""
         stored = octree_of(pose.cloud) if params.stop == "auto" else None
         cloud = pose.cloud
-        if params.radius == "spacing":
+        if params.radius == "spacing" or params.shape in _CUBES:
             stored, cloud = stored and without_reach(stored), replace(cloud, radii=None)
         octree = stored or build(cloud, _stop(params))
         # A process's first cut imports, a machine's first compiles: not while a window draws.
