@@ -69,6 +69,25 @@ def test_a_scan_can_be_the_reference_of_another(run: Run) -> None:
     assert report["rigid"]["states"]["gap"] == 0
 
 
+def test_the_mean_of_frames_can_be_the_reference(run: Run) -> None:
+    words = ("motion", "seq", "--unit", "mm", "--region", "region.json", "--reference")
+    done = run(*words, "1,0:2", "-o", "out")
+    assert done.code == 0, done.err
+    assert "The reference is the mean of 2 frames; on average, of 2.0 frames a point" in done.out
+    report = json.loads(Path("out/report.json").read_text())
+    assert report["reference"]["frame"] == 2
+    assert report["reference"]["mean"]["frames"] == [2, 1]
+    assert report["rigid"]["states"]["ok"] == 3
+    one = run(*words, "1:2", "-o", "one")
+    assert one.code == 0, one.err
+    tables = [
+        np.loadtxt(f"{name}/transforms.csv", delimiter=",", skiprows=1, usecols=range(2, 9))
+        for name in ("out", "one")
+    ]
+    assert np.allclose(*tables, atol=0.02)
+    assert (tables[0] != tables[1]).any()
+
+
 def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     from viewer.analysis.motion import stabilise
 
@@ -171,6 +190,9 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
     [
         (("seq", "--unit", "mm", "--reference", "7", "-o", "out"), "no pose 7"),
         (("seq", "--unit", "mm", "--reference", "-1", "-o", "out"), "no pose -1"),
+        (("seq", "--unit", "mm", "--reference", "0,7", "-o", "out"), "no pose 7"),
+        (("seq", "--unit", "mm", "--reference", "5:7", "-o", "out"), "no frame in the range 5:7"),
+        (("seq", "--unit", "mm", "--reference", "0,,1", "-o", "out"), "not a valid range of frames"),
         (("seq", "--unit", "mm", "--region", "none.json", "-o", "out"), "none.json"),
         (
             ("seq", "--unit", "mm", "--region", "points.json", "-o", "out"),

@@ -129,14 +129,18 @@ def rigid_part(args: Namespace, timeline: Timeline, reference: StartOfMotion, pa
     try:
         rows = _rows(args, timeline, reference)
     except NoRigidRegion as error:
-        if not args.dense:
+        if not args.dense or reference.rest:
             raise
         warn(f"{error}. Each frame in transforms.csv is a gap")
         known |= dict.fromkeys(range(len(timeline)), FrameMotion.gap(error.what))
         return RigidPart(timeline, reference, None, np.empty(0, np.int64), limits, axes, known)
     region = MotionReference.of(pose, rows, reference.frame)
     output_folder(args.out)
-    kept = PartialMotions(partial, key_of_partial(args, timeline, pose.cloud.world()[rows]))
+    if reference.rest:
+        reference = reference.averaged(timeline, region)
+        region = MotionReference.of(reference.pose, rows, None)
+    key = key_of_partial(args, timeline, reference.pose.cloud.world()[rows])
+    kept = PartialMotions(partial, key)
     known |= kept.read()
     if known:
         tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")

@@ -83,15 +83,16 @@ def chosen_poses(args: Namespace, timeline: Timeline) -> list[int] | None:
             raise InputError(f"{args.time} is not a time", "--time", "Use seconds")
         return [timeline.nearest(args.time)]
     if args.poses is not None:
-        return _poses_between(args.poses, timeline)
+        return poses_between(args.poses, timeline, "--poses")
     return list(range(len(timeline))) if args.all else None
 
 
-def _poses_between(text: str, timeline: Timeline) -> list[int]:
+def poses_between(text: str, timeline: Timeline, option: str) -> list[int]:
+    """The indices of a range A:B or A:B:STEP that an option names. Raises InputError where there are none."""
     match = re.fullmatch(r"(\d*):(\d*)(?::0*([1-9]\d*))?", text)
     if not match:
         raise InputError(
-            f"'{text}' is not a valid range of frames", "--poses", "Use A:B or A:B:STEP, for example 0:10:2"
+            f"'{text}' is not a valid range of frames", option, "Use A:B or A:B:STEP, for example 0:10:2"
         )
     start, stop, step = (int(part) if part else None for part in match.groups())
     indices = list(range(len(timeline)))[start:stop:step]

@@ -7,7 +7,7 @@ you interrupt the command, the same command later continues.
 
 from __future__ import annotations
 
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
@@ -36,9 +36,9 @@ def add_arguments(parser: ArgumentParser) -> None:
         help="JSON file of the rigid region (spheres, points or landmarks); default: Scan4D finds it",
     )  # fmt: skip
     parser.add_argument(
-        "--reference", type=_reference, default=0, metavar="I|SCAN",
-        help="frame of SCAN in which motions begin, counted from 0; or another scan, for its first frame; "
-        "default 0",
+        "--reference", default="0", metavar="I|I,J,...|SCAN",
+        help="frame of SCAN in which motions begin, counted from 0; or several, such as 0,3,7 or 0:6, for "
+        "their mean; or another scan, for its first frame; default 0",
     )  # fmt: skip
     parser.add_argument(
         "--dense", action="store_true",
@@ -61,33 +61,26 @@ def run(args: Namespace) -> int:
     return 0
 
 
-def _reference(text: str) -> int | str:
-    if not text:
-        raise ArgumentTypeError("'' is neither a number of a frame nor a scan")
-    return int(text) if text.removeprefix("-").isdecimal() else text
-
-
 def _written(args: Namespace, timeline: Timeline) -> list[Path]:
     """Find the motions; gives the files that it wrote. Raises InputError."""
     table, facts, region, points = (args.out / name for name in (_TABLE, _REPORT, _REGION, _POINTS))
     outputs = [table, facts, region, *([points] if args.dense else [])]
     claim(outputs, [*scan_inputs(timeline), *([args.region] if args.region else [])], args.force)
-    reference = StartOfMotion.of(args, timeline)
     motions, followed = args.out / _PARTIAL_MOTIONS, args.out / _PARTIAL_POINTS
-    rigid = rigid_part(args, timeline, reference, motions)
+    rigid = rigid_part(args, timeline, StartOfMotion.of(args, timeline), motions)
     found: dict[str, Any] = {
         "version": __version__,
         "scan": timeline.name,
         "unit": timeline.unit,
-        "reference": reference.facts(),
+        "reference": rigid.reference.facts(),
         "rigid": rigid.facts(args.region or "found"),
     }
     tell_rigid(found["rigid"], timeline)
     if args.dense:
-        kept = dense_part(args, timeline, reference, followed)
-        found["dense"] = dense_facts(len(timeline), reference, kept)
+        kept = dense_part(args, timeline, rigid.reference, followed)
+        found["dense"] = dense_facts(len(timeline), rigid.reference, kept)
         tell_dense(found["dense"])
-        save_displacements(points, reference.pose.cloud.world(), len(timeline), kept.read)
+        save_displacements(points, rigid.reference.pose.cloud.world(), len(timeline), kept.read)
     report(timeline, 0)
     save_rows(table, rigid.table())
     if rigid.region is None:

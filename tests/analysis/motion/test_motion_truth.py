@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from viewer.analysis.motion.found import found_region
+from viewer.analysis.motion.rest import mean_of_rest
 from viewer.analysis.motion.stabilise import FrameMotion, MotionReference, MotionState, WeakLimits, stabilise
 from viewer.errors import InputError
 from viewer.scan.open import find_source
@@ -45,6 +46,28 @@ def test_the_motion_of_a_talking_head_is_found(talking: Heads, fault: str | None
     turns, shifts = np.linalg.norm(np.reshape(errors, (-1, 2, 3)), axis=2).T
     assert np.median(turns) <= most
     assert np.median(shifts) <= most
+
+
+def test_the_mean_of_rest_frames_has_less_noise_and_gives_the_same_motions() -> None:
+    heads, count = Heads.of("demo:smile:1", 20), 6
+    timeline = heads.timeline()
+    pose = timeline.pose(0)
+    rows = found_region(timeline, pose, 0)
+    first = MotionReference.of(pose, rows, 0)
+    mean = mean_of_rest(timeline, pose, first, range(count))
+    exact = heads.source.paths(0, [0])[0]
+    off = pose.cloud.world() - exact
+    length = np.linalg.norm(off, axis=1)
+    noisy = length > 1e-9
+    normals = off[noisy] / length[noisy, None]
+    left = np.abs(((mean.pose.cloud.world() - exact)[noisy] * normals).sum(axis=1))
+    assert np.median(left) < np.median(length) / np.sqrt(count)
+    starts = first, MotionReference.of(mean.pose, rows, None)
+    errors = [stabilised_errors(heads, timeline, start, LIMITS.shift) for start in starts]
+    before, after = (
+        np.median(np.linalg.norm(np.reshape(each, (-1, 2, 3)), axis=2), axis=0) for each in errors
+    )
+    assert (after < 1.2 * before).all()
 
 
 def test_errors_of_regions_of_growing_difficulty_are_within_the_spread() -> None:

@@ -311,10 +311,10 @@ def follow_points(
 ) -> Iterator[int]:
     """Follow the points through each frame that is not kept yet, outward from the reference; gives the frame.
 
-    reference: its frame; None: it is of another scan. Raises Cancelled between frames, see `checkpoint`;
+    reference: its frame; None: it is none of the scan's. Raises Cancelled between frames, see `checkpoint`;
     another call goes on from there.
     """
-    order = outward(range(len(timeline)), reference or 0)
+    order = outward(range(len(timeline)), points.pose.index)
     read: dict[int | None, int | None] = {None: None}  # the last frame that could be read, up to each one
     earlier: dict[int | None, int | None] = {None: None}  # the one before it
     surfaces: dict[int, MomentSurface] = {}  # of the last frame in each direction

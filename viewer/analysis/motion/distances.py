@@ -30,7 +30,7 @@ def distances_from(
     from .region_kernels import heights_over
 
     moved = reference_from_frame.points(cloud.world()) - origin
-    heights = heights_over(surface.held, np.ascontiguousarray(moved), _REACH * surface.spacing)
+    heights, _ = heights_over(surface.held, np.ascontiguousarray(moved), _REACH * surface.spacing)
     return np.abs(heights).astype(np.float32)
 
 

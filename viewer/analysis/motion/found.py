@@ -38,7 +38,7 @@ class NoRigidRegion(InputError):
 
 
 def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[np.int64]:
-    """The rows of a pose that stay rigid, increasing. frame: the pose's in the scan; None: of another scan.
+    """The rows of a pose that stay rigid, increasing. frame: the pose's in the scan; None: it is of none.
 
     Raises NoRigidRegion where there is none, and InputError where no other frame can be read.
     """
@@ -60,7 +60,7 @@ def found_region(timeline: Timeline, pose: Pose, frame: int | None) -> NDArray[n
         region = whole.only(kept)
         off, seen = np.zeros((2, len(kept)))
         noises: list[float] = []
-        for number, (index, beside) in enumerate(outward(list(moments), frame or 0)):
+        for number, (index, beside) in enumerate(outward(list(moments), pose.index)):
             checkpoint((round_ + number / len(moments)) / _ROUNDS)
             start = starts.get(index, starts.get(beside, STILL))
             found = register_region(region, moments[index], start, LEVELS if round_ == 0 else LEVELS[1:])

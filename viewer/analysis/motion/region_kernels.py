@@ -51,10 +51,10 @@ def rows_nearest(surface: Cells, positions: Float, reach: float) -> NDArray[np.i
 
 
 @compiled
-def heights_over(surface: Cells, positions: Float, reach: float) -> Float:
-    """The heights of positions (n, 3) over the parabola around the nearest point, along its normal; NaN where
-    no point is within reach, and over holes."""
-    heights = np.full(len(positions), np.nan)
+def heights_over(surface: Cells, positions: Float, reach: float) -> tuple[Float, Float]:
+    """The heights of positions (n, 3) over the parabola around the nearest point, (n,), along its normals,
+    (n, 3); NaN where no point is within reach, and over holes."""
+    heights, normals = np.full(len(positions), np.nan), np.full((len(positions), 3), np.nan)
     for i in range(len(positions)):
         row = nearest_within(surface, positions[i, 0], positions[i, 1], positions[i, 2], reach)
         if row < 0 or not fit_at(surface, row):
@@ -73,4 +73,6 @@ def heights_over(surface: Cells, positions: Float, reach: float) -> Float:
         slope_u, slope_v = parabola_slopes(p[0], u, v)
         slant = np.sqrt(1.0 + slope_u * slope_u + slope_v * slope_v)
         heights[i] = (w - parabola_height(p[0], u, v)) / slant
-    return heights
+        for k in range(3):
+            normals[i, k] = (f[2, k] - slope_u * f[0, k] - slope_v * f[1, k]) / slant
+    return heights, normals

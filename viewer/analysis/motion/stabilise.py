@@ -105,14 +105,15 @@ class FrameMotion:
 class MotionReference:
     """The moment that motions begin in.
 
-    surface: of all its points, relative to `origin`. region: its rigid part. frame: of the scan; None: it is
-    of another scan.
+    surface: of all its points, relative to `origin`. region: its rigid part. frame: the frame of the scan
+    that it is; None: it is none of them. start: the frame from which on others are registered.
     """
 
     surface: MomentSurface
     origin: Float
     region: RegionSurface
     frame: int | None
+    start: int
 
     @classmethod
     def of(cls, pose: Pose, rows: NDArray[np.int64], frame: int | None) -> MotionReference:
@@ -125,7 +126,7 @@ class MotionReference:
             what = f"the region has {len(rows)} points in the reference frame, which is too few"
             hint = f"Choose a larger region: at least {FEWEST} points need neighbours"
             raise InputError(what, pose.label, hint)
-        return cls(surface, origin, region, frame)
+        return cls(surface, origin, region, frame, pose.index)
 
     @property
     def middle(self) -> Float:
@@ -158,13 +159,14 @@ def stabilise(
     reference: MotionReference,
     within: float,
     known: MutableMapping[int, FrameMotion],
+    frames: Sequence[int] | None = None,
 ) -> Iterator[int]:
     """Find the motion of the region in each frame that is not known yet, and add it; gives the frame.
 
-    within: scan units, see `FrameMotion`. Raises Cancelled between frames, see `checkpoint`; another call
-    goes on from there.
+    within: scan units, see `FrameMotion`. frames: that are registered; None: all. Raises Cancelled between
+    frames, see `checkpoint`; another call goes on from there.
     """
-    order = outward(range(len(timeline)), reference.frame or 0)
+    order = outward(range(len(timeline)) if frames is None else frames, reference.start)
     starts: dict[int | None, Rigid] = {None: STILL}
     for number, (frame, beside) in enumerate(order):
         checkpoint(number / len(order))
