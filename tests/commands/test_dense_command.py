@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import Run
-from hill_folders import turning_hills
+from hill_folders import TURN, turning_hills
+from moving_hills import hills
 
 from viewer.analysis.motion import dense
 from viewer.analysis.motion.displacements import Displacements
@@ -17,6 +18,7 @@ from viewer.scan import formats
 from viewer.scan.points import PointCloud
 
 WORDS = ("motion", "seq", "--unit", "mm", "--region", "region.json", "--dense", "-o")
+PATHS = ("--paths", "region.json", "side.json")
 POINTS = 300
 
 
@@ -27,13 +29,14 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "home"))
     turning_hills("seq", POINTS)
     Path("region.json").write_text('{"spheres": [[0, 0, 0, 16]]}')
+    Path("side.json").write_text('{"spheres": [[8, 0, 1, 6]]}')
     return tmp_path
 
 
 def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole = run(*WORDS, "whole")
+    whole = run(*WORDS, "whole", *PATHS)
     assert whole.code == 0, whole.err
-    names = ("transforms.csv", "report.json", "region.json", "displacements.npz")
+    names = ("transforms.csv", "report.json", "region.json", "displacements.npz", "paths.csv")
     assert whole.out.endswith("".join(f"whole/{name}\n" for name in names))
     found = Displacements.read("whole/displacements.npz")
     assert found.displacement.shape == (3, POINTS, 3)
@@ -42,6 +45,18 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
     assert report["rigid"]["states"]["gap"] == 0
     assert report["dense"]["states"]["seen"]["share"] > 0.9
     assert report["dense"]["same_points_in_file"] is False
+    table = np.loadtxt("whole/paths.csv", delimiter=",", skiprows=1, usecols=range(1, 11))
+    assert table.shape == (6, 10), "two regions in three frames"
+    frames, _, *columns = table.T
+    assert (frames == [1, 2, 3] * 2).all()
+    path, stabilised, (sigma, seen) = np.transpose(columns[:3]), np.transpose(columns[3:6]), columns[6:]
+    middle = np.array([8.0, 0.0, hills(np.array(8.0), np.array(0.0))])
+    right_path = [np.add((TURN**frame).apply(middle), [0.5 * frame, 0, 0]) for frame in range(3)]
+    assert np.allclose(path[3:] - path[3], right_path - middle, atol=0.3)
+    assert np.allclose(stabilised, path[[0, 0, 0, 3, 3, 3]], atol=0.3)
+    assert (sigma[[0, 3]] == 0).all()
+    assert (sigma[[1, 2, 4, 5]] > 0).all()
+    assert ((seen > 0.8) & (seen <= 1)).all()
     right, followed = dense.DensePoints.follow, []
 
     def interrupted(*args: object) -> dense.TrackedFrame:
@@ -52,11 +67,11 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
 
     with monkeypatch.context() as patch:
         patch.setattr(dense.DensePoints, "follow", interrupted)
-        stopped = run(*WORDS, "out")
+        stopped = run(*WORDS, "out", *PATHS)
     assert stopped.code != 0
     assert "out keeps the frames so far" in stopped.err
     assert not {path.name for path in Path("out").iterdir()} & set(names)
-    done = run(*WORDS, "out")
+    done = run(*WORDS, "out", *PATHS)
     assert done.code == 0, done.err
     assert "the motions of 3 of 3 frames are known" in done.out
     assert "all points in 2 of 3 frames are known" in done.out
@@ -87,3 +102,22 @@ def test_all_points_are_followed_where_nothing_stays_rigid(run: Run) -> None:
         "transforms.csv", "report.json", "displacements.npz",
     }  # fmt: skip
     assert Displacements.read("out/displacements.npz").displacement.shape == (3, 300, 3)
+
+
+@pytest.mark.parametrize(
+    ("words", "what"),
+    [
+        (("--paths", "side.json"), "--paths needs the motions of all points. Add --dense"),
+        (
+            ("--dense", "--paths", "far.json"),
+            "far.json: has no points of the reference. The reference extends",
+        ),
+        (("--dense", "--paths", "none.json"), "none.json"),
+    ],
+)
+def test_mistakes_with_paths_are_reported(run: Run, words: tuple[str, ...], what: str) -> None:
+    Path("far.json").write_text('{"spheres": [[0, 900, 0, 1]]}')
+    done = run("motion", "seq", "--unit", "mm", "-o", "out", *words)
+    assert done.code == 2
+    assert what in done.err
+    assert not Path("out").exists()

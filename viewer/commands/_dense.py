@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..analysis.motion.dense import DensePoints, PointState, follow_points
+from ..analysis.motion.displacements import Displacements
 from ..analysis.motion.partial_frames import PartialFrames
+from ..csv_text import cell
 from ..scan.timeline import Timeline
 from ._console import progress, tell, warn
 from ._reference import StartOfMotion, key_of_partial
+from ._rigid import RigidPart
 
+_COLUMNS = (
+    "region", "frame", "time", "x", "y", "z", "stabilised_x", "stabilised_y", "stabilised_z", "sigma", "seen",
+)  # fmt: skip
 _POOR = 0.5  # of the points: a warning where fewer are seen
 
 
@@ -48,6 +55,23 @@ def dense_facts(frames: int, reference: StartOfMotion, kept: PartialFrames) -> d
             for state in PointState
         },
     }
+
+
+def path_rows(
+    paths: Mapping[Path, NDArray[np.int64]], rigid: RigidPart, kept: PartialFrames
+) -> list[Sequence[object]]:
+    """The rows of paths.csv: the mean paths of regions, whose rows of the reference stand by their files."""
+    timeline, reference = rigid.timeline, rigid.reference.pose.cloud.world()
+    table: list[Sequence[object]] = [_COLUMNS]
+    for file, rows in paths.items():
+        frames = map(kept.read, range(len(timeline)))
+        path = Displacements.of(reference, frames, rows).mean_path(np.arange(len(rows)))
+        for index, position in enumerate(path.positions):
+            motion = rigid.known[index].motion
+            stabilised = np.full(3, np.nan) if motion is None else motion.inverse.points(position)
+            numbers = map(cell, (*position, *stabilised, path.sigma[index], path.seen[index]))
+            table.append([str(file), index + 1, float(timeline.times[index]), *numbers])
+    return table
 
 
 def tell_dense(found: Mapping[str, Any]) -> None:

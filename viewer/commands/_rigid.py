@@ -178,9 +178,14 @@ def region_rows(args: Namespace, file: Path, reference: StartOfMotion) -> NDArra
     region = RigidRegion.read(file)
     try:
         places = _places(args, reference) if region.landmarks else {}
-        return region.rows(reference.pose.cloud, places)
+        rows = region.rows(reference.pose.cloud, places)
     except InputError as error:
         raise InputError(error.what, file, error.hint) from None
+    if not len(rows):
+        low, high = reference.pose.bounds.low, reference.pose.bounds.high
+        where = " to ".join("(" + ", ".join(f"{value:.4g}" for value in end) + ")" for end in (low, high))
+        raise InputError("has no points of the reference", file, f"The reference extends from {where}")
+    return rows
 
 
 def _rows(args: Namespace, timeline: Timeline, reference: StartOfMotion) -> NDArray[np.int64]:

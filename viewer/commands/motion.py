@@ -1,8 +1,8 @@
 """Find the motion of a rigid region, such as the head, over time, and where all points go.
 
 Scan4D writes into DIR: transforms.csv with the motion of each frame and how sure it is, report.json, and
-region.json with the points of the region. With --dense, displacements.npz holds the way of every point. If
-you interrupt the command, the same command later continues.
+region.json with the points of the region. With --dense, displacements.npz holds the way of every point, and
+paths.csv the mean paths of regions. If you interrupt the command, the same command later continues.
 """
 
 from __future__ import annotations
@@ -14,18 +14,19 @@ from typing import Any
 from .. import __version__
 from ..analysis.motion.displacements import save_displacements
 from ..csv_text import save_rows
+from ..errors import InputError
 from ..files import save_json
 from ..scan.inputs import scan_inputs
 from ..scan.timeline import Timeline
 from ._console import tell, warn
-from ._dense import dense_facts, dense_part, tell_dense
+from ._dense import dense_facts, dense_part, path_rows, tell_dense
 from ._outputs import add_output_argument, claim
 from ._reference import StartOfMotion
-from ._rigid import rigid_part, tell_rigid
+from ._rigid import region_rows, rigid_part, tell_rigid
 from ._scans import SCAN_HELP, open_timeline, report
 
-_TABLE, _REPORT, _REGION, _POINTS = "transforms.csv", "report.json", "region.json", "displacements.npz"
-_PARTIAL_MOTIONS, _PARTIAL_POINTS = "transforms.partial", "displacements.partial"
+_RESULTS = "transforms.csv", "report.json", "region.json", "displacements.npz", "paths.csv"
+_PARTIAL = "transforms.partial", "displacements.partial"
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -44,6 +45,10 @@ def add_arguments(parser: ArgumentParser) -> None:
         "--dense", action="store_true",
         help="also follow every point of the reference frame, and write displacements.npz",
     )  # fmt: skip
+    parser.add_argument(
+        "--paths", type=Path, nargs="+", action="extend", default=[], metavar="FILE",
+        help="with --dense, also write paths.csv with the mean paths of these regions (files as of --region)",
+    )  # fmt: skip
     add_output_argument(parser, "folder for the results", "DIR")
 
 
@@ -53,7 +58,7 @@ def run(args: Namespace) -> int:
         try:
             paths = _written(args, timeline)
         except KeyboardInterrupt:
-            if any((args.out / name).exists() for name in (_PARTIAL_MOTIONS, _PARTIAL_POINTS)):
+            if any((args.out / name).exists() for name in _PARTIAL):
                 warn(f"{args.out} keeps the frames so far. To continue, run the same command again")
             raise
     for path in paths:
@@ -63,11 +68,16 @@ def run(args: Namespace) -> int:
 
 def _written(args: Namespace, timeline: Timeline) -> list[Path]:
     """Find the motions; gives the files that it wrote. Raises InputError."""
-    table, facts, region, points = (args.out / name for name in (_TABLE, _REPORT, _REGION, _POINTS))
-    outputs = [table, facts, region, *([points] if args.dense else [])]
-    claim(outputs, [*scan_inputs(timeline), *([args.region] if args.region else [])], args.force)
-    motions, followed = args.out / _PARTIAL_MOTIONS, args.out / _PARTIAL_POINTS
-    rigid = rigid_part(args, timeline, StartOfMotion.of(args, timeline), motions)
+    if args.paths and not args.dense:
+        raise InputError("--paths needs the motions of all points", hint="Add --dense")
+    table, facts, region, points, paths = (args.out / name for name in _RESULTS)
+    outputs = [table, facts, region, *[points] * args.dense, *[paths] * bool(args.paths)]
+    named = args.paths if args.region is None else [*args.paths, args.region]
+    claim(outputs, [*scan_inputs(timeline), *named], args.force)
+    start = StartOfMotion.of(args, timeline)
+    regions = {file: region_rows(args, file, start) for file in args.paths}
+    motions, followed = (args.out / name for name in _PARTIAL)
+    rigid = rigid_part(args, timeline, start, motions)
     found: dict[str, Any] = {
         "version": __version__,
         "scan": timeline.name,
@@ -81,6 +91,8 @@ def _written(args: Namespace, timeline: Timeline) -> list[Path]:
         found["dense"] = dense_facts(len(timeline), rigid.reference, kept)
         tell_dense(found["dense"])
         save_displacements(points, rigid.reference.pose.cloud.world(), len(timeline), kept.read)
+    if regions:
+        save_rows(paths, path_rows(regions, rigid, kept))
     report(timeline, 0)
     save_rows(table, rigid.table())
     if rigid.region is None:

@@ -197,7 +197,15 @@ def test_the_path_of_a_position_and_of_a_region() -> None:
     assert np.allclose(held.path(held.reference[7])[0], right, atol=0.05)
     rows = np.array([3, 4, 5])
     mean = (held.reference[rows] + held.displacement[0, rows]).mean(axis=0)
-    assert np.allclose(held.mean_path(rows)[0], mean, atol=1e-5)
+    held.sigma[0, rows] = [0.1, 0.3, 0.5]
+    path = held.mean_path(rows)
+    assert np.allclose(path.positions[0], mean, atol=1e-5)
+    assert (path.sigma[0], path.seen[0]) == (pytest.approx(0.3), 1.0)
+    held.state[0, rows[1:]] = [PointState.HIDDEN, PointState.LOST]
+    path = held.mean_path(rows)
+    assert (path.sigma[0], path.seen[0]) == (pytest.approx(0.2), pytest.approx(1 / 3))
     held.state[0, :] = PointState.LOST
+    assert np.isnan(held.mean_path(rows).positions).all()
+    assert np.isnan(held.mean_path(rows).sigma).all()
     assert np.isnan(held.path(held.reference[7])).all()
     assert np.isnan(held.strain(0).first).all()

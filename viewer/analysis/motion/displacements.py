@@ -38,6 +38,20 @@ class SurfaceStrain:
 
 
 @dataclass(frozen=True, eq=False)
+class MeanPath:
+    """The mean of some points in F frames.
+
+    positions: (F, 3), as scanned, scan units; NaN where all points are lost. sigma: (F,), standard deviations
+    of these, scan units: the means of those of the points, as errors of neighbours are alike. seen: (F,), the
+    share of the points that is seen.
+    """
+
+    positions: Float
+    sigma: Float
+    seen: Float
+
+
+@dataclass(frozen=True, eq=False)
 class Displacements:
     """N points of a reference frame in F frames.
 
@@ -71,6 +85,12 @@ class Displacements:
                 raise ValueError("the shapes of its arrays do not fit each other")
             return found
 
+    @classmethod
+    def of(cls, reference: Float, frames: Iterable[TrackedFrame], rows: NDArray[np.integer]) -> Displacements:
+        """The displacements of some points of a reference, (N, 3), by rows (n,), in frames."""
+        some = [(one.displacement[rows], one.sigma[rows], one.state[rows]) for one in frames]
+        return cls(reference[rows], *(np.stack(each) for each in zip(*some, strict=True)))
+
     def path(self, position: Float) -> Float:
         """The positions of a place of the reference frame, (3,), in all frames, (F, 3); NaN where it is lost.
 
@@ -81,10 +101,16 @@ class Displacements:
         weights = 1 / (away**2 + (0.1 * away.mean()) ** 2 + 1e-300)
         return np.asarray(position) + self._mean(rows, weights)
 
-    def mean_path(self, rows: NDArray[np.integer]) -> Float:
-        """The mean positions of points of the reference frame, by rows (n,), in all frames, (F, 3): of a
-        region. In each frame all points count that are not lost there; NaN where all are."""
-        return self.reference[rows].mean(axis=0) + self._mean(rows, np.ones(len(rows)))
+    def mean_path(self, rows: NDArray[np.integer]) -> MeanPath:
+        """The mean path of points of the reference frame, by rows (n,), such as those of a region. In each
+        frame all points count that are not lost there."""
+        places = self.reference[rows].mean(axis=0) + self._mean(rows, np.ones(len(rows)))
+        state = self.state[:, rows]
+        counted = state != PointState.LOST
+        sigmas = np.where(counted, self.sigma[:, rows], 0.0).sum(axis=1)
+        counts = counted.sum(axis=1)
+        sigma = np.divide(sigmas, counts, out=np.full(len(counts), np.nan), where=counts > 0)
+        return MeanPath(places, sigma, (state == PointState.SEEN).mean(axis=1))
 
     def strain(self, frame: int) -> SurfaceStrain:
         """How the surface is stretched in a frame, against the reference frame.
