@@ -37,7 +37,7 @@ class Track:
 
     times: (T,) seconds. positions: (T, 3) scan units, NaN where not known. covariances: (T, 3, 3) squared
     scan units, of how the place may lie off the position; NaN where not known. known: (T,) uint8 of `Known`.
-    reasons: frame -> why it is a gap, in words.
+    reasons: frame -> why it is a gap, in words. carried: frames to which densely tracked points carried it.
     """
 
     times: NDArray[np.float64]
@@ -45,6 +45,7 @@ class Track:
     covariances: NDArray[np.float64]
     known: NDArray[np.uint8]
     reasons: Mapping[int, str] = field(default_factory=dict)
+    carried: frozenset[int] = frozenset()
 
     @classmethod
     def pending(cls, times: NDArray[np.float64]) -> Track:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from ..analysis.measures import Series
+from ..analysis.motion.followed_points import FollowedPoints
 from ..analysis.track import Track
 from ..rigid import Rigid
 
@@ -19,7 +20,7 @@ class Followed:
     more of the tracks is being found, or is about to be; is_measuring: likewise of measures of surfaces.
     still: the motion of each frame to where the stabilised scan stands, None in a gap; None while the scan
     is shown as recorded. motion: curves of the subject's own motion by name, another object after each
-    change.
+    change. points: the points of a reference frame, followed through all frames; None before they are.
     """
 
     def __init__(self) -> None:
@@ -28,6 +29,7 @@ class Followed:
         self.is_following = self.is_measuring = False
         self.motion: Mapping[str, Series] = MappingProxyType({})
         self.still: tuple[Rigid | None, ...] | None = None
+        self.points: FollowedPoints | None = None
 
     @property
     def is_busy(self) -> bool:

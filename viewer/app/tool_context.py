@@ -148,6 +148,13 @@ class ToolContext:
         """The motion of a pose from the scan's coordinates to where it is shown, by what all tools lay."""
         return self.session.laid.layers(pose).world_from_pose
 
+    def motion_of(self, frame: int) -> Rigid | None:
+        """The motion of a frame likewise, which need not have been read; None in a gap of a stabilised
+        scan."""
+        still = self.followed.still
+        is_gap = still is not None and still[frame] is None
+        return None if is_gap else self.session.laid.world_from_pose(frame)
+
     # --- the document -----------------------------------------------------------------
 
     @property
@@ -164,6 +171,10 @@ class ToolContext:
         for part in parts:
             part.check_storable(self.document.part(type(part)))
         self.session.change(name, *parts, merge=merge, **fields)
+
+    def amend(self, **fields: Any) -> None:
+        """Set fields of the document that no user changed, such as a range that is found. It is no step."""
+        self.session.amend(**fields)
 
     # --- the window -------------------------------------------------------------------
 

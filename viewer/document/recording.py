@@ -32,6 +32,8 @@ from numpy.typing import NDArray
 
 from .. import __version__
 from ..analysis.motion import distances
+from ..analysis.motion.followed_points import FollowedPoints
+from ..analysis.motion.quantities import QUANTITIES
 from ..analysis.motion.stabilise import moment_surface
 from ..analysis.surface_point import slack_before
 from ..analysis.tracking.surface import MomentSurface
@@ -53,6 +55,7 @@ from ..output.overlays import (
     DrawnMarks,
     DrawnPath,
     DrawnPlot,
+    FollowedMarks,
     Overlay,
     Stabilised,
 )
@@ -104,6 +107,33 @@ Matrix = Annotated[tuple[_Row, _Row, _Row, _Row], Kind("a rotation and a transla
 
 
 @dataclass(frozen=True)
+class FrameMatrix:
+    """A frame and the motion by which it is shown. matrix: from the scan's coordinates to the world's."""
+
+    frame: PoseNumber
+    matrix: Matrix
+
+
+@dataclass(frozen=True)
+class FollowedNumbers:
+    """Numbers of followed points, by what they are found from again, see `FollowedMarks`."""
+
+    reference: PoseNumber
+    motions: tuple[FrameMatrix, ...]
+
+    @classmethod
+    def of(cls, marks: FollowedMarks) -> FollowedNumbers:
+        """The marks that a tool gives."""
+        motions = ((frame, _rows_of(motion)) for frame, motion in sorted(marks.motions.items()))
+        return cls(marks.reference, tuple(FrameMatrix(*one) for one in motions))
+
+    def moved(self, origin: NDArray[np.float64]) -> FollowedNumbers:
+        """The numbers with motions in coordinates relative to an origin, (3,)."""
+        motions = {one.frame: Rigid(np.array(one.matrix)).in_frame(origin) for one in self.motions}
+        return FollowedNumbers.of(FollowedMarks(self.reference, motions))
+
+
+@dataclass(frozen=True)
 class Entry:
     """One picture that was shown: all that is needed to draw it again.
 
@@ -114,6 +144,7 @@ class Entry:
     None where it is not. anonymous: whether camera, time, look and place are those of the scan as
     `anonymous_request` has it. notes: of the
     scan, where the marks show them. stabilised: how the place was found, None where it is as recorded.
+    followed: how numbers of followed points were found, None where the picture is not coloured by any.
     labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
     the scan says which it is. reading: corrections of how Scan4D reads the scan, as documents have them.
@@ -143,6 +174,7 @@ class Entry:
     measure_lines: tuple[DrawnPath, ...] = ()
     plot: DrawnPlot | None = None
     stabilised: Stabilised | None = None
+    followed: FollowedNumbers | None = None
     labels: tuple[LabelSpot, ...] = ()
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
@@ -211,6 +243,7 @@ class Entry:
             measure_lines=drawn.measure_lines if marks.measure_lines else (),
             plot=drawn.plot if marks.plot else None,
             stabilised=drawn.stabilised,
+            followed=None if drawn.followed is None else FollowedNumbers.of(drawn.followed),
         )
 
     def request(self, pose: Pose, scalars: Mapping[str, NDArray[np.generic]] | None = None) -> Request:
@@ -222,7 +255,10 @@ class Entry:
     def computed(self, timeline: Timeline) -> dict[str, NDArray[np.generic]]:
         """The numbers that the picture is coloured by and no file of the scan has, by name. timeline: of the
         scan. Raises InputError where the reference frame cannot be read."""
-        if self.stabilised is None or self.look.color_by != distances.NAME:
+        name = self.look.color_by
+        if self.followed is not None and name in QUANTITIES:
+            return {name: self._of_followed(self.followed, timeline)}
+        if self.stabilised is None or name != distances.NAME:
             return {}
         pose = timeline.drawn(self.pose)
         if self.stabilised.is_gap:
@@ -230,6 +266,15 @@ class Entry:
         surface, origin = _reference_surface(timeline, self.stabilised.reference)
         motion = self.motion.in_frame(-middle_of(pose)) if self.anonymous else self.motion
         return {distances.NAME: distances.distances_from(surface, origin, pose.cloud, motion)}
+
+    def _of_followed(self, followed: FollowedNumbers, timeline: Timeline) -> NDArray[np.float32]:
+        """The number of followed points that the picture is coloured by, (N,) by row of its cloud. Points are
+        followed now, unless the cache folder has them."""
+        pose = timeline.drawn(self.pose)
+        followed = followed.moved(-middle_of(pose)) if self.anonymous else followed
+        motions = {one.frame: Rigid(np.array(one.matrix)) for one in followed.motions}
+        points = _followed_of_film(timeline, followed.reference)
+        return points.of_pose(self.look.color_by, self.pose, points.rows_nearest(pose), motions.get)
 
     @property
     def motion(self) -> Rigid:
@@ -282,7 +327,7 @@ class Entry:
         held = None if self.held is None else matrix_of(Rigid(np.array(self.held)).in_frame(origin))
         return replace(
             self, landmarks=landmarks, trajectories=moved(self.trajectories), held=held,
-            measure_lines=moved(self.measure_lines),
+            measure_lines=moved(self.measure_lines), followed=self.followed and self.followed.moved(origin),
         )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
@@ -322,7 +367,16 @@ class Entry:
         return json.dumps(_head() | self.to_json())
 
 
-@lru_cache(maxsize=1)  # all frames of a film share it
+def followed_points(timeline: Timeline, reference: int) -> FollowedPoints:
+    """The points of a frame, as far as they were followed. Raises InputError as `FollowedPoints` does."""
+    of = {"version": __version__, "scan": fingerprint(timeline.files) or timeline.name}
+    return FollowedPoints(timeline, reference, of)
+
+
+_followed_of_film = lru_cache(maxsize=1)(followed_points)  # all frames of a film share them
+
+
+@lru_cache(maxsize=1)
 def _reference_surface(timeline: Timeline, frame: int) -> tuple[MomentSurface, NDArray[np.float64]]:
     """The surface of a frame, and the origin that it is relative to."""
     cloud = timeline.pose(frame).cloud
@@ -331,7 +385,11 @@ def _reference_surface(timeline: Timeline, frame: int) -> tuple[MomentSurface, N
 
 def matrix_of(place: Rigid) -> Matrix | None:
     """The `place` of an entry."""
-    return None if place.is_identity else tuple(map(tuple, place.matrix.tolist()))  # type: ignore[return-value]
+    return None if place.is_identity else _rows_of(place)
+
+
+def _rows_of(motion: Rigid) -> Matrix:
+    return tuple(map(tuple, motion.matrix.tolist()))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True)

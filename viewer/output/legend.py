@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.motion import distances
+from ..analysis.motion.quantities import QUANTITIES
 from ..camera import Camera
 from ..look import HOLE_COLOR, LEVEL_COLORS, Look, ValueKind, rgba
 from ..params import describe, param
@@ -20,7 +21,10 @@ from .overlays import DrawnPlot, Overlay
 Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 
 _MEASURED: Color = (150, 150, 150, 255)
-LENGTHS = ("depth", "height", distances.NAME)  # numbers in the scan's unit, as looks colour by them
+# Units of the numbers that looks colour by; "{}" is the unit of length.
+_UNITS = dict.fromkeys(("depth", "height", distances.NAME), "{}")
+_OF_KINDS = {"length": "{}", "speed": "{}/s", "strain": "%"}
+_UNITS |= {name: _OF_KINDS[one.kind] for name, one in QUANTITIES.items()}
 _BAR_SHARE = 1 / 6  # of the picture's width that a scale bar takes at most
 _MOST_DIGITS = 15  # that a float64 holds
 
@@ -109,18 +113,31 @@ def scale_bar(camera: Camera, size: tuple[float, float], factor: float = 1.0) ->
     return length, length * height / view_height
 
 
+def value_unit(name: str, unit: str) -> str:
+    """The unit of numbers of this name, as looks colour by them; "" where they have none that is known. unit:
+    of length."""
+    return _UNITS.get(name, "").format(unit)
+
+
+def goes_by_length(name: str) -> bool:
+    """Whether numbers of this name, as looks colour by them, depend on the unit of length."""
+    return "{}" in _UNITS.get(name, "")
+
+
 def quantity(look: Look, unit: str, kind: ValueKind | None = None) -> str:
-    """The number that the look colours by, with its unit where it is a length. kind: of what a backend
+    """The number that the look colours by, with its unit where that is known. kind: of what a backend
     finds."""
-    if kind is not None or shows_length(look, kind):
-        unit_words = f" ({unit})" if shows_length(look, kind) else ""
+    of_kind = unit if kind is not None and kind.is_length else ""
+    words = value_unit(look.color_by, unit) if kind is None else of_kind
+    if kind is not None or words:
+        unit_words = f" ({words})" if words else ""
         return look.color_by.replace("_", " ").capitalize() + unit_words
     return "Value" if look.color_by.startswith("#") else look.color_by
 
 
 def shows_length(look: Look, kind: ValueKind | None) -> bool:
     """Whether the number that the look colours by is one in the scan's unit. kind: as for `quantity`."""
-    return look.color_by in LENGTHS if kind is None else kind.is_length
+    return goes_by_length(look.color_by) if kind is None else kind.is_length
 
 
 def number(value: float, span: float) -> str:

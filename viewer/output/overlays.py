@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.motion import distances
+from ..analysis.motion.quantities import QUANTITIES
 from ..analysis.track import Known
 from ..camera import Camera
 from ..geometry import Vector
@@ -123,12 +124,25 @@ class Stabilised:
     is_gap: bool = False
 
 
+@dataclass(frozen=True, eq=False)
+class FollowedMarks:
+    """Numbers of followed points in a frame, by what they are found from again.
+
+    reference: the frame whose points are followed. motions: by frame, as it is shown: of all frames that the
+    numbers depend on; one whose motion is not known is left out.
+    """
+
+    reference: int
+    motions: Mapping[int, Rigid]
+
+
 @dataclass(frozen=True)
 class DrawnMarks:
     """Landmarks and lines that tools draw over a frame, in the scan's coordinates.
 
     held: the motion that brings the trajectories to where they are about this frame. plot: None where none is
-    shown. stabilised: None where the frame stands as recorded.
+    shown. stabilised: None where the frame stands as recorded. followed: None unless the colours are numbers
+    of followed points.
     """
 
     landmarks: tuple[DrawnLandmark, ...] = ()
@@ -137,18 +151,20 @@ class DrawnMarks:
     measure_lines: tuple[DrawnPath, ...] = ()
     plot: DrawnPlot | None = None
     stabilised: Stabilised | None = None
+    followed: FollowedMarks | None = None
 
     @property
     def replayable(self) -> tuple[str, ...]:
         """The numbers of tools that a recording can compute again, and so colour by."""
-        return () if self.stabilised is None else (distances.NAME,)
+        of_motion = () if self.stabilised is None else (distances.NAME,)
+        return of_motion if self.followed is None else (*of_motion, *QUANTITIES)
 
     def with_more(self, other: DrawnMarks) -> DrawnMarks:
         """Add the marks of another tool."""
         return DrawnMarks(
             (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
             other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
-            other.plot or self.plot, other.stabilised or self.stabilised,
+            other.plot or self.plot, other.stabilised or self.stabilised, other.followed or self.followed,
         )  # fmt: skip
 
 

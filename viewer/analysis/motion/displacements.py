@@ -37,6 +37,46 @@ class SurfaceStrain:
     area: Float
 
 
+class StrainGauge:
+    """Tells how the surface around points of a reference frame is stretched.
+
+    Around each point, the map of the tangent plane that fits the moved neighbours best (least squares) is the
+    deformation gradient; its singular values are the principal stretches.
+    """
+
+    def __init__(self, reference: Float, tree: Any, rows: NDArray[np.integer] | None = None) -> None:
+        """reference: (N, 3) positions. tree: a cKDTree of them. rows: (n,), of the points at which strain is
+        told; None: at all."""
+        self._reference = reference
+        self._rows = np.arange(len(reference)) if rows is None else rows
+        count, nearest = len(self._rows), min(_BESIDE + 1, len(reference))
+        self._beside = tree.query(reference[self._rows], nearest)[1].reshape(count, -1).astype(np.int32)
+        self._slopes = np.empty((*self._beside.shape, 2))  # what each neighbour adds to the gradient
+        for start in range(0, count, _CHUNK):
+            part = slice(start, start + _CHUNK)
+            ways = reference[self._beside[part]] - reference[self._rows[part], None]
+            sizes, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", ways, ways))
+            flat = np.einsum("nki,nia->nka", ways, axes[:, :, 1:])
+            squares = np.where(sizes[:, 1:] > _FLAT * sizes[:, 2:], sizes[:, 1:], np.nan)
+            self._slopes[part] = flat / squares[:, None]
+
+    def strain(self, displacement: NDArray[np.float32], state: NDArray[np.uint8]) -> SurfaceStrain:
+        """The strain at its points. displacement: (N, 3). state: (N,), see `PointState`."""
+        moved = self._reference + displacement
+        moved[state == PointState.LOST] = np.nan
+        first, second = np.empty(len(self._rows)), np.empty(len(self._rows))
+        for start in range(0, len(first), _CHUNK):
+            part = slice(start, start + _CHUNK)
+            ways = moved[self._beside[part]] - moved[self._rows[part], None]
+            gradient = np.einsum("nka,nki->nia", self._slopes[part], ways)
+            squares = np.einsum("nia,nib->nab", gradient, gradient)
+            middle = (squares[:, 0, 0] + squares[:, 1, 1]) / 2
+            apart = np.hypot((squares[:, 0, 0] - squares[:, 1, 1]) / 2, squares[:, 0, 1])
+            first[part] = np.sqrt(middle + apart)
+            second[part] = np.sqrt(np.maximum(middle - apart, 0.0))
+        return SurfaceStrain(first - 1, second - 1, first * second - 1)
+
+
 @dataclass(frozen=True, eq=False)
 class MeanPath:
     """The mean of some points in F frames.
@@ -113,25 +153,8 @@ class Displacements:
         return MeanPath(places, sigma, (state == PointState.SEEN).mean(axis=1))
 
     def strain(self, frame: int) -> SurfaceStrain:
-        """How the surface is stretched in a frame, against the reference frame.
-
-        Around each point, the map of the tangent plane that fits the moved neighbours best (least squares) is
-        the deformation gradient; its singular values are the principal stretches.
-        """
-        rows, slopes = self._gradients
-        moved = self.reference + self.displacement[frame]
-        moved[self.state[frame] == PointState.LOST] = np.nan
-        first, second = np.empty(len(rows)), np.empty(len(rows))
-        for start in range(0, len(rows), _CHUNK):
-            part = slice(start, start + _CHUNK)
-            ways = moved[rows[part]] - moved[part, None]
-            gradient = np.einsum("nka,nki->nia", slopes[part], ways)
-            squares = np.einsum("nia,nib->nab", gradient, gradient)
-            middle = (squares[:, 0, 0] + squares[:, 1, 1]) / 2
-            apart = np.hypot((squares[:, 0, 0] - squares[:, 1, 1]) / 2, squares[:, 0, 1])
-            first[part] = np.sqrt(middle + apart)
-            second[part] = np.sqrt(np.maximum(middle - apart, 0.0))
-        return SurfaceStrain(first - 1, second - 1, first * second - 1)
+        """How the surface is stretched in a frame, against the reference frame; see `StrainGauge`."""
+        return self._gauge.strain(self.displacement[frame], self.state[frame])
 
     def _mean(self, rows: NDArray[np.integer], weights: Float) -> Float:
         """The weighted mean displacements of points, (F, 3)."""
@@ -148,22 +171,8 @@ class Displacements:
         return cKDTree(self.reference)
 
     @cached_property
-    def _gradients(self) -> tuple[NDArray[np.int32], Float]:
-        """The rows of the neighbours of each point, (N, k), and what each adds to the deformation gradient,
-        along two tangents, (N, k, 2)."""
-        count = len(self.reference)
-        rows = self._tree.query(self.reference, min(_BESIDE + 1, count))[1].reshape(count, -1)
-        rows = rows.astype(np.int32)
-        slopes = np.empty((*rows.shape, 2))
-        for start in range(0, count, _CHUNK):
-            part = slice(start, start + _CHUNK)
-            ways = self.reference[rows[part]] - self.reference[part, None]
-            sizes, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", ways, ways))
-            tangents = axes[:, :, 1:]
-            flat = np.einsum("nki,nia->nka", ways, tangents)
-            squares = np.where(sizes[:, 1:] > _FLAT * sizes[:, 2:], sizes[:, 1:], np.nan)
-            slopes[part] = flat / squares[:, None]
-        return rows, slopes
+    def _gauge(self) -> StrainGauge:
+        return StrainGauge(self.reference, self._tree)
 
 
 def save_displacements(

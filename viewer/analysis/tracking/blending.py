@@ -33,12 +33,13 @@ def track_of(
     from either side may be apart, scan units. so_far: holds in all but some frames.
     """
     positions, covariances = so_far.positions.copy(), so_far.covariances.copy()
-    known, reasons = so_far.known.copy(), dict(so_far.reasons)
+    known, reasons, carried = so_far.known.copy(), dict(so_far.reasons), set(so_far.carried)
     keys = [key for key in landmark.keys if key.frame < len(known)]
     at = [key.frame for key in keys]
     for frame in frames:
         number = bisect_left(at, frame)
         reasons.pop(frame, None)
+        carried.discard(frame)
         if number < len(at) and at[number] == frame:
             known[frame], positions[frame] = Known.PLACED, keys[number].position
             spread = keys[number].spread
@@ -59,7 +60,9 @@ def track_of(
         positions[frame], covariances[frame] = sighting.position, sighting.covariance
         if sighting.reason:
             reasons[frame] = sighting.reason
-    return Track(so_far.times, positions, covariances, known, reasons)
+        elif sighting.is_carried:
+            carried.add(frame)
+    return Track(so_far.times, positions, covariances, known, reasons, frozenset(carried))
 
 
 def _between(
@@ -95,6 +98,7 @@ def _between(
         weights[0] * sides[0].covariance
         + weights[1] * sides[1].covariance
         + weights[0] * weights[1] * np.outer(apart, apart),
+        is_carried=any(side.is_carried for side in sides),
     )
 
 
@@ -106,4 +110,5 @@ def _held(seen: Sighting | None, at_end: Sighting | None, end: SurfacePoint, sha
     return Sighting(
         seen.position + share * drift,
         seen.covariance + share * (1 - share) * np.outer(drift, drift),
+        is_carried=seen.is_carried,
     )

@@ -66,12 +66,13 @@ class Sighting:
     """A landmark in one frame, as seen from where it was set.
 
     position: (3,) absolute, scan units; NaN where it is not known. covariance: (3, 3). reason: why it is
-    not known, in words; "" where it is.
+    not known, in words; "" where it is. is_carried: whether densely tracked points carried it there.
     """
 
     position: Float
     covariance: Float
     reason: str = ""
+    is_carried: bool = False
 
     @classmethod
     def gap(cls, reason: str) -> Sighting:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
@@ -80,6 +80,7 @@ class _Pass:
         return 0 < (frame - self.at) * self.direction <= self.left
 
 
+Carry = Callable[[Sequence[SurfacePoint]], Sequence[Mapping[int, Sighting]]]
 # A pass, and the moments of its key where that is needed, of the frame before, and of the one to look at.
 _Followed = tuple[_Pass, _Moment | None, _Moment, _Moment]
 
@@ -98,11 +99,13 @@ class Tracker:
         first: int = 0,
         settings: TrackingSettings | None = None,
         known: Tracker | None = None,
+        carry: Carry | None = None,
     ) -> None:
         """first: the frame that is needed first. known: an earlier tracker of the same timeline, of which
-        is taken over what landmarks that have changed leave as it was; that one must not run any more."""
+        is taken over what landmarks that have changed leave as it was; that one must not run any more.
+        carry: gives the sightings of spots in all frames at once, where densely tracked points know them."""
         self.settings = settings or TrackingSettings()
-        self._timeline, self._first = timeline, first
+        self._timeline, self._first, self._carry = timeline, first, carry
         self._landmarks = [landmark for landmark in landmarks if landmark.state == "placed"]
         is_same = known is not None and known._timeline is timeline and known.settings == self.settings
         old = known if is_same else None
@@ -152,6 +155,7 @@ class Tracker:
 
         Raises Cancelled between frames, see `checkpoint`; another call goes on from there.
         """
+        yield from self._carried()
         for frame in sorted({part.spot.frame for part in self._passes.values() if part.left}):
             if self._origin is None:  # that of the first key, in whatever order frames are read
                 self._read(frame)
@@ -182,6 +186,21 @@ class Tracker:
             part.follower = None if not part.left else part.follower
         self._moments.clear()
         self._bodies.clear()
+
+    def _carried(self) -> Iterator[int]:
+        """Carry the spots of passes that have not begun; gives the frames of which something new is known."""
+        parts = [part for part in self._passes.values() if part.left and not part.seen]
+        if self._carry is None or not parts:
+            return
+        spots = list(dict.fromkeys(part.spot for part in parts))
+        found = dict(zip(spots, self._carry(spots), strict=True))
+        for part in parts:
+            if found[part.spot]:
+                part.seen, part.at = dict(found[part.spot]), part.end
+        for landmark in self._landmarks:
+            if any(found.get(key) for key in landmark.keys):
+                self._update(landmark, range(len(self._timeline)))
+        yield from range(len(self._timeline)) if any(found.values()) else ()
 
     def _next_step(self) -> tuple[int, int, list[_Pass]] | None:
         """The direction and frame to be looked at next, and the passes that do; None: nothing is left.

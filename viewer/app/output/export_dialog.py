@@ -58,7 +58,7 @@ def _draw(exporting: Exporting, quit: Callable[[], None]) -> None:
         if is_drawn:
             choices, problems = exporting.choices, exporting.problems()
             choices = _edit_what(choices, exporting.count, problems)
-            choices = _edit_format(choices, exporting.even_rate, problems)
+            choices = _edit_format(choices, exporting.count, exporting.even_rate, problems)
             choices = _edit_size(choices, exporting.size, problems)
             choices = _edit_quality(choices, exporting.quality)
             marks = _edit_marks(exporting.marks, choices)
@@ -97,9 +97,11 @@ def _edit_what(choices: Choices, count: int, problems: dict[str, str]) -> Choice
     return choices
 
 
-def _edit_format(choices: Choices, even_rate: float, problems: dict[str, str]) -> Choices:
+def _edit_format(choices: Choices, count: int, even_rate: float, problems: dict[str, str]) -> Choices:
     widgets.label("Format", _HELP["format"])
-    choices = replace(choices, format=widgets.combo("format", choices.format, list(_FORMATS), _FORMATS))
+    format = widgets.combo("format", choices.format, list(_FORMATS), _FORMATS)
+    is_film_of_view = format == MP4 != choices.format and choices.what == VIEW and count > 1
+    choices = replace(choices, format=format, what=FRAMES if is_film_of_view else choices.what)
     if choices.format == MP4 and choices.what == FRAMES:
         widgets.label(
             "Frame times", "As in the scan: the film shows each frame until the time of the next frame"

@@ -11,6 +11,7 @@ from imgui_bundle import imgui
 from ...backends import backend
 from ...files import printable
 from ...look import BACKGROUNDS, COLOR_BY, COLOR_WORDS, RANGE_WORDS, Look, drawable
+from ...output.legend import goes_by_length
 from ...params import in_words
 from ...scan.pose import Pose
 from ...scan.units import Scale
@@ -61,7 +62,7 @@ def _draw(
     colors = _colors(look, names, found)
     is_found = look.color_by in found and look.color_by not in names
     shown = viewport.surface.color_range if viewport.surface is not None and viewport.is_there else None
-    factor = scale.factor if look.color_by in ("depth", "height") else 1.0
+    factor = scale.factor if goes_by_length(look.color_by) else 1.0
     is_here = drawable(look, names, found) == look
     drawn_by, params = session.document.chosen(pose)
     idle = idle_parameters(look, pose, is_here, _why_unlit(look, drawn_by, params, pose))

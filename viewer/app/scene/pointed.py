@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 from ...analysis.pick import Picked
-from ...output.legend import LENGTHS
+from ...output.legend import goes_by_length, value_unit
 from ...scan.times import frame_in_words
 from ...scan.units import Scale
 from ..commands import Command
@@ -81,9 +81,9 @@ def describe_pick(picked: Picked, frame: str, scale: Scale, radius: float, shown
     position = ", ".join(f"{scale.factor * v:.{decimals}f}" for v in picked.position)
     words = [f"{position}{sure} {scale.unit}", frame]
     if shown in picked.scalars:
-        value, is_length = picked.scalars[shown], shown in LENGTHS
-        number = f"{_number(scale.factor * value)} {scale.unit}" if is_length else _number(value)
-        words.append(f"{shown} {number}")
+        factor = scale.factor if goes_by_length(shown) else 1
+        value, unit = _number(factor * picked.scalars[shown]), value_unit(shown, scale.unit)
+        words.append(f"{shown} {value} {unit}".rstrip())
     if not picked.measured:
         words.append(f"in a hole that the renderer filled from level {picked.level}")
     if picked.at_outline:

@@ -88,7 +88,9 @@ class Following:
         self._begins_at = time.monotonic() + _CALM
         if any(landmark.keys for landmark in landmarks):
             self._looked_at = self._context.index
-            self._tracker = Tracker(timeline, landmarks, first=self._looked_at, known=known)
+            points = self._context.followed.points
+            carry = None if points is None else points.carried
+            self._tracker = Tracker(timeline, landmarks, first=self._looked_at, known=known, carry=carry)
 
     def _go_on(self, tracker: Tracker, is_wanted: bool) -> None:
         if self._context.index != self._looked_at:

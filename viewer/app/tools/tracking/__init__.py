@@ -1,0 +1,156 @@
+"""Dense tracking: every point of a frame is followed through all frames, and colours show how it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from imgui_bundle import icons_fontawesome_6 as icons
+from numpy.typing import NDArray
+
+from ....analysis.motion.quantities import DISPLACEMENT, QUANTITIES, frames_needed
+from ....errors import InputError
+from ....look import Look
+from ....output.overlays import NOTHING_DRAWN, DrawnMarks, FollowedMarks
+from ....scan.pose import Pose
+from ...commands import Command
+from ...tool_context import ToolContext
+from ...ui import Ui
+from . import panel
+from .choices import DenseTracking
+from .point_colors import PointColors
+from .point_follower import PointFollower
+
+TITLE = "Dense tracking"
+_SIGNED_MAP = "vik"  # readable with colour-blindness; its middle is 0
+_GREY = "#6e6e6e"  # of points without a number: in neither map
+
+
+class Tool:
+    """The tool that follows points. follower: has them followed. colors: has numbers of them found."""
+
+    def __init__(self, context: ToolContext) -> None:
+        self.context = context
+        self.follower = PointFollower(context)
+        self.colors = PointColors(context)
+        self._laid: tuple[object, ...] = ()
+        self._ends: tuple[object, ...] = ()  # of the colour map, as the tool has set them last
+
+    @property
+    def choices(self) -> DenseTracking:
+        """The choices about the open scan."""
+        return self.context.document.part(DenseTracking)
+
+    @property
+    def frame(self) -> int:
+        """The frame that is shown."""
+        return self.context.index if self.context.pose is None else self.context.pose.index
+
+    @property
+    def color(self) -> str:
+        """The number of followed points that the colours show; "" for none."""
+        name = self.context.document.look.color_by
+        return name if name in QUANTITIES else ""
+
+    def choose(self, step: str, **changes: Any) -> None:
+        """Change choices. step: what Undo calls it."""
+        self.context.change(step, self.choices.changed(**changes))
+
+    def follow(self) -> None:
+        """Follow the points and colour them by displacement; or colour as usual. Raises InputError for a scan
+        of one frame."""
+        self.color_by("" if self.color else DISPLACEMENT)
+        if self.color:
+            self.context.reveal()
+
+    def color_by(self, name: str) -> None:
+        """Colour by a number of QUANTITIES, for which points are followed; "": as usual. Raises InputError
+        for a scan of one frame."""
+        look, usual = self.context.document.look, Look()
+        grey, plain = (_GREY, usual.plain) if name else (usual.plain, _GREY)
+        look = replace(look, plain=grey if look.plain == plain else look.plain)
+        is_own = not self.color or look.color_map != _map_of(self.color)  # the map that the user has chosen
+        color_map = look.color_map if is_own else usual.color_map
+        if not name:
+            look = replace(look, color_by=usual.color_by, color_map=color_map, low=usual.low, high=usual.high)
+            self.context.change("Change colours", look=look)
+            return
+        if len(self.context.timeline) < 2:
+            raise InputError("The scan has one frame, so there is no motion to follow.")
+        color_map = _SIGNED_MAP if QUANTITIES[name].is_signed else color_map
+        low, high = _ends(name, self.colors.end(name) or 1.0)
+        look = replace(look, color_by=name, color_map=color_map, low=low, high=high)
+        step = "Colour by displacement" if self.choices.is_on else "Follow points"
+        self.context.change(step, self.choices.changed(is_on=True), look=look)
+        self._ends = name, low, high
+        self.follower.resume()
+        self._lay()  # the numbers, not known yet, are there before the next picture asks for them
+
+    def advance(self, budget: float) -> bool:
+        """Have points followed, and the scan coloured by them; whether there is something new."""
+        choices = self.choices
+        is_new = self.follower.advance(choices.reference, choices.is_on)
+        work = self.follower.work
+        self.context.followed.points = None if work is None or not work.is_whole else work.points
+        self.colors.advance(self.follower.points, self.color)
+        self._fit_ends()
+        return self._lay() or is_new
+
+    def _fit_ends(self) -> None:
+        """Have the colour map end where the numbers do, unless the user has set its ends."""
+        name, look = self.color, self.context.document.look
+        end = self.colors.end(name) if name and (name, look.low, look.high) == self._ends else None
+        if end is not None and (name, *_ends(name, end)) != self._ends:
+            low, high = _ends(name, end)
+            self._ends = name, low, high
+            self.context.amend(look=replace(look, low=low, high=high))
+
+    def _lay(self) -> bool:
+        """Lay the numbers over the frame that is shown; whether others than before."""
+        name, pose = self.color, self.context.playback.pose
+        values = None if pose is None or not name else self.colors.of(pose)
+        wanted = (self.context.timeline, name, values is not None and id(values))
+        if wanted == self._laid:
+            return False
+        self._laid = wanted
+        self.context.lay(self._numbers if name else None)
+        return True
+
+    def _numbers(self, pose: Pose) -> Mapping[str, NDArray[Any]]:
+        return {self.color: self.colors.of(pose)} if self.color else {}
+
+    def drawn(self, frame: int) -> DrawnMarks:
+        """How the numbers of a frame of a saved picture are found again."""
+        if not self.color:
+            return NOTHING_DRAWN
+        reference = self.choices.reference
+        needed = {reference, *frames_needed(self.color, frame, len(self.context.timeline))}
+        motions = {index: self.context.motion_of(index) for index in needed}
+        known = {index: motion for index, motion in motions.items() if motion is not None}
+        return DrawnMarks(followed=FollowedMarks(reference, known))
+
+    def panel(self, ui: Ui) -> None:
+        """Declare the section of the panel."""
+        panel.draw(self, ui)
+
+
+def _map_of(name: str) -> str:
+    """The colour map that the tool sets for a number; "" where it leaves that of the user."""
+    return _SIGNED_MAP if QUANTITIES[name].is_signed else ""
+
+
+def _ends(name: str, end: float) -> tuple[float, float]:
+    """The ends of the colour map of a number, alike on both sides of 0 where it has a sign."""
+    return (-end if QUANTITIES[name].is_signed else 0.0), end
+
+
+COMMANDS = {
+    "Tools": (
+        Command(
+            "follow_points", "Follow points", Tool.follow, "Shift+D",
+            is_on=lambda tool: bool(tool.color), can=lambda tool: len(tool.context.timeline) > 1,
+            short="Follow points", icon=icons.ICON_FA_BRAILLE,
+        ),
+    )
+}  # fmt: skip
