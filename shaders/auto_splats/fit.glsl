@@ -8,8 +8,9 @@
 #if HAS_COLORS
 layout(binding = TEXTURE_COLORS) uniform samplerBuffer colors;
 #endif
-// By row: the radius of the neighborhood, and how far the mean of its points lies above the point; 0 without a plane.
-layout(std430, binding = STORAGE_EXTENTS) buffer Extents { vec2 extents[]; };
+// By row: the radius of the neighborhood; how far the mean of its points lies above the point, 0 without a plane; and how
+// far the middle of the splat lies from the point, along the shorter half-axis.
+layout(std430, binding = STORAGE_EXTENTS) buffer Extents { float extents[]; };
 layout(std430, binding = STORAGE_FOUND) writeonly buffer Found { vec4 found[]; };  // by place in the list
 
 const int LEAST_COUNT = 6;  // points that tell of a surface
@@ -135,6 +136,67 @@ float splat_radius(Extent extent, int count, vec3 values, vec3 normal, float cro
     return radius * min(reach, reach_of_plane(extent, values, count, scale));
 }
 
+#if CUT
+const int SIDES = 12;
+const float MARGIN = 0.8;  // of a splat's radius, what it reaches beyond all neighbors
+const float LEAST_FACING = 0.05;  // cosine between a normal and the line of sight, what it counts as at least
+
+vec2 side_of(int i) {
+    float angle = 6.2831853 / float(SIDES) * float(i);
+    return vec2(cos(angle), sin(angle));
+}
+
+// The side to which neighbors reach least, as seen from the eye, and how far they do: where a surface turns away sharply
+// or ends, none lies beyond. A unit vector of the plane, and a distance in radii of the neighborhood.
+vec4 narrowest(Extent extent, vec3 normal, vec3 to_eye) {
+    float facing = max(dot(normal, to_eye), LEAST_FACING);
+    vec3 u = tangent_of(normal), v = cross(normal, u);
+    float reaches[SIDES];
+    for (int i = 0; i < SIDES; ++i) reaches[i] = 0.0;
+    for (int k = 1; k < K; ++k) {
+        vec3 d = k < extent.count ? near_offsets[k] : vec3(0.0);
+        d -= dot(d, normal) / facing * to_eye;
+        vec2 at = vec2(dot(d, u), dot(d, v));
+        for (int i = 0; i < SIDES; ++i) reaches[i] = max(reaches[i], dot(at, side_of(i)));
+    }
+    vec4 found = vec4(0.0, 0.0, 0.0, UNKNOWN);
+    for (int i = 0; i < SIDES; ++i) {
+        vec2 side = side_of(i);
+        if (reaches[i] < found.w) found = vec4(side.x * u + side.y * v, reaches[i]);
+    }
+    return found;
+}
+#endif
+
+#if BENDS
+const float RIDGE = 0.02;  // of the sum of fourth powers: few neighbors tell no bend
+const float LEAST_SLANT = 1e-3, LEAST_BEND = 1e-6;  // below, no outline is near
+
+// Where the picture of the surface ends on a splat's plane, if heights of neighbors are those of a paraboloid: its normal is
+// perpendicular to the line of sight along a line, and seen from the eye, this line lies on the plane half as far from the
+// point. height: of the splat over the point. Returned as `narrowest` does.
+vec4 outline(Extent extent, vec3 normal, vec3 to_eye, float height) {
+    float facing = dot(normal, to_eye);
+    vec3 along = to_eye - facing * normal, by = vec3(0.0);
+    float slant = max(length(along), LEAST_SLANT), far = facing / slant;
+    along /= slant;
+    vec3 across = cross(normal, along);
+    mat3 form = mat3(0.0);
+    for (int k = 1; k < K; ++k) {
+        vec3 d = k < extent.count ? near_offsets[k] : vec3(0.0);
+        vec2 at = vec2(dot(d, along), dot(d, across));
+        float rise = dot(d, normal), weight = rise * rise <= dot(at, at) ? 1.0 : 0.0;  // else on another side of it
+        vec3 terms = weight * vec3(0.5 * at.x * at.x, at.x * at.y, 0.5 * at.y * at.y);
+        form += outerProduct(terms, terms);
+        by += rise * terms;
+    }
+    float ridge = RIDGE * (form[0][0] + form[1][1] + form[2][2]) + 1e-12;
+    vec2 bend = (inverse(form + mat3(ridge)) * by).xy;
+    float steep = max(length(bend), LEAST_BEND), end = 0.5 * far + bend.x * height / max(far, LEAST_SLANT);
+    return vec4((bend.x * along + bend.y * across) / steep, max(end, 0.0) / steep);
+}
+#endif
+
 // Returns how far lines beside it are looked for where all neighbors are on a line, scan units; else 0.
 float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     int count = extent.count;
@@ -159,10 +221,25 @@ float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     bool on_line = extent.count >= LEAST_COUNT && values.y < LINE * values.z;
     bool has_plane = values.y > COLLINEAR * values.z && !outlier && !on_line;
-    extents[row] = vec2(radius, has_plane ? dot(mean, normal) * radius : 0.0);
+    float height = has_plane ? dot(mean, normal) : 0.0, shift = 0.0;
+    vec3 longer = vectors[2];
+    float roundness = ELLIPTICAL && values.z > 0.0 ? values.y / values.z : 1.0;
+#if CUT
+    vec3 sight = normalize(to_eye);
+    vec4 end = narrowest(extent, normal, sight);
+    end.w = end.w * radius + MARGIN * splat;
+#if BENDS
+    vec4 bent = outline(extent, normal, sight, height);
+    if (bent.w * radius < end.w) end = vec4(bent.xyz, bent.w * radius);
+#endif
+    if (has_plane && end.w < splat) shift = cut(normal, end.xyz, end.w, pixel, splat, longer, roundness);
+#endif
+    extents[3u * row] = radius;
+    extents[3u * row + 1u] = height * radius;
+    extents[3u * row + 2u] = shift;
     splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = outlier && drops ? 0u : floatBitsToUint(max(splat, LEAST));
-    splats[3u * row + 2u] = pack_axes(normal, vectors[2], ELLIPTICAL && values.z > 0.0 ? values.y / values.z : 1.0);
+    splats[3u * row + 2u] = pack_axes(normal, longer, roundness);
 #if HAS_COLORS
     uvec3 roots = uvec3(to_roots(texelFetch(colors, int(row)).rgb));
     looks[2u * row] = roots.x | roots.y << 10 | roots.z << 20;

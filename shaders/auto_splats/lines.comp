@@ -8,7 +8,7 @@
 #include "amplify/packed.glsl"
 
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of those that are searched
-layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { vec2 extents[]; };
+layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { float extents[]; };
 layout(std430, binding = STORAGE_NEXT) buffer Next { float next[]; };  // as search.comp has it; made 0: done
 
 const float APART = 0.4;  // radii of the neighborhood that what is beside is away at least, else it is noise
@@ -55,7 +55,7 @@ void main() {
     vec3 place = uintBitsToFloat(slot.xyz);
     uvec3 words = uvec3(splats[3u * row], splats[3u * row + 1u], splats[3u * row + 2u]);
     along = packed_longer(words);
-    least = APART * extents[row].x * unit;
+    least = APART * extents[3u * row] * unit;
     least *= least;
     center = to_view(texelFetch(positions, int(row)).xyz);
     float reach = -next[n];

@@ -66,7 +66,7 @@ uniform uint first;  // of those listed, else
 // The radius that is searched first: as large as this row's neighborhood was in the last picture that it had one in, of
 // whatever pose; else what most are within.
 float first_ball(uint row, float usual_radius) {
-    float before = extents[row].x;
+    float before = extents[3u * row];
     return usual_radius * (before > 0.0 ? clamp(before / usual_radius * 1.001, 0.1, 1.2) : FIRST_BALL);
 }
 #endif

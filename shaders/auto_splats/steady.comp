@@ -7,9 +7,10 @@
 #include "auto_splats/ball.glsl"
 #include "auto_splats/eigen.glsl"
 #include "auto_splats/splat.glsl"
+#include "amplify/packed.glsl"
 
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed;  // slots of those that are searched
-layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { vec2 extents[]; };
+layout(std430, binding = STORAGE_EXTENTS) readonly buffer Extents { float extents[]; };
 layout(std430, binding = STORAGE_NEXT) readonly buffer Next { float next[]; };  // below 0: lines.comp finds the plane
 layout(std430, binding = STORAGE_PLACES) writeonly buffer Places { float places[]; };  // of splats, by row
 uniform uint first;
@@ -41,12 +42,15 @@ void take(vec3 offset, uint row) {
 }
 
 // How far the surface lies above the point, along the normal: as the mean of participants, or, with BENT, as heights are
-// that grow with the squared distance. total: of weighted offsets; mean: of offsets, all in radii of the ball.
-float height(vec3 total, vec3 mean, vec3 normal) {
+// that grow with the squared distance. total: of weighted offsets; mean: of offsets, all in radii of the ball. bend: what
+// heights grow by over that square; 0: unknown.
+float height(vec3 total, vec3 mean, vec3 normal, out float bend) {
+    bend = 0.0;
     float level = dot(mean, normal), count = float(weights) / STEPS;
     float second = float(squares.x + squares.y + squares.z) / STEPS, fourth = float(fourths) / STEPS;
     float determinant = count * fourth - second * second;
     if (determinant < BENDING * count * count) return level;
+    bend = (count * dot(vec3(thirds), normal) / STEPS - second * dot(total, normal)) / determinant;
     float bent = (fourth * dot(total, normal) - second * dot(vec3(thirds), normal) / STEPS) / determinant;
     return mix(level, bent, BENT);
 }
@@ -63,7 +67,7 @@ void main() {
     uint row = slot.w >> 1;
     vec3 position = texelFetch(positions, int(row)).xyz;
     put(row, position);
-    float radius = widening * extents[row].x;
+    float radius = widening * extents[3u * row];
     if (next[n] < 0.0 || !(radius * unit > 0.0)) return;
     scale = 1.0 / (radius * unit);
     weights = 0;
@@ -77,11 +81,28 @@ void main() {
     if (values.y <= COLLINEAR * values.z) return;
     vec3 normal = vectors[0];
     if (dot(normal, seen_from(row)) < 0.0) normal = -normal;
-    put(row, position + height(total, mean, normal) * radius * normal);
-    splats[3u * row] = packSnorm2x16(folded(normal));
+    float bend, above = height(total, mean, normal, bend) * radius;
     // Noise moves splats off each other, so that they would leave gaps where they are seen from the side.
-    float grown = (1.0 + GROWTH * (widening - 1.0)) * uintBitsToFloat(splats[3u * row + 1u]);
+    float grown = (1.0 + GROWTH * (widening - 1.0)) * uintBitsToFloat(splats[3u * row + 1u]), shift = 0.0;
+    float roundness = ELLIPTICAL ? max(values.y, 0.0) / values.z : 1.0;
+    vec3 longer = vectors[2];
+#if CUT
+    // What search.comp cut; or more, where the surface, which is taken to bend alike in all directions, is seen to end.
+    uvec3 words = uvec3(splats[3u * row], splats[3u * row + 1u], splats[3u * row + 2u]);
+    roundness = unpackUnorm2x16(words.z).y;
+    longer = normalize(cross(normal, cross(packed_longer(words), normal)));
+    shift = extents[3u * row + 2u];
+    vec3 to_eye = normalize(seen_from(row)), along = to_eye - dot(to_eye, normal) * normal;
+    float slant = length(along), end = 0.25 * dot(to_eye, normal) / max(slant * abs(bend), 1e-9) * radius;
+    float whole = grown / roundness;
+    if (end < (2.0 * roundness - 1.0) * whole) {
+        grown = whole;
+        shift = cut(normal, sign(bend) * along / slant, end, 1.0 / scale_at(-center.z), grown, longer, roundness);
+    }
+#endif
+    put(row, position + above * normal + shift * cross(longer, normal));
+    splats[3u * row] = packSnorm2x16(folded(normal));
     splats[3u * row + 1u] = floatBitsToUint(grown);  // 0 stays: of outliers
-    splats[3u * row + 2u] = pack_axes(normal, vectors[2], ELLIPTICAL ? max(values.y, 0.0) / values.z : 1.0);
+    splats[3u * row + 2u] = pack_axes(normal, longer, roundness);
     looks[2u * row + 1u] = pack_normal(normal);
 }

@@ -38,7 +38,7 @@ from .grids import COARSEST, FINEST_COARSE, Grids, foresee_border
 from .kept import KeptNeighbors
 
 # Bytes of a pose's row, of a participant, of a point that is seen.
-_SPLAT, _LOOK, _EXTENT, _PLACE, _SLOT, _FOUND = 12, 8, 8, 12, 16, 16
+_SPLAT, _LOOK, _EXTENT, _PLACE, _SLOT, _FOUND = 12, 8, 12, 12, 16, 16
 _FIRST_BALL = 0.56  # that is searched, in usual radii: most neighborhoods are within
 _DIRECTIONS = 24  # in which the cells of points are measured
 _LANES = 32  # that search together for one point, of the few that are left
@@ -89,6 +89,12 @@ class Search:
         """Whether it tells other places of splats than their points."""
         return self.raises or self.widening > 1
 
+    @property
+    def cuts(self) -> bool:
+        """Whether splats end where the picture of the surface ends; they become ellipses, whose middles lie
+        beside their points."""
+        return self.raises and not self.elliptical and not self.by_scanner
+
 
 @dataclass(frozen=True)
 class _Pixels:
@@ -101,11 +107,11 @@ class Neighborhoods:
     """The neighborhoods of points that a picture shows, and their splats.
 
     Buffers by name, as texels. By the pose's row: "splats" and "looks", as `Points.buffers` has them;
-    "extents", the radius of the neighborhood in the last picture that found one, 0: none, and how far the
-    mean of its points lies above the point; "places", where the centres of splats lie that move. Of those
-    whose neighborhoods were searched, one after the other: "drawn", their rows; "found": radius, scan units,
-    0 where it is alone; number of points, negative of an outlier; curvature; usual radius. "slots": the
-    participants, positions and rows.
+    "extents", the radius of the neighborhood in the last picture that found one, 0: none, how far the mean
+    of its points lies above the point, and how far the splat's middle lies beside it; "places", where the
+    centres of splats lie that move. Of those whose neighborhoods were searched, one after the other:
+    "drawn", their rows; "found": radius, scan units, 0 where it is alone; number of points, negative of an
+    outlier; curvature; usual radius. "slots": the participants, positions and rows.
     """
 
     def __init__(self, gpu: Gpu, size: tuple[int, int]) -> None:
@@ -211,7 +217,7 @@ class Neighborhoods:
         if visible:
             self._divide(search, visible, pose, border)
             self._reserve("splats", _SPLAT * len(pose.cloud), gl.RGB32UI)
-            if self._reserve("extents", _EXTENT * len(pose.cloud), gl.RG32F):
+            if self._reserve("extents", _EXTENT * len(pose.cloud), gl.R32F):
                 self._gpu.clear(self["extents"].buffer, 0)
             self._reserve("looks", _LOOK * len(pose.cloud), gl.RG32UI)
             if search.moves:
@@ -409,6 +415,8 @@ class Neighborhoods:
             "HAS_COLORS": int(pose.cloud.colors is not None),
             "ADAPTIVE": int(search.adaptive and search.widening <= 1),
             "ELLIPTICAL": str(search.elliptical).lower(),
+            "CUT": int(search.cuts),
+            "BENDS": int(search.cuts and search.widening <= 1),
             "DIRECTIONS": _DIRECTIONS,
             "KEEPS": int(self.kept.is_open),
             "FROM_KEPT": int(from_kept),
@@ -438,7 +446,11 @@ class Neighborhoods:
         steadies = search.widening > 1
         with self._gpu.timers.measure("steady" if steadies else "raise"):
             if steadies:
-                defines = {"LANES": 1, "ELLIPTICAL": str(search.elliptical).lower()}
+                defines = {
+                    "LANES": 1,
+                    "ELLIPTICAL": str(search.elliptical).lower(),
+                    "CUT": int(search.cuts),
+                }
                 program = self._searching("auto_splats/steady.comp", pose, search, defines)
                 self._gpu.set(program, widening=search.widening)
             else:
