@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from command_line import Run
 from hill_folders import TURN, turning_hills
 from moving_hills import hills
 
-from viewer.analysis.motion import dense
+from viewer.analysis.motion import dense, displacements
 from viewer.analysis.motion.displacements import Displacements
 from viewer.scan import formats
 from viewer.scan.points import PointCloud
@@ -65,16 +66,26 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
         followed.append(args)
         return right(*args)  # type: ignore[arg-type]
 
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "")
+
     with monkeypatch.context() as patch:
         patch.setattr(dense.DensePoints, "follow", interrupted)
         stopped = run(*WORDS, "out", *PATHS)
     assert stopped.code != 0
     assert "out keeps the frames so far" in stopped.err
     assert not {path.name for path in Path("out").iterdir()} & set(names)
+    with monkeypatch.context() as patch:
+        patch.setattr(displacements, "_add", full)
+        full_disk = run(*WORDS, "out", *PATHS)
+    assert full_disk.code == 2
+    assert "the motions of 3 of 3 frames are known" in full_disk.out
+    assert "all points in 2 of 3 frames are known" in full_disk.out
+    assert "out/displacements.npz: cannot be written: the disk is full" in full_disk.err
+    assert not {path.name for path in Path("out").iterdir()} & set(names)
     done = run(*WORDS, "out", *PATHS)
     assert done.code == 0, done.err
-    assert "the motions of 3 of 3 frames are known" in done.out
-    assert "all points in 2 of 3 frames are known" in done.out
+    assert "all points in 3 of 3 frames are known" in done.out
     assert {path.name for path in Path("out").iterdir()} == set(names)
     for name in names:
         assert (Path("out") / name).read_bytes() == (Path("whole") / name).read_bytes()

@@ -8,6 +8,7 @@ paths.csv the mean paths of regions. If you interrupt the command, the same comm
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -90,18 +91,35 @@ def _written(args: Namespace, timeline: Timeline) -> list[Path]:
         kept = dense_part(args, timeline, rigid.reference, followed)
         found["dense"] = dense_facts(len(timeline), rigid.reference, kept)
         tell_dense(found["dense"])
-        save_displacements(points, rigid.reference.pose.cloud.world(), len(timeline), kept.read)
-    if regions:
-        save_rows(paths, path_rows(regions, rigid, kept))
     report(timeline, 0)
-    save_rows(table, rigid.table())
+    writers: dict[Path, Callable[[Path], None]] = {
+        table: lambda path: save_rows(path, rigid.table()),
+        facts: lambda path: save_json(path, found),
+    }
     if rigid.region is None:
-        outputs.remove(region)
         region.unlink(missing_ok=True)  # that of an earlier run
     else:
-        save_json(region, rigid.points().to_json())
-    save_json(facts, found)
+        writers[region] = lambda path: save_json(path, rigid.points().to_json())
+    if args.dense:
+        world = rigid.reference.pose.cloud.world()
+        writers[points] = lambda path: save_displacements(path, world, len(timeline), kept.read)
+    if regions:
+        writers[paths] = lambda path: save_rows(path, path_rows(regions, rigid, kept))
+    _save(writers)
     motions.unlink(missing_ok=True)
     if args.dense:
         kept.end()
-    return outputs
+    return list(writers)
+
+
+def _save(writers: Mapping[Path, Callable[[Path], None]]) -> None:
+    """Write all files or, where one fails, none, so that the same command can go on."""
+    written: list[Path] = []
+    try:
+        for path, write in writers.items():
+            written.append(path)
+            write(path)
+    except BaseException:
+        for path in written[:-1]:
+            path.unlink(missing_ok=True)
+        raise
