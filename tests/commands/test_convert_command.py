@@ -136,7 +136,7 @@ def test_convert_puts_estimates_into_octrees(run: Run, tmp_path: Path) -> None:
     assert np.median(np.abs(outward)) > 0.95
     octree = octree_of(leaves)
     assert octree is not None
-    assert octree.attributes[-1].reach is not None
+    assert octree.attributes[-1].own_radii is not None
 
 
 @pytest.mark.parametrize(("out", "flag"), [("a.exr", "normals"), ("a.exr", "radii")])

@@ -121,7 +121,7 @@ def test_the_layout_is_the_stated_one() -> None:
     magic, version, flags, before, depth, unit_size, zero = struct.unpack_from("<4s6B", data)
     assert (magic, version, flags, before, depth, unit_size, zero) == (
         b"\x8dSVO",
-        4,
+        5,
         0,
         0,
         octree.depth,
@@ -284,7 +284,7 @@ def test_strays_come_back_as_they_are() -> None:
         outside(data[: size + header.strays.masks - 1])
 
 
-def test_reaches_come_back_a_little_larger_and_coarser_trees_have_none() -> None:
+def test_radii_come_back_a_little_larger_and_coarser_trees_have_none() -> None:
     cloud = ball()
     radii = np.geomspace(1e-5, 100, len(cloud)).astype(np.float32)
     radii[::7] = 0
@@ -294,22 +294,22 @@ def test_reaches_come_back_a_little_larger_and_coarser_trees_have_none() -> None
     data = to_bytes(octree)
     found = from_bytes(data)
     for one, other in zip(octree.attributes, found.attributes, strict=True):
-        assert ((one.reach > 0) == (other.reach > 0)).all()
-        limited = np.clip(one.reach, CUBE.edge * 2.0**-22, None)
-        share = other.reach[one.reach > 0] / limited[one.reach > 0]
+        assert ((one.own_radii > 0) == (other.own_radii > 0)).all()
+        limited = np.clip(one.own_radii, CUBE.edge * 2.0**-22, None)
+        share = other.own_radii[one.own_radii > 0] / limited[one.own_radii > 0]
         assert share.min() > 0.999
         assert share.max() < 1.073
     assert to_bytes(found, time=0.0) == data, "bytes that were read are their own"
     header, size = read_header(data)
     cut = size + sum(level.masks + level.attributes for level in header.levels[:-1])
-    assert all(each.reach is None for each in from_bytes(data[:cut]).attributes)
+    assert all(each.own_radii is None for each in from_bytes(data[:cut]).attributes)
     later = build(replace(ball(turn=0.001), radii=radii), cube=CUBE)
     told = to_bytes(later, octree)
     assert read_header(told)[0].before
     for one, other in zip(
         from_bytes(to_bytes(later)).attributes, from_bytes(told, found).attributes, strict=True
     ):
-        np.testing.assert_array_equal(one.reach, other.reach)
+        np.testing.assert_array_equal(one.own_radii, other.own_radii)
 
 
 def test_normals_are_kept_as_bytes_that_are_their_own() -> None:
@@ -356,7 +356,7 @@ def test_headers_that_contradict_themselves_are_refused() -> None:
 def test_other_versions_are_refused() -> None:
     data = bytearray(to_bytes(TREES["delta"]))
     data[4] = 2
-    with pytest.raises(InputError, match=r"version 2\. This version of Scan4D reads format version 4"):
+    with pytest.raises(InputError, match=r"version 2\. This version of Scan4D reads format version 5"):
         from_bytes(bytes(data))
 
 

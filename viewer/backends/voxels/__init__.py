@@ -18,7 +18,7 @@ from ...picture.stats import Stats
 from ...picture.surface import Surface
 from ...scan.octree import DEEPEST, Octree
 from ...scan.octree.build import STOPS, Stop, build, shortfall
-from ...scan.octree.stored import octree_of, without_reach
+from ...scan.octree.stored import octree_of, without_own_radii
 from ...scan.octree.traverse import Sight, Traversal
 from ...scan.points import PointCloud
 from ...scan.pose import Pose
@@ -92,7 +92,7 @@ class Params:
     )
     radius: str = param(
         "auto",
-        "Radii of discs. auto: discs cover the radii that the scan stores for the points of their octant; "
+        "Radii of discs. auto: the largest radius that the scan stores for the points of an octant; "
         "if a scan stores none, or if they are smaller than the distance between neighbouring octants, as "
         "spacing; spacing: the distance between neighbouring octants, enlarged so that discs form a closed "
         "surface",
@@ -205,7 +205,7 @@ class Voxels(Backend):
         stored = octree_of(pose.cloud) if params.stop == "auto" else None
         cloud = pose.cloud
         if params.radius == "spacing" or params.shape in _CUBES:
-            stored, cloud = stored and without_reach(stored), replace(cloud, radii=None)
+            stored, cloud = stored and without_own_radii(stored), replace(cloud, radii=None)
         octree = stored or build(cloud, _stop(params))
         # A process's first cut imports, a machine's first compiles: not while a window draws.
         traversal = Traversal(octree.prefix(1), _ANYWHERE)

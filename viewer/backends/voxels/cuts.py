@@ -204,8 +204,8 @@ class OctreeCuts:
         can be estimated, and without one they face the eye."""
         cloud, rows = pose.cloud, self.octree.strays
         stored, radii = pose.stored.normals, np.full(len(rows), self._usual, np.float32)
-        has_reach = bool(self.octree.attributes) and self.octree.attributes[0].reach is not None
-        if has_reach and pose.stored.radii is not None:
+        has_radii = bool(self.octree.attributes) and self.octree.attributes[0].own_radii is not None
+        if has_radii and pose.stored.radii is not None:
             own = pose.stored.radii[rows]
             np.copyto(radii, own, where=(own > 0) & (own < np.inf))
         return StrayPoints(

@@ -16,6 +16,7 @@ from .cube import Grid
 from .discs import discs_of
 from .octree import Attributes
 
+_LARGEST = 8  # edges of the cube: discs that are larger cover all of it
 _LIGHT = light_from_bytes(np.arange(256, dtype=np.uint8)).astype(np.int64)
 _ENCODED = bytes_from_light(np.arange(16 * LIGHT_STEPS + 1) / 16).astype(np.uint32)
 
@@ -42,7 +43,7 @@ def attributes_of(
     found["offsets"] = np.empty((order.nodes, 3), np.uint16)
     found["radii"] = np.empty(order.nodes, np.float32)
     if cloud.radii is not None and ((cloud.radii > 0) & (cloud.radii < np.inf)).any():
-        found["reach"] = np.zeros(order.nodes, np.float32)
+        found["own_radii"] = np.empty(order.nodes, np.float32)
     works.append(partial(_discs, order, cloud, points, grid, edge, masks, found))
     if cloud.colors is not None:
         found["colors"] = np.empty((order.nodes, 4), np.uint8)
@@ -94,24 +95,29 @@ def _discs(
     masks: Sequence[NDArray[np.uint8]],
     found: dict[str, NDArray],
 ) -> None:
-    """Fill the offsets, the radii and, where points store radii, the reach of all nodes."""
+    """Fill the offsets, the radii and, where points store radii, their own of all nodes."""
     from . import disc_kernels
 
     walk = disc_kernels.CodeOrder(points.rows, points.codes, points.levels, order.ends, order.starts)
     disc_kernels.leaf_offsets(np.ascontiguousarray(cloud.positions), walk, grid, found["offsets"])
     offsets, radii = order.by_level(found["offsets"]), order.by_level(found["radii"])
-    reach: Sequence[NDArray[np.float32] | None] = [None] * len(radii)
-    if "reach" in found and cloud.radii is not None:
-        positions, own = np.ascontiguousarray(cloud.positions), np.ascontiguousarray(cloud.radii)
-        disc_kernels.leaf_reach(positions, own, walk, grid, edge, found["offsets"], found["reach"])
-        reach = levels = order.by_level(found["reach"])
-        for level in reversed(range(len(masks))):
-            inner = masks[level] != 0
-            counts = np.bitwise_count(masks[level][inner])
-            starts = np.cumsum(counts, dtype=np.intp) - counts
-            if len(starts):
-                levels[level][inner] = np.maximum.reduceat(levels[level + 1], starts)
-    discs_of(masks, edge, offsets, radii, reach)
+    own: Sequence[NDArray[np.float32] | None] = [None] * len(radii)
+    if "own_radii" in found and cloud.radii is not None:
+        _own_radii(order, cloud.radii, edge, found["own_radii"])
+        own = order.by_level(found["own_radii"])
+    discs_of(masks, edge, offsets, radii, own)
+
+
+def _own_radii(order: _Order, radii: NDArray[np.float32], edge: float, largest: NDArray[np.float32]) -> None:
+    """Fill the largest radius of the points below each node, as `Attributes` has it."""
+    from . import node_kernels
+
+    those = radii[order.rows]
+    known = np.where((those > 0) & (those < np.inf), np.minimum(those, _LARGEST * edge), 0)
+    # Numbers that are not negative have the order of their bits.
+    inverse = ~known.astype(np.float32).view(np.uint32)
+    node_kernels.lowest_rows(order.levels, order.ends, inverse, order.starts, largest.view(np.uint32))
+    np.invert(largest.view(np.uint32), out=largest.view(np.uint32))
 
 
 def _rows(order: _Order, rows: NDArray[np.uint32]) -> None:

@@ -50,9 +50,9 @@ def unpack(block: bytes, size: int, most: int = MOST_RATIO) -> Bytes:
 
 # --- attributes -------------------------------------------------------------------------
 
-_REACH_STEPS = 10  # of a reach, for each factor of two
-_REACH_OF_EDGE = 221  # the byte of a reach that is the edge of the cube
-_ROUNDING = 1e-3  # steps; so that the bytes of `reach_of` are its own
+_RADIUS_STEPS = 10  # of a radius, for each factor of two
+_RADIUS_OF_EDGE = 221  # the byte of a radius that is the edge of the cube
+_ROUNDING = 1e-3  # steps; so that the bytes of `radii_of` are its own
 
 
 class Counterparts(NamedTuple):
@@ -118,16 +118,16 @@ def colors_of(stored: Bytes) -> Bytes:
     return np.stack([red + green, green, blue + green, alpha], axis=1)
 
 
-def reach_bytes(reach: NDArray[np.float32], edge: float) -> Bytes:
+def radius_bytes(radii: NDArray[np.float32], edge: float) -> Bytes:
     """(n, 1): distances in steps of a tenth of a factor of two, rounded up, of an edge; 0 stands for none."""
-    steps = np.log2(np.maximum(reach, np.float32(1e-30)) / np.float64(edge)) * _REACH_STEPS + _REACH_OF_EDGE
+    steps = np.log2(np.maximum(radii, np.float32(1e-30)) / np.float64(edge)) * _RADIUS_STEPS + _RADIUS_OF_EDGE
     found = np.clip(np.ceil(steps - _ROUNDING), 1, 255).astype(np.uint8)
-    return np.where(reach > 0, found, np.uint8(0))[:, None]
+    return np.where(radii > 0, found, np.uint8(0))[:, None]
 
 
-def reach_of(stored: Bytes, edge: float) -> NDArray[np.float32]:
-    """(n,) distances of their `reach_bytes`, which are (n,)."""
-    steps = (np.arange(256) - _REACH_OF_EDGE) / _REACH_STEPS
+def radii_of(stored: Bytes, edge: float) -> NDArray[np.float32]:
+    """(n,) distances of their `radius_bytes`, which are (n,)."""
+    steps = (np.arange(256) - _RADIUS_OF_EDGE) / _RADIUS_STEPS
     table = np.where(np.arange(256) > 0, edge * np.exp2(steps), 0).astype(np.float32)
     return table[stored]
 

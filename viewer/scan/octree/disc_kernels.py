@@ -19,7 +19,6 @@ from .octree import DEEPEST
 _CHILDREN = np.bitwise_count(np.arange(256, dtype=np.uint8)).astype(np.int64)
 _ONLY = np.array([mask.bit_length() - 1 if mask.bit_count() == 1 else -1 for mask in range(256)])
 STEPS = 65536  # of a cell's edge
-MOST_REACH = 8  # edges of the cube: splats that reach farther cover all of it
 _ENOUGH = 4.0  # leaves that tell how far apart they are
 _TOGETHER = (  # as in octree.py
     (np.uint64(2), np.uint64(0x10C30C30C30C30C3)),
@@ -78,44 +77,6 @@ def leaf_offsets(
                 offsets[at, axis] = (2 * sums[axis] + points) // (2 * points)
                 sums[axis] = 0
             points = 0
-
-
-@compiled
-def leaf_reach(
-    positions: NDArray[np.float32],
-    radii: NDArray[np.float32],
-    order: CodeOrder,
-    grid: Grid,
-    edge: float,
-    offsets: NDArray[np.uint16],
-    reach: NDArray[np.float32],
-) -> None:
-    """How far the discs of the points in each leaf reach from its offset (nodes,), scan units; those of other
-    nodes stay as they are.
-
-    positions, radii: (N, 3) and (N,) of the cloud. edge: of the cube. offsets: of `leaf_offsets`.
-    """
-    rows, codes, levels, ends, starts = order
-    steps_per_unit, low, cells_per_step = grid
-    node = starts - 1
-    for i in range(len(rows)):
-        end = ends[i]
-        for level in range(levels[i], end + 1):
-            node[level] += 1
-        radius = radii[rows[i]]
-        if not 0 < radius < math.inf:
-            continue
-        row, squares, at = rows[i], 0.0, node[end]
-        if levels[i] <= end and (i + 1 == len(rows) or levels[i + 1] <= end):
-            reach[at] = min(radius, MOST_REACH * edge)  # alone in its leaf, as most are
-            continue
-        cell, code = 1.0 / (1 << (DEEPEST - end)), codes[i] >> np.uint64(3 * (DEEPEST - end))
-        for axis in range(3):
-            place = (positions[row, axis] * steps_per_unit - low[axis]) * cells_per_step * cell
-            away = place - _coordinate(code >> np.uint64(axis)) - offsets[at, axis] / STEPS
-            squares += away * away
-        own = radius + math.sqrt(squares) * edge / (1 << end)
-        reach[at] = max(reach[at], min(own, MOST_REACH * edge))
 
 
 @compiled

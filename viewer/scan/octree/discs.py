@@ -1,8 +1,8 @@
 """The nodes of an octree as pieces of a surface: where each lies on the mean, and how large a disc there has
 to be to close the surface.
 
-A leaf whose points store radii reaches as far as these do, where that is at least the distance between
-leaves. Elsewhere the leaves say how dense the surface is sampled around each of them. The disc of an inner
+A leaf whose points store radii has the largest of them, where that is at least the distance between leaves.
+Elsewhere the leaves say how dense the surface is sampled around each of them. The disc of an inner
 node covers what the discs below it cover (as the spheres of QSplat do, Rusinkiewicz and Levoy 2000).
 """
 
@@ -25,13 +25,13 @@ def discs_of(
     edge: float,
     offsets: Sequence[NDArray[np.uint16]],
     radii: Sequence[NDArray[np.float32]],
-    reach: Sequence[NDArray[np.float32] | None],
+    own_radii: Sequence[NDArray[np.float32] | None],
 ) -> None:
     """Find offsets and radii of all nodes, as `Attributes` has them, from the offsets of the leaves.
 
     masks: of the levels above the deepest, see `Octree`. edge: of the cube. offsets: of each level, (n, 3);
     those of inner nodes, means over the leaves below, are written. radii: of each level, (n,), are written.
-    reach: of each level, as `Attributes` has it.
+    own_radii: of each level, as `Attributes` has them.
     """
     from . import disc_kernels
 
@@ -52,7 +52,7 @@ def discs_of(
     most = _LARGEST * usual_radius(masks, radii)
     for level in range(depth + 1):
         np.minimum(radii[level], np.float32(most), out=radii[level], where=are_leaves[level])
-        if (own := reach[level]) is not None:
+        if (own := own_radii[level]) is not None:
             suffices = are_leaves[level] & (own > 0) & (own * _RADIUS_PER_SPACING >= radii[level])
             np.copyto(radii[level], own, where=suffices)
     for level in reversed(range(depth)):

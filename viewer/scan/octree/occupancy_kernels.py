@@ -39,7 +39,9 @@ _TOUCHED = _PLANE_OF_ONE + (1 << 11)  # whether a child: children that touch it
 _PLANE = _TOUCHED + (1 << 16)  # its distance from the plane, and those of children behind
 _KNOWN = _PLANE + (1 << 17)  # children before it, and nodes at faces
 _LIKELY = _KNOWN + (64 << 8)  # whether it is expected, and what else of the mask
-SITUATIONS = _LIKELY + (16 << 5)
+_EXPECTED_OF_ONE = _LIKELY + (16 << 5)  # which child: the mask that is expected
+_RECENT = _EXPECTED_OF_ONE + (512 << 3)  # as expected: whether the nodes before it were
+SITUATIONS = _RECENT + (16 << 4)
 
 _COUNT = 31  # up to which a situation counts
 _SCORE = 12  # bits of a score below a step
@@ -158,8 +160,8 @@ _FROM_BEFORE = np.stack([_touching(_as_cells(_OCTANTS + 1 - 2 * before)) for bef
 _FROM_WITHIN = _touching(1 << _SELF + _CORNERS)
 _ODDS = np.cumprod(np.full(_LARGEST, _GROWTH))
 _ODDS = np.concatenate([1 / _ODDS[::-1], [1.0], _ODDS[:-1]])  # of each score
-_WEIGHTS = np.maximum(np.rint(64 * _ODDS), 1).astype(np.int64)
-_CHANCES = np.clip(np.rint(65536 * _ODDS / (1 + _ODDS)), 64, 65536 - 64).astype(np.int64)
+_WEIGHTS = np.maximum(np.rint(64 * _ODDS), 1).astype(np.int32)
+_CHANCES = np.clip(np.rint(65536 * _ODDS / (1 + _ODDS)), 64, 65536 - 64).astype(np.uint16)
 _FOR_ONE, _FOR_SOME = _rates(1.5), _rates(2.0)
 
 
@@ -326,6 +328,7 @@ def code_part(
     masks = coded.masks
     begin = _whole(above.first[nodes[0]])
     corners, distances, sides, weights = _eight(), _eight(), _eight(), _eight()
+    recent = _whole(0)  # whether each of the last nodes was as expected, a bit each
     state = 1 << 48, _whole(0), 0  # the span that is left, the place in it, bytes
     if decodes:
         state = 1 << 48, _start(stored), 6
@@ -344,11 +347,18 @@ def code_part(
             )  # fmt: skip
             faces, crowd = _spread(beside, sides)
             if expected:
-                same = np.uint32(_SAME + (_HOW_MANY[expected] * 2 + agrees - 2 << 4) + min(crowd, 15))
+                likely = _HOW_MANY[expected] * 2 + agrees - 2
+                a, b = (
+                    np.uint32(_SAME + (likely << 4) + min(crowd, 15)),
+                    np.uint32(_RECENT + (likely << 4) + recent),
+                )
                 expected |= agrees << 8
-                chance = _CHANCES[_score(_whole(learnt[same]))]
+                chance = _whole(_CHANCES[_score(_whole(learnt[a]) + _whole(learnt[b]))])
                 state, bit = _decide(state, chance, mask == expected & 255, stored, decodes)
-                _learn(learnt, same, (bit << 16) - chance, _FOR_SOME)
+                error = (bit << 16) - chance
+                _learn(learnt, a, error, _FOR_SOME)
+                _learn(learnt, b, error, _FOR_SOME)
+                recent = (recent << 1 | bit) & 15
                 if bit:
                     masks[node] = expected & 255
                     node += 1
@@ -359,7 +369,7 @@ def code_part(
             a = np.uint32(_FACES + (_HOW_MANY[faces] << 4) + quality)
             b = np.uint32(_CROWD + (crowd << 3) + _HOW_MANY[children] - 1)
             c = np.uint32(_OFF + (min(abs(middle) >> _FINER + 1, 15) << 4) + quality)
-            chance = _CHANCES[_score(_whole(learnt[a]) + _whole(learnt[b]) + _whole(learnt[c]))]
+            chance = _whole(_CHANCES[_score(_whole(learnt[a]) + _whole(learnt[b]) + _whole(learnt[c]))])
             state, bit = _decide(state, chance, (mask != 0) & (mask & mask - 1 == 0), stored, decodes)
             error = (bit << 16) - chance
             _learn(learnt, a, error, _FOR_SOME)
@@ -368,7 +378,7 @@ def code_part(
             if bit:
                 total = _weigh(learnt, sides, distances, expected, quality, weights)
                 state, child = _choose(state, weights, total, _LOWEST[mask], stored, decodes)
-                _learn_child(learnt, sides, distances, weights, child)
+                _learn_child(learnt, sides, distances, expected, weights, child)
                 masks[node] = 1 << child
             else:
                 touched = _before(above, parent, octant, beside, begin, masks)
@@ -433,7 +443,10 @@ def _weigh(
         sides[child] += _SIDES_OF_ONE
         distances[child] = _PLANE_OF_ONE + plane
         a, b = np.uint32(sides[child]), np.uint32(distances[child])
-        weights[child] = _WEIGHTS[_score(_whole(learnt[a]) + _whole(learnt[b]))]
+        score = _whole(learnt[a]) + _whole(learnt[b])
+        if expected:
+            score += _whole(learnt[np.uint32(_EXPECTED_OF_ONE + (expected << 3 | child))])
+        weights[child] = _whole(_WEIGHTS[_score(score)])
         total += weights[child]
     return total
 
@@ -469,10 +482,14 @@ def _learn_child(
     learnt: NDArray[np.int32],
     sides: NDArray[np.int64],
     distances: NDArray[np.int64],
+    expected: int,
     weights: NDArray[np.int64],
     child: int,
 ) -> None:
     weights[child] -= 1 << 16
+    if expected:
+        for i in range(8):
+            _learn(learnt, np.uint32(_EXPECTED_OF_ONE + (expected << 3 | i)), -weights[i], _FOR_ONE)
     for i in range(8):
         _learn(learnt, np.uint32(sides[i]), -weights[i], _FOR_ONE)
         _learn(learnt, np.uint32(distances[i]), -weights[i], _FOR_ONE)
@@ -531,7 +548,7 @@ def _code_several(
         likely = (_HOW_MANY[expected & 255] << 2 | wrong) << 1 | expected >> child & 1
         d = np.uint32(_LIKELY + (likely << 2 | count))
         score = _score(_whole(learnt[a]) + _whole(learnt[b]) + _whole(learnt[c]) + _whole(learnt[d]))
-        chance = _CHANCES[score]
+        chance = _whole(_CHANCES[score])
         state, bit = _decide(state, chance, mask >> child & 1, stored, decodes)
         error = (bit << 16) - chance
         _learn(learnt, a, error, _FOR_SOME)

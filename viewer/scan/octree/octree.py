@@ -30,8 +30,7 @@ class Attributes:
     offsets: (n, 3) uint16, or None: where the surface is in the node's cell: of a leaf the mean position of
              its points, of others that of the leaves below, in 65536ths of the cell's edge
     radii:   (n,) float32, scan units, or None: of discs there that close the surface
-    reach:   (n,) float32, scan units, or None: of a leaf, how far the discs of its points reach from there,
-             by the radii that these store; of others the largest below; 0 where no point stores one
+    own_radii: (n,) float32, scan units, or None: the largest radius that a point below stores; 0 for none
     """
 
     colors: NDArray[np.uint8] | None = None
@@ -40,7 +39,7 @@ class Attributes:
     rows: NDArray[np.uint32] | None = None
     offsets: NDArray[np.uint16] | None = None
     radii: NDArray[np.float32] | None = None
-    reach: NDArray[np.float32] | None = None
+    own_radii: NDArray[np.float32] | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,11 +24,11 @@ from .occupancy import OccupancyCoder
 from .octree import DEEPEST, Attributes, Octree
 
 MAGIC = b"\x8dSVO"
-VERSION = 4
+VERSION = 5
 _FREE = 1 << 22  # nodes of any tree: some 300 MB as points
 MOST_BEFORE = 255  # trees that have to be read before one
 
-_PACKED, _COLORS, _NORMALS, _REACH = 1, 2, 4, 8  # bits of `Header.flags`
+_PACKED, _COLORS, _NORMALS, _RADII = 1, 2, 4, 8  # bits of `Header.flags`
 _FIXED = struct.Struct("<4s6BI5d2Q5I")  # magic, version, flags, before, depth, size of the unit, 0; numbers
 _LEVEL = struct.Struct("<4I")  # see `Level`
 _CHECK = struct.Struct("<I")  # CRC-32 of the header before it
@@ -76,7 +76,7 @@ class Strays:
         rows = octree.strays
         of_nodes = octree.attributes[0] if octree.attributes else Attributes()
         radii = None
-        if of_nodes.reach is not None and cloud.radii is not None:
+        if of_nodes.own_radii is not None and cloud.radii is not None:
             own = cloud.radii[rows]
             radii = np.where((own > 0) & (own < np.inf), own, np.float32(0))
         return cls(
@@ -94,7 +94,7 @@ class Strays:
 class Header:
     """The header of a tree, which stands before its levels.
 
-    flags: 1: packed, 2: with colours, 4: with normals, 8: with reaches. before: how many trees have to be
+    flags: 1: packed, 2: with colours, 4: with normals, 8: with radii. before: how many trees have to be
     read before this one, each predicted from the one before it; 0: it stands alone. predicted: bit n: the
     masks of level n are predicted from the tree before; predicted_attributes: its attributes are. time:
     seconds. strays: their entry. Others: see `Octree`.
@@ -121,7 +121,7 @@ class Header:
     @property
     def width(self) -> int:
         """Bytes of attributes for a node."""
-        return 4 * bool(self.flags & _COLORS) + 2 * bool(self.flags & _NORMALS) + bool(self.flags & _REACH)
+        return 4 * bool(self.flags & _COLORS) + 2 * bool(self.flags & _NORMALS) + bool(self.flags & _RADII)
 
     def to_bytes(self) -> bytes:
         """The bytes that stand before the levels."""
@@ -144,9 +144,9 @@ def to_bytes(
     packed: bool = True,
     strays: Strays | None = None,
 ) -> bytes:
-    """A tree with its colours, normals and reaches; also what a file of one pose holds.
+    """A tree with its colours, normals and radii; also what a file of one pose holds.
 
-    Geometry and colours come back bit for bit, normals to a degree, reaches up to 7 % larger, cones and rows
+    Geometry and colours come back bit for bit, normals to a degree, radii up to 7 % larger, cones and rows
     not at all.
     previous: the tree of the pose before. Where it has the same cube, and that saves more than a 32nd of the
     bytes, masks and attributes of the levels that get shorter are predicted from it. Reading them needs it.
@@ -239,7 +239,7 @@ def read_levels(
             values = _read_attributes(own, header.width, masks, values, known)
             found.append(_attributes(values, header))
         is_finest = number == len(header.levels) - 1
-        kept = found if is_finest else [replace(each, reach=None) for each in found]  # which is of leaves
+        kept = found if is_finest else [replace(each, own_radii=None) for each in found]  # which is of leaves
         yield Octree(header.low, header.edge, tuple(masks), header.points, header.distinct, tuple(kept))
 
 
@@ -260,7 +260,7 @@ def read_strays(header: Header, read: Read) -> Strays:
     if header.width:
         values = coding.unpack(data[entry.masks :], header.width * entry.nodes)
         found = _attributes(values.reshape(header.width, -1).T, header)
-    return Strays(positions.reshape(-1, 3), found.colors, found.normals, found.reach)
+    return Strays(positions.reshape(-1, 3), found.colors, found.normals, found.own_radii)
 
 
 def read_header(data: bytes) -> tuple[Header, int]:
@@ -351,7 +351,7 @@ def _store_strays(strays: Strays | None, edge: float) -> tuple[bytes, bytes]:
     if not strays:
         return b"", b""
     places = np.ascontiguousarray(strays.positions, "<f8").view(np.uint8)
-    own = Attributes(strays.colors, strays.normals, reach=strays.radii)
+    own = Attributes(strays.colors, strays.normals, own_radii=strays.radii)
     values = _bytes(own, edge, len(strays))
     return coding.pack(places.T.ravel()), coding.pack(values.T.ravel())
 
@@ -447,7 +447,7 @@ def _kinds(octree: Octree) -> int:
         return 0
     root = octree.attributes[0]
     of_surface = _COLORS * (root.colors is not None) | _NORMALS * (root.normals is not None)
-    return of_surface | _REACH * (root.reach is not None)
+    return of_surface | _RADII * (root.own_radii is not None)
 
 
 def _store_attributes(
@@ -481,8 +481,8 @@ def _bytes(attributes: Attributes, edge: float, count: int = 0) -> Bytes:
         parts.append(coding.color_bytes(attributes.colors))
     if attributes.normals is not None:
         parts.append(coding.normal_bytes(attributes.normals))
-    if attributes.reach is not None:
-        parts.append(coding.reach_bytes(attributes.reach, edge))
+    if attributes.own_radii is not None:
+        parts.append(coding.radius_bytes(attributes.own_radii, edge))
     return np.concatenate(parts, axis=1) if parts else np.zeros((count, 0), np.uint8)
 
 
@@ -503,5 +503,5 @@ def _attributes(values: Bytes, header: Header) -> Attributes:
     return Attributes(
         colors=coding.colors_of(values[:, :4]) if has_colors else None,
         normals=coding.normals_of(normals) if has_normals else None,
-        reach=coding.reach_of(values[:, -1], header.edge) if header.flags & _REACH else None,
+        own_radii=coding.radii_of(values[:, -1], header.edge) if header.flags & _RADII else None,
     )

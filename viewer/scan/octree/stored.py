@@ -42,7 +42,7 @@ def with_discs(octree: Octree, strays: int = 0) -> Octree:
     for offset, each in zip(offsets, own, strict=True):
         if each.offsets is not None and len(each.offsets):
             offset[:] = each.offsets
-    discs_of(octree.masks, octree.edge, offsets, radii, [each.reach for each in own])
+    discs_of(octree.masks, octree.edge, offsets, radii, [each.own_radii for each in own])
     attributes = tuple(
         replace(each, rows=of_row, offsets=offset, radii=radius)
         for each, of_row, offset, radius in zip(own, _rows(octree), offsets, radii, strict=True)
@@ -51,9 +51,9 @@ def with_discs(octree: Octree, strays: int = 0) -> Octree:
     return replace(octree, attributes=attributes, strays=outside)
 
 
-def without_reach(octree: Octree) -> Octree:
+def without_own_radii(octree: Octree) -> Octree:
     """The octree of `with_discs`, its discs as large as the distances between leaves alone tell."""
-    bare = replace(octree, attributes=tuple(replace(each, reach=None) for each in octree.attributes))
+    bare = replace(octree, attributes=tuple(replace(each, own_radii=None) for each in octree.attributes))
     return replace(with_discs(bare), strays=octree.strays)
 
 
