@@ -3,7 +3,7 @@
     python tests/app/window_picture.py [FOLDER]
 
 window.png: a distance between the eyes. window-landmarks.png: landmarks of a face, tracked, with the
-plot of their measures. Needs Xvfb and xdotool.
+plot of their measures. window-dense-tracking.png: displacements of a face. Needs Xvfb and xdotool.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from viewer.camera import Camera
 from viewer.geometry import vector
 
 SIZE = (1280, 800)
+FRAME = 20  # in which the mouth of demo:sway is open
 EYES = ("endocanthion right", "endocanthion left")
 # Landmarks of the template, by the places of the demo's face. The others are skipped.
 CLICKED = {
@@ -68,9 +69,15 @@ def tracked(app: RunningApp) -> None:
     app.press("Escape", "v")
 
 
+def followed(app: RunningApp) -> None:
+    """How the face has moved against the head, by colours."""
+    app.press("shift+d", "u", *["Right"] * FRAME)
+
+
 PICTURES: dict[str, tuple[str, Callable[[RunningApp], None]]] = {
     "window": ("demo", measured),
     "window-landmarks": ("demo:smile", tracked),
+    "window-dense-tracking": ("demo:sway", followed),
 }
 
 

@@ -151,7 +151,7 @@ class FollowedPoints:
         covariance is that of these points in both frames, and its own. Frames that are not known are found
         first. Raises InputError.
         """
-        held = [self._held(spot) for spot in spots]
+        held = self._held(spots)
         rows = np.array([one[0] for one in held if one is not None], np.int64)
         moved, sigma, state = [], [], []
         for frame in range(len(self.timeline) if len(rows) else 0):
@@ -178,18 +178,24 @@ class FollowedPoints:
                     into[frame] = Sighting.gap(_LOST)
         return sightings
 
-    def _held(self, spot: SurfacePoint) -> tuple[NDArray[np.int64], Float] | None:
-        """The rows of the points that carry a spot, and their places in its frame, (k, 3); None where no
+    def _held(self, spots: Sequence[SurfacePoint]) -> list[tuple[NDArray[np.int64], Float] | None]:
+        """The rows of the points that carry each spot, and their places in its frame, (k, 3); None where no
         point is near."""
         from scipy.spatial import cKDTree
 
-        here = self.frame(spot.frame)
-        is_there = np.flatnonzero(here.state != PointState.LOST)
-        if len(is_there) < _AROUND:
-            return None
-        places = self._points.reference[is_there] + here.displacement[is_there]
-        away, near = cKDTree(places).query(spot.position, _AROUND)
-        return None if away.min() > _REACH * self.spacing else (is_there[near], places[near])
+        found: list[tuple[NDArray[np.int64], Float] | None] = [None] * len(spots)
+        for frame in {spot.frame for spot in spots}:
+            here = self.frame(frame)
+            is_there = np.flatnonzero(here.state != PointState.LOST)
+            if len(is_there) < _AROUND:
+                continue
+            places = self._points.reference[is_there] + here.displacement[is_there]
+            numbers = [number for number, spot in enumerate(spots) if spot.frame == frame]
+            away, near = cKDTree(places).query([spots[number].position for number in numbers], _AROUND)
+            for number, distances, rows in zip(numbers, away, near, strict=True):
+                if distances[0] <= _REACH * self.spacing:
+                    found[number] = is_there[rows], places[rows]
+        return found
 
     def _numbers(self, of: PointQuantities, name: str, frame: int, motion_of: MotionOf) -> Float:
         """A number of QUANTITIES of some of the points in a frame; NaN where a motion is not known."""
@@ -216,7 +222,7 @@ class FollowedPoints:
 
     def _quantities(self, step: int) -> PointQuantities:
         rows = np.arange(0, len(self._points.points), step)
-        return PointQuantities(self._points.reference, self._normals, rows, self._tree)
+        return PointQuantities(self._points.reference, lambda: self._normals, rows, lambda: self._tree)
 
     @cached_property
     def _normals(self) -> NDArray[np.floating]:

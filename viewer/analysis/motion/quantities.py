@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
@@ -62,12 +62,16 @@ class PointQuantities:
     """
 
     def __init__(
-        self, reference: Float, normals: NDArray[np.floating], rows: NDArray[np.integer], tree: Any
+        self,
+        reference: Float,
+        normals: Callable[[], NDArray[np.floating]],
+        rows: NDArray[np.integer],
+        tree: Callable[[], Any],
     ) -> None:
-        """reference: (N, 3) positions. normals: (N, 3), zero where there is none. rows: (n,), of the points.
-        tree: a cKDTree of the reference."""
+        """reference: (N, 3) positions. rows: (n,), of the points. Asked for once they are needed: normals,
+        (N, 3), zero where there is none, and tree, a cKDTree of the reference."""
         self._reference, self._rows, self._tree = reference, rows, tree
-        self._rest, self._normals = reference[rows], normals[rows].astype(np.float64)
+        self._rest, self._find_normals = reference[rows], normals
 
     @property
     def count(self) -> int:
@@ -88,13 +92,13 @@ class PointQuantities:
             found = self._speed(frame, [beside[number] for number in sorted(beside)])
         else:
             moved = self._places(frame) - reference_motion.points(self._rest)
-            along = np.einsum("nk,nk->n", moved, reference_motion.directions(self._normals))
-            along[~self._normals.any(axis=1)] = np.nan
-            if name == NORMAL:
-                found = along
-            else:
-                squared = np.einsum("nk,nk->n", moved, moved)
-                found = np.sqrt(np.maximum(squared - (along**2 if name == TANGENTIAL else 0.0), 0.0))
+            if name != DISPLACEMENT:
+                along = np.einsum("nk,nk->n", moved, reference_motion.directions(self._normals))
+                along[~self._normals.any(axis=1)] = np.nan
+            squared = np.einsum("nk,nk->n", moved, moved)
+            if name == TANGENTIAL:
+                squared = np.maximum(squared - along**2, 0.0)
+            found = along if name == NORMAL else np.sqrt(squared)
         found[frame.points.state[self._rows] != PointState.SEEN] = np.nan
         return found
 
@@ -122,4 +126,8 @@ class PointQuantities:
 
     @cached_property
     def _gauge(self) -> StrainGauge:
-        return StrainGauge(self._reference, self._tree, self._rows)
+        return StrainGauge(self._reference, self._tree(), self._rows)
+
+    @cached_property
+    def _normals(self) -> Float:
+        return self._find_normals()[self._rows].astype(np.float64)

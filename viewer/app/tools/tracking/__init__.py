@@ -90,7 +90,7 @@ class Tool:
     def advance(self, budget: float) -> bool:
         """Have points followed, and the scan coloured by them; whether there is something new."""
         choices = self.choices
-        is_new = self.follower.advance(choices.reference, choices.is_on)
+        is_new = self.follower.advance(choices.reference, choices.is_on or bool(self.color))
         work = self.follower.work
         self.context.followed.points = None if work is None or not work.is_whole else work.points
         self.colors.advance(self.follower.points, self.color)

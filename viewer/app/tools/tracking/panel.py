@@ -56,14 +56,16 @@ def draw(tool: Tool, ui: Ui) -> None:
 def _draw_state(tool: Tool, ui: Ui) -> None:
     """Say how far points are followed, and what is known of them in the frame that is shown."""
     work, follower = tool.follower.work, tool.follower
-    if work is None or work.problem:
-        widgets.faint("" if work is None else work.problem)
+    if work is None:
         return
     known, count = len(follower.known), len(tool.context.timeline)
+    if work.problem:
+        imgui.text_wrapped(work.problem)
     if known < count:
         widgets.faint(f"The points are known in {known} of {count} frames, {count - known} left.")
-        if follower.is_stopped and ui.row("Continue").button():
-            follower.resume()
+    stops = follower.is_stopped or work.problem
+    if stops and ui.row(widgets.labelled("Continue", "continue following")).button():
+        follower.resume()
     facts = tool.colors.facts(tool.frame)
     if facts is not None and facts.is_exact:
         widgets.faint(f"The file names its {facts.points:,} points in this frame: their motion is exact.")

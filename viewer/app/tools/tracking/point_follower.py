@@ -68,8 +68,10 @@ class PointFollower:
         return frozenset() if self.points is None else self.points.known
 
     def resume(self) -> None:
-        """Go on after the user has cancelled it."""
+        """Go on after the user has cancelled it, or after a problem."""
         self.is_stopped = False
+        if self.work is not None and self.work.problem:
+            self.work = None
 
     def advance(self, reference: int, is_wanted: bool) -> bool:
         """Have the points of a frame followed; whether there is something new.
