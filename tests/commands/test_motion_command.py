@@ -180,6 +180,10 @@ def test_a_region_lies_around_landmarks_of_the_session(run: Run) -> None:
     report = json.loads(Path("out/report.json").read_text())["rigid"]
     assert report["states"]["ok"] == 3
     assert np.allclose(report["region"]["middle"][:2], [0.5, 0.0], atol=1.5)
+    Path("near.json").write_text('{"landmarks": ["nose"]}')
+    near = run("motion", "seq", "--unit", "mm", "--region", "near.json", "-o", "near", "--reference", "1")
+    assert "near.json: points count up to 2.8" in near.out
+    assert "which is too few" in near.err
     elsewhere = run(*words, "0", "--force")
     assert elsewhere.code == 2
     assert "nose.json: the reference frame has no landmark 'nose'. Place it there" in elsewhere.err

@@ -185,6 +185,8 @@ def region_rows(args: Namespace, file: Path, reference: StartOfMotion) -> NDArra
         low, high = reference.pose.bounds.low, reference.pose.bounds.high
         where = " to ".join("(" + ", ".join(f"{value:.4g}" for value in end) + ")" for end in (low, high))
         raise InputError("has no points of the reference", file, f"The reference extends from {where}")
+    if region.landmarks and region.radius is None:
+        tell(f"{file}: points count up to {region.radius_in(reference.pose.cloud):.3g} from a landmark")
     return rows
 
 

@@ -159,6 +159,7 @@ def test_a_frame_that_cannot_be_read_is_lost_and_the_next_one_is_not() -> None:
 
 def test_frames_are_kept_in_a_folder(tmp_path: Path, sampled_anew: tuple[Kept, list[Float]]) -> None:
     kept, _ = sampled_anew
+    (tmp_path / "part").mkdir()  # as an interruption can leave it
     folder = PartialFrames(tmp_path / "part", {"scan": "hills"})
     folder.save(2, kept[2])
     same = PartialFrames(tmp_path / "part", {"scan": "hills"})

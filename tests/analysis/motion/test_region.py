@@ -21,6 +21,8 @@ CLOUD = PointCloud.from_arrays(np.array([[0, 0, 0], [np.nan, 0, 0], [10, 0, 0], 
         ({"spheres": [[0, 0, 0, 1], [21, 0, 0, 2]]}, [0, 2]),
         ({"points": [2, 0]}, [0, 1]),
         ({"landmarks": ["n"], "radius": 3}, [1]),
+        ({"landmarks": ["n"]}, [1]),
+        ({"landmarks": ["n"], "radius": 0.9}, []),
         ({"points": [3], "spheres": [[0, 0, 0, 1]]}, [0, 2]),
     ],
 )
@@ -42,7 +44,7 @@ def test_a_region_is_all_that_its_parts_hold(data: dict[str, Any], rows: list[in
         ('{"spheres": [[0, 0, NaN, 1]]}', "'spheres' is not a list"),
         ('{"points": [1.5]}', "'points' is not a list"),
         ('{"points": [true]}', "'points' is not a list"),
-        ('{"landmarks": ["n"]}', "'radius' is not a length.*State the radius"),
+        ('{"landmarks": ["n"], "radius": 0}', "'radius' is not a length.*State the radius"),
         ('{"landmarks": [1], "radius": 2}', "'landmarks' is not a list"),
     ],
 )

@@ -28,7 +28,7 @@ class PartialFrames:
     def __init__(self, folder: Path, key: Mapping[str, Any]) -> None:
         self.folder = folder
         wanted = json.loads(json.dumps(key))
-        if folder.exists():
+        if folder.exists() and not (folder.is_dir() and not any(folder.iterdir())):
             with reading(folder / _KEY, "does not say what the frames are of", _HINT):
                 is_same = parsed_json(read_text(folder / _KEY, _MOST_BYTES)) == wanted
             if is_same:

@@ -4,7 +4,8 @@
     {"points": [id, ...]}                    points of the reference frame, by their numbers in its file
     {"landmarks": [name, ...], "radius": r}  what lies within a radius of landmarks of the scan's session
 
-A file may have several of these: the region is all of them together.
+Without "radius", it is a tenth of the radius of the reference frame's bounds. A file may have several of
+these: the region is all of them together.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from ...scan.points import PointCloud
 Float = NDArray[np.float64]
 
 _MOST_BYTES = 1 << 28
+_SHARE = 0.1  # of the radius of the bounds, that a sphere around a landmark has unless it is stated
 _KEYS = ("spheres", "points", "landmarks", "radius")
 _HINT = (
     'Write {"spheres": [[x, y, z, radius], ...]}, {"points": [id, ...]} or {"landmarks": [name, ...], '
@@ -36,13 +38,13 @@ class RigidRegion:
     """A region of the reference frame.
 
     spheres: (S, 4), middles and radii, scan units. points: (P,), ids. landmarks: names, each the middle of a
-    sphere of `radius`, scan units.
+    sphere of `radius`, scan units; None: see `radius_in`.
     """
 
     spheres: Float
     points: NDArray[np.int64]
     landmarks: tuple[str, ...] = ()
-    radius: float = 0.0
+    radius: float | None = None
 
     @classmethod
     def read(cls, path: Path) -> RigidRegion:
@@ -59,10 +61,10 @@ class RigidRegion:
                 raise unknown_name("entry of a region", key, list(_KEYS))
         if not any(data.get(key) for key in _KEYS[:3]):
             raise InputError("has no region", hint=_HINT)
-        names, radius = data.get("landmarks", []), data.get("radius", 0.0)
+        names, radius = data.get("landmarks", []), data.get("radius")
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             raise InputError("'landmarks' is not a list of names", hint=_HINT)
-        if names and not (_is_number(radius) and radius > 0):
+        if radius is not None and not (_is_number(radius) and radius > 0):
             raise InputError("'radius' is not a length above 0", hint="State the radius around the landmarks")
         return cls(_spheres(data.get("spheres", [])), _ids(data.get("points", [])), tuple(names), radius)
 
@@ -74,8 +76,14 @@ class RigidRegion:
         if len(self.points):
             said["points"] = self.points.tolist()
         if self.landmarks:
-            said |= {"landmarks": list(self.landmarks), "radius": self.radius}
+            said["landmarks"] = list(self.landmarks)
+        if self.radius is not None:
+            said["radius"] = self.radius
         return said
+
+    def radius_in(self, cloud: PointCloud) -> float:
+        """The radius around landmarks in a cloud: as stated, or a share of the radius of its bounds."""
+        return _SHARE * cloud.bounds().radius if self.radius is None else self.radius
 
     def rows(self, cloud: PointCloud, places: Mapping[str, Float]) -> NDArray[np.int64]:
         """The rows of a cloud that are in the region, increasing. places: (3,) by the names of landmarks.
@@ -95,7 +103,7 @@ class RigidRegion:
                     f"Place it there in the window, or name one that is there: {', '.join(places) or 'none'}"
                 )
                 raise InputError(what, hint=did_you_mean(name, places) + hint)
-        around = [np.append(places[name], self.radius) for name in self.landmarks]
+        around = [np.append(places[name], self.radius_in(cloud)) for name in self.landmarks]
         positions = cloud.world()
         for sphere in [*self.spheres, *around]:
             is_in |= ((positions - sphere[:3]) ** 2).sum(axis=1) <= sphere[3] ** 2
