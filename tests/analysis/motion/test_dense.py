@@ -108,6 +108,24 @@ def test_a_hidden_part_is_predicted_and_less_sure() -> None:
     assert (error[hidden] < 2 * found.sigma[hidden]).mean() > 0.9
 
 
+def parted(where: Float, frame: int) -> PointCloud:
+    """The points in a frame of a patch whose halves touch at rest, and part."""
+    x, y = where.T
+    rest = np.column_stack([x, y - 2.0 * frame * (y < 0), hills(x, y)])
+    return PointCloud.from_arrays(rest, colors=colors_of(x, y))
+
+
+def test_halves_that_touch_at_rest_part() -> None:
+    where = [places(seed) for seed in range(5)]
+    clouds = [parted(each, frame) for frame, each in enumerate(where)]
+    source = KeptFrames("parted", clouds, np.arange(5.0))
+    found = followed(Timeline(source, source.times(), "mm"))[4]
+    y = where[0][:, 1]
+    error = np.linalg.norm(found.displacement - np.column_stack([0 * y, -8.0 * (y < 0), 0 * y]), axis=1)
+    assert np.median(error) < 0.1
+    assert np.quantile(error[np.abs(y) > 4], 0.8) < 0.3
+
+
 def test_points_that_a_file_names_are_exact_and_missing_ones_lost() -> None:
     where = places(0)
     clouds = [frame_of(where, frame) for frame in range(2)]

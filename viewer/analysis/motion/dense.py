@@ -1,10 +1,11 @@
 """Where every point of a reference frame is in the other frames.
 
 The nodes of a body (`tracking.body`) carry the points along (embedded deformation: Sumner, Schmid and Pauly
-2007). The body first moves onto a frame as a whole. Then places all over the reference frame draw its nodes:
-along the normals of the surface beside them (point to plane, Chen and Medioni 1992), along it where colours
-change (Park, Zhou and Koltun 2017), and to the points themselves where these recur (`tracking.pattern`). The
-body is always compared with the reference frame, never with the frame before: errors do not add up.
+2007). The body first moves onto a frame as a whole, in the shape that it has in the frame beside. Then places
+all over the reference frame draw its nodes: along the normals of the surface beside them (point to plane,
+Chen and Medioni 1992), along it where colours change (Park, Zhou and Koltun 2017), and to the points
+themselves where these recur (`tracking.pattern`). Where the subject opens, nodes let go of each other. These
+places are always compared with the reference frame, never with the frame before: errors do not add up.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from ...task import checkpoint
 from ...threads import ranges, threads_for, together
 from ..tracking.body import BodyPose, DeformableBody
 from ..tracking.pattern import RecurringPoints
-from ..tracking.registration import rotations
 from ..tracking.surface import MomentSurface
 from .stabilise import outward
 
@@ -38,14 +38,14 @@ Float = NDArray[np.float64]
 _PLACES = 25_000  # of the reference frame that draw the body
 _ROUNDS = 10
 _REACH = 3.0, 2.0  # spacings that a place is drawn over, first and last
-_LOOSE = 15.0, 4.0  # of the usual deviations, at which a residual counts as an outlier, first and last
-_STIFF = 1.0, 0.1  # of the body, first and last
+_LOOSE = 6.0, 4.0  # of the usual deviations, at which a residual counts as an outlier, first and last
+_STIFF = 0.3, 0.1  # of the body, first and last
 _LEAST_OFF = 0.02  # spacings: deviations of distances are taken to be this at least
-_LEAST_COLOR = 0.004  # of a byte's range, as of colours
+_LEAST_COLOR = 0.002  # of a byte's range, as of colours
 _DEVIATION = 1.4826  # standard deviation of Gaussian residuals, by their median absolute deviation
 _RIDGE = 1e-9
 _ALIKE = 14.0  # places whose errors are alike, as their parabolas share points
-_BENDING = 2.0  # of the strains around a node, that they may be off
+_BENDING = 1.5  # of the strains around a node, that they may be off
 _UNSUPPORTED = 0.04  # of the way from the nearest point that is seen, the deviation of a hidden one
 _FLOOR = 0.03  # spacings: what a standard deviation is at least
 _STARTS = 24  # nodes, far from each other, near which recurring points are looked for first
@@ -161,14 +161,16 @@ class DensePoints:
         body, rest, places, held, *_ = self._carried
         recurring = RecurringPoints(before, now, np.empty((0, 3)), np.empty((0, 3)))
         rows = np.where(beside.rows >= 0, recurring.matches[beside.rows], -1).astype(np.int32)
-        body.put(self._rotated(beside), self._rotated(earlier))
-        body.go_to(now.held.points, recurring)
+        last = beside.pose or rest
+        step = body.reformed(last, earlier.pose or rest)
+        step.go_to(now.held.points, recurring)
+        start = BodyPose(step.pose.positions, step.pose.turns @ last.turns)
         if (recurring.matches >= 0).any():
-            motions = body.pose.positions - rest.positions
+            motions = start.positions - rest.positions
             direct = RecurringPoints(self.surface, now, rest.positions[:_STARTS], motions[:_STARTS])
             rows = np.where(direct.matches >= 0, direct.matches, rows).astype(np.int32)
-        pose, spreads = self._refined(body.pose, now, rows)
-        found = self._matched(held, pose, now, _REACH[1])
+        pose, spreads = self._refined(start, now, rows)
+        found = self._matched(_torn(held, body, pose), pose, now, _REACH[1])
         known = rows >= 0
         moved = found.places - places
         moved[known] = now.held.points[rows[known]] - self.points[known]
@@ -198,12 +200,6 @@ class DensePoints:
         chosen = CarriedPlaces(nodes[some].astype(np.int32), *(each[some] for each in all_of_them[1:]))
         return _Carried(body, body.pose, places, all_of_them, some, chosen)
 
-    def _rotated(self, frame: TrackedFrame) -> BodyPose:
-        """The pose of the body in a frame, without strains."""
-        if frame.pose is None:
-            return self._carried.rest
-        return BodyPose(frame.pose.positions, rotations(frame.pose.turns))
-
     def _distances(self, is_seen: NDArray[np.bool_]) -> Float:
         """How far each point is from those that a frame shows, at rest, (N,); inf where it shows none."""
         from scipy.spatial import cKDTree
@@ -231,10 +227,11 @@ class DensePoints:
         stiffness, off = _STIFF[1], 0.0
         for part in np.linspace(0, 1, _ROUNDS):
             reach = now.spacing * _REACH[0] ** (1 - part) * _REACH[1] ** part
-            found = self._matched(held, pose, now, reach)
-            scales = _scales(found, now.spacing)
+            torn = _torn(held, body, pose)
+            found = self._matched(torn, pose, now, reach)
+            scales = _scales(found, now)
             loose = _LOOSE[0] ** (1 - part) * _LOOSE[1] ** part
-            gather_pulls(held, found, known, scales, loose, pulls, pushes)
+            gather_pulls(torn, found, known, scales, loose, pulls, pushes)
             pulls /= share
             pushes /= share
             ways = np.linalg.solve(pulls + _RIDGE * np.eye(3), pushes[..., None])[..., 0]
@@ -278,18 +275,28 @@ class DensePoints:
         return found
 
 
-def _scales(found: PlaceMatches, spacing: float) -> PullScales:
-    """The standard deviations of the distances and colours of matched places."""
+def _torn(held: CarriedPlaces, body: DeformableBody, pose: BodyPose) -> CarriedPlaces:
+    """Places that go along with the nearest of their nodes, and with the others as far as these do."""
+    weights = held.weights * body.intact(pose)[held.nodes[:, 0]]
+    return held._replace(weights=weights / weights.sum(axis=1, keepdims=True))
+
+
+def _scales(found: PlaceMatches, now: MomentSurface) -> PullScales:
+    """The standard deviations of the distances and colours of matched places.
+
+    They are those of the frame's points from the parabolas around them: where the body is changes nothing.
+    """
     from .dense_kernels import PullScales
 
-    matched = found.is_matched
-    if not matched.any():
-        channels = found.colors.shape[1]
-        return PullScales(_LEAST_OFF * spacing, np.full(channels, _LEAST_COLOR), np.zeros(channels))
-    off = _DEVIATION * float(np.median(np.abs(found.off[matched])))
-    shifts = np.median(found.colors[matched], axis=0)
-    colors = _DEVIATION * np.median(np.abs(found.colors[matched] - shifts), axis=0)
-    return PullScales(max(off, _LEAST_OFF * spacing), np.maximum(colors, _LEAST_COLOR), shifts)
+    rows, channels = found.rows[found.is_matched], found.colors.shape[1]
+    least = np.array([_LEAST_OFF * now.spacing, *[_LEAST_COLOR] * channels])
+    shifts, scales = np.zeros(channels), least
+    if len(rows):
+        heights = now.held.parabolas[rows, : 1 + channels, 0]
+        heights[:, 1:] -= now.held.colors[rows, :channels]
+        shifts = np.median(found.colors[found.is_matched], axis=0)
+        scales = np.maximum(_DEVIATION * np.median(np.abs(heights), axis=0), least)
+    return PullScales(float(scales[0]), scales[1:], shifts)
 
 
 def _surface(pose: Pose, origin: Float) -> MomentSurface:

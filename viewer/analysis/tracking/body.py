@@ -10,6 +10,7 @@ long ways and stiffly, then closely and softly.
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -41,6 +42,7 @@ _PREDICTED = 0.01  # weight of positions that the speed predicts, against the bo
 _STEPS = 60  # of conjugate gradients at most
 _CAPPED = 3.0  # node distances: a longer way counts as this one where poses are compared
 _UNSTRAINED = 0.1  # of a node's edges, that hold its map to a rotation
+_EASE = 0.02  # strain of the map at which it is held by a quarter of this
 _PROBES = 8  # random changes that say how exactly nodes are held
 _PROBING = 2  # threads
 _USUAL = 0.75  # of the nodes, that are strained less: strains are off by a share of this at least
@@ -124,6 +126,8 @@ class DeformableBody:
         self._ones, self._others = np.nonzero(is_beside)
         self._firsts = np.searchsorted(self._ones, np.arange(count + 1))
         self._edges = rest[self._others] - rest[self._ones]
+        self._rest = rest
+        self._strengths = np.ones(len(self._edges))
         self._moments = self._products(rest, np.ones(len(self._edges)))
         self._surface = MomentSurface(some, reach)
         self._normals = normals_at(self._surface.held, rows)
@@ -161,9 +165,20 @@ class DeformableBody:
         self.pose = min(found, key=lambda pose: self._misfit(pose, targets))
         self._surface = surface
 
-    def put(self, pose: BodyPose, before: BodyPose) -> None:
-        """Put it where it is in a frame, and was in the one before."""
-        self.pose, self._before = pose, before
+    def reformed(self, pose: BodyPose, before: BodyPose) -> DeformableBody:
+        """The body with a pose as its shape at rest, which `go_to` then keeps; its turns count from there.
+
+        before: its pose a frame earlier. What the pose tears apart holds little.
+        """
+        other, back = copy(self), np.linalg.inv(pose.turns)
+        other._rest = pose.positions
+        other._edges = pose.positions[self._others] - pose.positions[self._ones]
+        other._moments = other._products(pose.positions, np.ones(len(self._edges)))
+        other._strengths = self._holds(pose) ** 2
+        other._normals = np.einsum("nij,nj->ni", rotations(pose.turns), self._normals)
+        other.pose = BodyPose(pose.positions, np.tile(np.eye(3), (len(back), 1, 1)))
+        other._before = BodyPose(before.positions, rotations(before.turns @ back))
+        return other
 
     def gripped(self, positions: Float) -> Grip:
         """The grip of positions (..., 3) of the body as it is now."""
@@ -197,12 +212,13 @@ class DeformableBody:
         count = len(pose.positions)
         sizes, ways = np.linalg.eigh(pulls)
         loosely = np.where(sizes > _HELD, noise / np.sqrt(np.maximum(sizes, _HELD)), 0.0)
-        strained = self._strained(BodyPose(pose.positions, rotations(pose.turns)))
+        rigid, holds = BodyPose(pose.positions, rotations(pose.turns)), self._holds(pose) ** 2
+        strained = self._strained(rigid, self._ones, self._others)
         squares = np.zeros(count)
-        np.add.at(squares, self._ones, (strained**2).sum(axis=1))
+        np.add.at(squares, self._ones, holds * (strained**2).sum(axis=1))
         squares /= np.trace(self._moments, axis1=1, axis2=2) + 1e-300
         usual = bending * np.sqrt(self._mean_around(np.maximum(squares, np.quantile(squares, _USUAL))))
-        edges = BodyEdges(self._firsts, self._others, self._edges, np.ones(len(self._edges)))
+        edges = BodyEdges(self._firsts, self._others, self._edges, holds)
 
         def moved(probe: int) -> Float:
             chance = np.random.default_rng(probe)
@@ -218,6 +234,11 @@ class DeformableBody:
         with ThreadPoolExecutor(_PROBING, "scan4d-body") as pool:
             squares = np.mean([(away**2).sum(axis=1) for away in pool.map(moved, range(_PROBES))], axis=0)
         return np.sqrt(self._mean_around(squares))
+
+    def intact(self, pose: BodyPose) -> Float:
+        """How far each node holds together with those that `around` gives with it, (N, k), 0..1: less where
+        the subject opens, as a mouth does whose lips touch at rest."""
+        return self._kept(pose, np.arange(len(pose.positions))[:, None], self._around) ** 2
 
     def _mean_around(self, values: Float) -> Float:
         """The means of values of nodes, (N, ...), over each and those beside it."""
@@ -293,10 +314,14 @@ class DeformableBody:
         Its turns are affine maps (as in embedded deformation: Sumner, Schmid and Pauly 2007): each the one
         that fits the edges of the node best, drawn to a rotation.
         """
-        positions, products = self._moved(pose, stiffness, pulls, wanted, np.ones(len(self._edges)))
-        hold = _UNSTRAINED * np.trace(self._moments, axis1=1, axis2=2)[:, None, None] + 1e-300
+        holds = self._holds(pose) ** 2
+        positions, products = self._moved(pose, stiffness, pulls, wanted, holds)
+        moments = self._products(self._rest, holds)
+        strains = ((pose.turns - rotations(pose.turns)) ** 2).sum(axis=(1, 2))
+        eased = _UNSTRAINED / (1 + strains / _EASE**2) ** 2
+        hold = (eased * np.trace(self._moments, axis1=1, axis2=2) + 1e-300)[:, None, None]
         turns = products + hold * rotations(products)
-        return BodyPose(positions, turns @ np.linalg.inv(self._moments + hold * np.eye(3)))
+        return BodyPose(positions, turns @ np.linalg.inv(moments + hold * np.eye(3)))
 
     def _moved(
         self, pose: BodyPose, stiffness: float, pulls: Float, wanted: Float, holds: Float
@@ -308,14 +333,20 @@ class DeformableBody:
         from .body_kernels import BodyEdges, NodeTargets, settle_nodes
 
         positions = pose.positions.copy()
-        edges = BodyEdges(self._firsts, self._others, self._edges, holds)
+        edges = BodyEdges(self._firsts, self._others, self._edges, holds * self._strengths)
         settle_nodes(edges, pose.turns, stiffness, NodeTargets(pulls, wanted), _STEPS, positions)
         return positions, self._products(positions, holds)
 
     def _holds(self, pose: BodyPose) -> Float:
-        """How much of its stiffness each edge keeps, (E,): those that are stretched, as at joints, less."""
-        off = self._strained(pose)
-        return 1 / (1 + (off**2).sum(axis=1) / (_YIELD**2 * (self._edges**2).sum(axis=1)))
+        """How much of its stiffness each edge keeps, (E,): those that are stretched, as at joints, less. The
+        square is the weight of a kernel to which far residuals are outliers (Geman and McClure 1985)."""
+        return self._kept(pose, self._ones, self._others)
+
+    def _kept(self, pose: BodyPose, ones: NDArray[np.intp], others: NDArray[np.intp]) -> Float:
+        """`_holds` of edges between nodes (...)."""
+        edges = self._rest[others] - self._rest[ones]
+        off = self._strained(pose, ones, others)
+        return 1 / (1 + (off**2).sum(axis=-1) / (_YIELD**2 * (edges**2).sum(axis=-1) + 1e-300))
 
     def _products(self, positions: Float, holds: Float) -> Float:
         """The sums of the products of each node's edges, at positions (N, 3) and at rest, (N, 3, 3)."""
@@ -326,11 +357,11 @@ class DeformableBody:
         edge_products(edges, positions, products)
         return products
 
-    def _strained(self, pose: BodyPose) -> Float:
-        """How far each edge is from where its nodes, as they are turned, would have it, (E, 3)."""
-        turns = 0.5 * (pose.turns[self._ones] + pose.turns[self._others])
-        ways = pose.positions[self._others] - pose.positions[self._ones]
-        return ways - np.einsum("eij,ej->ei", turns, self._edges)
+    def _strained(self, pose: BodyPose, ones: NDArray[np.intp], others: NDArray[np.intp]) -> Float:
+        """How far edges between nodes (...) are from where the turns of these would have them, (..., 3)."""
+        turns = 0.5 * (pose.turns[ones] + pose.turns[others])
+        ways = pose.positions[others] - pose.positions[ones]
+        return ways - np.einsum("...ij,...j->...i", turns, self._rest[others] - self._rest[ones])
 
     def _spacing_of(self, points: Float, some: Float) -> float:
         """The spacing of some of the points, evenly chosen."""
