@@ -48,3 +48,14 @@ def test_no_widget_lies_over_the_label_of_its_row(text: str, indents: int) -> No
     imgui.button("widget")
     assert imgui.get_item_rect_min().x >= left + imgui.calc_text_size(text).x
     imgui.end()
+
+
+@pytest.mark.usefixtures("font")
+@pytest.mark.parametrize("name", ["Time", "Samples per pixel"])
+def test_no_value_lies_over_the_name_of_its_fact(name: str) -> None:
+    imgui.set_next_window_size(imgui.ImVec2(20 * imgui.get_font_size(), 100))
+    imgui.begin("window")
+    left = imgui.get_cursor_screen_pos().x
+    widgets.fact(name, "5")
+    assert imgui.get_item_rect_min().x > left + imgui.calc_text_size(name).x
+    imgui.end()

@@ -167,9 +167,11 @@ def dot_color() -> int:
 
 
 def fact(name: str, text: str) -> None:
-    """A row that tells something: what it is, faint, and its value."""
+    """A row that tells something: what it is, faint, and its value, which begins behind a long name."""
+    start = imgui.get_cursor_pos_x()
     imgui.text_disabled(name)
-    imgui.same_line(_FACTS * imgui.get_font_size())
+    end = start + imgui.get_item_rect_size().x + imgui.get_style().item_spacing.x
+    imgui.same_line(max(_FACTS * imgui.get_font_size(), end))
     imgui.push_text_wrap_pos(0)
     imgui.text_unformatted(text)
     imgui.pop_text_wrap_pos()
@@ -234,9 +236,9 @@ def check_width(label: str) -> float:
 
 
 def combo(name: str, current: str, words: Sequence[str], titles: Mapping[str, str] | None = None) -> str:
-    """A combo box; the word that is chosen now."""
-    titles = titles or {}
-    if imgui.begin_combo(f"##{name}", unhidden(titles.get(current, current))):
+    """A combo box, which shows up to twenty words at once; the word that is chosen now."""
+    titles, tall = titles or {}, imgui.ComboFlags_.height_large.value
+    if imgui.begin_combo(f"##{name}", unhidden(titles.get(current, current)), tall):
         for word in words:
             if imgui.selectable(labelled(titles.get(word, word), word), word == current)[0]:
                 current = word
