@@ -192,6 +192,23 @@ def test_normals_that_lean_to_the_wrong_side_follow_the_winding_number() -> None
     assert np.einsum("ij,ij->i", steered, truth).min() > 0
 
 
+def test_normals_on_two_flat_sides_stay() -> None:
+    rng = np.random.default_rng(7)
+    side = np.where(rng.random(800) < 0.5, 1.0, -1.0)
+    points = np.column_stack([*rng.uniform(-1, 1, (2, 800)), 0.01 * side])
+    normals = np.column_stack([np.zeros((800, 2)), side]).astype(np.float32)
+    near = np.argsort(np.linalg.norm(points[:, None] - points, axis=2), axis=1)[:, :20].astype(np.int32)
+    assert np.array_equal(fine_sides.steered_normals(points, normals, near, 9), normals)
+
+
+def test_normals_of_a_tube_point_out() -> None:
+    """Its radius is the distance between its points, so that neighbours lie on all sides of it."""
+    rng = np.random.default_rng(0)
+    turn, along = rng.uniform(0, 2 * np.pi, 600), rng.uniform(0, 600 / (2 * np.pi), 600)
+    truth = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(600)])
+    assert flipped(truth + along[:, None] * [0, 0, 1], truth, "fine") < 0.005
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("folder", "least"), [("horse_gallop_48", 0.002), ("crane_175", 0.0)])
 def test_fine_sides_of_moving_bodies_are_never_worse(data_dir: Path, folder: str, least: float) -> None:

@@ -37,7 +37,9 @@ _SPACING_OF = 6  # neighbours that tell the distance between points
 _TWO_SHEETS = 0.85, 0.95
 _TRUSTED = 2.0  # so that half of the trust decides a link
 _FAR = 3.0  # radii of a patch, the distance from which its cluster stands for its points
-_OPPOSITE = -0.8  # cosine from which normals are those of two flat sides, whose planes are good
+# Cosine from which normals are those of two sides of something flat, unless neighbours on the same side lie
+# off the plane by more than such a share of their distance.
+_OPPOSITE, _BENT = -0.8, 0.25
 _STEERS = 5  # rounds in which normals follow the winding number
 _STEERED_SOFT = 0.4  # in distances between points
 _PART = 128  # points of a group whose cluster stands for them, at most
@@ -123,7 +125,11 @@ def steered_normals(
     if near.shape[1] <= _AREA_OF:
         return normals
     cosines = np.einsum("ij,ikj->ik", normals, normals[near[:, :linked]])
-    rows = np.flatnonzero(((cosines < 0) & (cosines > _OPPOSITE)).any(axis=1))
+    steps, is_beside = points[near[:, :linked]] - points[:, None], cosines > 0
+    heights = (np.einsum("ij,ikj->ik", normals, steps) ** 2 * is_beside).sum(axis=1)
+    is_bent = heights > _BENT**2 * ((steps**2).sum(axis=2) * is_beside).sum(axis=1)
+    leans = (cosines < 0) & ((cosines > _OPPOSITE) | is_bent[:, None])
+    rows = np.flatnonzero(leans.any(axis=1))
     area = np.pi * np.linalg.norm(points[near[:, _AREA_OF]] - points, axis=1) ** 2 / (_AREA_OF + 0.5)
     soft = (_STEERED_SOFT * np.linalg.norm(points[near[rows, _SPACING_OF]] - points[rows], axis=1)) ** 2
     steered = normals.astype(np.float64)
