@@ -86,6 +86,9 @@ def test_from_opening_to_a_stabilised_film_coloured_by_displacement_in_eight_act
         app.press("ctrl+z", "ctrl+z")
         look = app.state.document["look"]
         assert (look["color_by"], look["plain"]) == ("auto", Look().plain)
+        app.press("ctrl+y")
+        assert app.state.color_range[1] > 0
+        assert not any("to colour by" in note for note in app.notes), "the numbers are there at once"
         assert "Traceback" not in app.log()
 
 

@@ -33,12 +33,19 @@ class Editing(WindowPart):
         if self.tools.is_under_way:
             self.tools.abandon()
         else:
-            self.session.history.undo()
+            self._step(self.session.history.undo)
 
     def redo(self) -> None:
         """Make the change again that was undone last."""
         self.tools.abandon()
-        self.session.history.redo()
+        self._step(self.session.history.redo)
+
+    def _step(self, step: Callable[[], object]) -> None:
+        """Go to another document of the history. Tools lay numbers for the colours that this one shows."""
+        before = self.session.document.look.color_by
+        step()
+        if self.session.document.look.color_by != before:
+            self.session.laid.ask_anew()
 
     def advance(self, now: float) -> None:
         """End the step of the history that a drag or typing is, once it is over."""

@@ -72,6 +72,10 @@ class Laid:
             world_from_pose = motion_of(index).after(world_from_pose)
         return world_from_pose
 
+    def ask_anew(self) -> None:
+        """Have tools asked for their numbers again, since the document shows another one."""
+        self._forget()
+
     def _forget(self) -> None:
         """Forget what was replayed and found."""
         self._replayed = self._found = None

@@ -114,7 +114,7 @@ class Tool:
         if wanted == self._laid:
             return False
         self._laid = wanted
-        self.context.lay(self._numbers if name else None)
+        self.context.lay(self._numbers)  # also without a colour: Undo may bring one back
         return True
 
     def _numbers(self, pose: Pose) -> Mapping[str, NDArray[Any]]:
