@@ -28,7 +28,7 @@ _POOR = 0.5  # of the points: a warning where fewer are seen
 def dense_part(args: Namespace, timeline: Timeline, reference: StartOfMotion, partial: Path) -> PartialFrames:
     """Follow every point of the reference; gives the frames, which a folder keeps. Raises InputError."""
     points = DensePoints(reference.pose)
-    kept = PartialFrames(partial, key_of_partial(args, timeline, points.reference))
+    kept = PartialFrames(partial, key_of_partial(args, timeline, reference, points.reference))
     done = sum(index in kept for index in range(len(timeline)))
     if done:
         tell(f"Scan4D continues: all points in {done} of {len(timeline)} frames are known")

@@ -22,13 +22,13 @@ _MOST_NAMED = 3  # of words that are too many
 
 
 def parsed(words: Sequence[str]) -> Namespace:
-    """The arguments, with the command's `run`. Raises InputError; SystemExit after --help and --version."""
+    """The arguments, with the command's `run`. Raises InputError; SystemExit after -h and -V."""
     commands = command_names()
     named = [word for word in words[:1] if word in commands]
-    if not named and words and words[0] not in ("--version", "--help", "-h"):
+    if not named and words and words[0] not in ("-V", "--version", "--help", "-h"):
         raise _no_command(words, commands)
     # A command's module brings what it works with: only what is named is imported, and all for the help.
-    parser, parsers = _parsers([] if words[:1] == ["--version"] else named or commands)
+    parser, parsers = _parsers([] if words[:1] in (["-V"], ["--version"]) else named or commands)
     if not named:
         parser.parse_args(words[:1])  # ends with what they ask for
         parser.print_help()
@@ -122,7 +122,7 @@ def _parsers(commands: Sequence[str]) -> tuple[_Parser, dict[str, _Parser]]:
     parser = _Parser(
         prog="scan4d", description="Viewer and headless renderer for 4D scans.", allow_abbrev=False
     )
-    parser.add_argument("--version", action="version", version=f"scan4d {__version__}")
+    parser.add_argument("-V", "--version", action="version", version=f"scan4d {__version__}")
     parsers: dict[str, _Parser] = {}
     its_commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     common = _common_arguments()

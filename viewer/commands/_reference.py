@@ -1,4 +1,4 @@
-"""The moment in which the motions of `scan4d motion` begin."""
+"""The moment in which motions begin, as the command line names it."""
 
 from __future__ import annotations
 
@@ -29,11 +29,13 @@ from ._scans import open_timeline, poses_between
 class StartOfMotion:
     """The pose that motions begin in.
 
-    frame: the frame of the scan that it is; None: it is none of them. rest: the frames that it is to be the
-    mean of, or is. scan: the other scan that it is of. mean: how it was averaged.
+    named: as the command line names it. frame: the frame of the scan that it is; None: it is none of them.
+    rest: the frames that it is to be the mean of, or is. scan: the other scan that it is of. mean: how it was
+    averaged.
     """
 
     pose: Pose
+    named: str
     frame: int | None
     rest: tuple[int, ...] = ()
     scan: str | None = None
@@ -42,21 +44,21 @@ class StartOfMotion:
     @classmethod
     def of(cls, args: Namespace, timeline: Timeline) -> StartOfMotion:
         """The reference that the command line names; of rest frames, the first one. Raises InputError."""
-        if not re.fullmatch(r"-?[\d:,]+", args.reference):
-            return cls._of_scan(args, timeline)
-        frames = _frames(args.reference, timeline)
-        if len(timeline) == 1:
-            hint = "Name a scan with several frames, or name another scan with --reference"
-            raise InputError("has only one frame, so there is no motion to find", timeline.name, hint)
-        return cls(timeline.pose(frames[0]), frames[0], frames if len(frames) > 1 else ())
+        named = args.reference
+        if re.fullmatch(r"-?[\d:,]+", named):
+            if len(timeline) == 1:
+                hint = "Name a scan with several frames, or name another scan with --reference"
+                raise InputError("has only one frame, so there is no motion to find", timeline.name, hint)
+            return cls.in_frames(timeline, named, "--reference")
+        with open_timeline(args, named) as other:
+            check_unit(other, timeline)
+            return cls(other.pose(0), named, None, scan=named)
 
     @classmethod
-    def _of_scan(cls, args: Namespace, timeline: Timeline) -> StartOfMotion:
-        with open_timeline(args, args.reference) as other:
-            if conversion(other.unit, timeline.unit) != 1.0:
-                what = f"has the unit '{other.unit}', but the scan has '{timeline.unit}'"
-                raise InputError(what, other.name, "Use a reference in the unit of the scan")
-            return cls(other.pose(0), None, scan=args.reference)
+    def in_frames(cls, timeline: Timeline, named: str, option: str) -> StartOfMotion:
+        """The frame or the frames, such as 0,3,7 or 0:6, that an option names. Raises InputError."""
+        frames = _frames(named, timeline, option)
+        return cls(timeline.pose(frames[0]), named, frames[0], frames if len(frames) > 1 else ())
 
     def averaged(self, timeline: Timeline, region: MotionReference) -> StartOfMotion:
         """The mean of its rest frames. Raises InputError."""
@@ -77,19 +79,28 @@ class StartOfMotion:
         return {"scan": self.scan, "frame": self.pose.index + 1, "label": self.pose.label, "mean": mean}
 
 
-def _frames(text: str, timeline: Timeline) -> tuple[int, ...]:
-    """The frames that a text names, the first one first. Raises InputError."""
+def check_unit(other: Timeline, timeline: Timeline) -> None:
+    """Raise InputError where a reference scan has another unit than the scan."""
+    if conversion(other.unit, timeline.unit) != 1.0:
+        what = f"has the unit '{other.unit}', but the scan has '{timeline.unit}'"
+        raise InputError(what, other.name, "Use a reference in the unit of the scan")
+
+
+def _frames(text: str, timeline: Timeline, option: str) -> tuple[int, ...]:
+    """The frames that an option names, the first one first. Raises InputError."""
     frames: dict[int, None] = {}
     for part in text.split(","):
         if part.removeprefix("-").isdecimal():
             timeline.label(int(part))  # raises where there is none
             frames[int(part)] = None
         else:
-            frames |= dict.fromkeys(poses_between(part, timeline, "--reference"))
+            frames |= dict.fromkeys(poses_between(part, timeline, option))
     return tuple(frames)
 
 
-def key_of_partial(args: Namespace, timeline: Timeline, positions: NDArray[np.float64]) -> dict[str, Any]:
+def key_of_partial(
+    args: Namespace, timeline: Timeline, reference: StartOfMotion, positions: NDArray[np.float64]
+) -> dict[str, Any]:
     """The scan, the reference, and positions in it that partial results must be of, to be used again."""
     return {
         "version": __version__,
@@ -97,6 +108,6 @@ def key_of_partial(args: Namespace, timeline: Timeline, positions: NDArray[np.fl
         "hash": fingerprint(timeline.files),
         "times": len(timeline),
         "unit": timeline.unit,
-        "reference": args.reference,
+        "reference": reference.named,
         "positions": hashlib.sha256(positions.tobytes()).hexdigest(),
     }

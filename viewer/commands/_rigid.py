@@ -1,4 +1,4 @@
-"""`scan4d motion`: the motion of a rigid region, such as the head, in each frame."""
+"""The motion of a rigid region, such as the head, in each frame, as commands find and report it."""
 
 from __future__ import annotations
 
@@ -114,10 +114,12 @@ class RigidPart:
         return [index + 1, float(self.timeline.times[index]), *numbers, self.states[index].value]
 
 
-def rigid_part(args: Namespace, timeline: Timeline, reference: StartOfMotion, partial: Path) -> RigidPart:
+def rigid_part(
+    args: Namespace, timeline: Timeline, reference: StartOfMotion, partial: Path, needed: bool = True
+) -> RigidPart:
     """Find the motions of the region, and keep them in a file as they are found.
 
-    Raises InputError, also where Scan4D finds no region, unless all points are followed as well.
+    Raises InputError. needed: also where Scan4D finds no region; else each frame is a gap there.
     """
     pose = reference.pose
     limits = WeakLimits.of(timeline.unit, typical_spacing(pose.cloud))
@@ -129,7 +131,7 @@ def rigid_part(args: Namespace, timeline: Timeline, reference: StartOfMotion, pa
     try:
         rows = _rows(args, timeline, reference)
     except NoRigidRegion as error:
-        if not args.dense or reference.rest:
+        if needed or reference.rest:
             raise
         warn(f"{error}. Each frame in transforms.csv is a gap")
         known |= dict.fromkeys(range(len(timeline)), FrameMotion.gap(error.what))
@@ -139,7 +141,7 @@ def rigid_part(args: Namespace, timeline: Timeline, reference: StartOfMotion, pa
     if reference.rest:
         reference = reference.averaged(timeline, region)
         region = MotionReference.of(reference.pose, rows, None)
-    key = key_of_partial(args, timeline, reference.pose.cloud.world()[rows])
+    key = key_of_partial(args, timeline, reference, reference.pose.cloud.world()[rows])
     kept = PartialMotions(partial, key)
     known |= kept.read()
     if known:

@@ -78,7 +78,7 @@ def _written(args: Namespace, timeline: Timeline) -> list[Path]:
     start = StartOfMotion.of(args, timeline)
     regions = {file: region_rows(args, file, start) for file in args.paths}
     motions, followed = (args.out / name for name in _PARTIAL)
-    rigid = rigid_part(args, timeline, start, motions)
+    rigid = rigid_part(args, timeline, start, motions, needed=not args.dense)
     found: dict[str, Any] = {
         "version": __version__,
         "scan": timeline.name,

@@ -88,6 +88,13 @@ class Mesh:
         found = self._scene.list_intersections(open3d.core.Tensor.from_numpy(rays))
         return found["ray_ids"].numpy().astype(np.intp), found["primitive_ids"].numpy()
 
+    def nearest_faces(self, positions: Rays) -> NDArray[np.uint32]:
+        """The face nearest to each position (N, 3), relative to the origin, found in float32."""
+        import open3d
+
+        query = open3d.core.Tensor.from_numpy(np.ascontiguousarray(positions, np.float32))
+        return self._scene.compute_closest_points(query)["primitive_ids"].numpy()
+
     @cached_property
     def neighbors(self) -> Triangles:
         """The face across each edge of each face, (F, 3); the face itself where there is none."""

@@ -85,3 +85,13 @@ def topology(points: int, pieces: Iterable[Faces]) -> str | None:
         corners.update(piece.corners.astype("<u4", copy=False).data)
         empty = empty and not len(piece)
     return None if empty else f"{points} points, faces {sizes.hexdigest()} {corners.hexdigest()}"
+
+
+def rows_of_faces(faces: Triangles, ids: NDArray[np.uint32] | None) -> NDArray[np.int64]:
+    """Faces (F, 3) of ids as faces of rows, without those of points that are not among the ids."""
+    if ids is None:
+        return faces.astype(np.int64)
+    if not len(ids):
+        return np.zeros((0, 3), np.int64)
+    rows = np.searchsorted(ids, faces).clip(max=len(ids) - 1)
+    return rows[(ids[rows] == faces).all(axis=1)].astype(np.int64)

@@ -16,7 +16,7 @@ from ...mesh.openings import bridged, detour, inner_holes, without_pockets
 from ...mesh.patch import Patch
 from ...mesh.smoothing import Points, moved_to_quadrics, noise_over_faces, smoothing_radius
 from ...scan.estimate import cloud_normals
-from ...scan.faces import Triangles
+from ...scan.faces import Triangles, rows_of_faces
 from ...scan.noise import noise_of
 from ...scan.pose import Pose
 from ...scan.range_view import merged_normals
@@ -91,7 +91,7 @@ class PoseSurface:
 
     def __init__(self, pose: Pose, faces: Triangles | None = None) -> None:
         self._cloud, self._views, self.spacing = pose.cloud, pose.views, pose.spacing
-        self._faces = None if faces is None or not len(faces) else _rows(faces, self._cloud.ids)
+        self._faces = None if faces is None or not len(faces) else rows_of_faces(faces, self._cloud.ids)
         self.origin = self._cloud.origin
         self._loops: dict[bytes, Circuit | Refused] = {}
 
@@ -313,13 +313,3 @@ class PoseSurface:
                 return Refused("no surface connects {} and {}", (number, number + 1))
             lines.append(line)
         return Circuit(patch, tuple(numbers), tuple(lines), lids)
-
-
-def _rows(faces: Triangles, ids: NDArray[np.uint32] | None) -> NDArray[np.int64]:
-    """Faces of ids as faces of rows, without those of points that were dropped."""
-    if ids is None:
-        return faces.astype(np.int64)
-    if not len(ids):
-        return np.zeros((0, 3), np.int64)
-    rows = np.searchsorted(ids, faces).clip(max=len(ids) - 1)
-    return rows[(ids[rows] == faces).all(axis=1)].astype(np.int64)

@@ -79,6 +79,11 @@ class FrameMotion:
     residual: float = np.nan
 
     @classmethod
+    def still(cls) -> FrameMotion:
+        """The motion of the reference frame to itself."""
+        return cls(STILL, np.zeros((6, 6)), within=1.0, residual=0.0)
+
+    @classmethod
     def gap(cls, reason: str) -> FrameMotion:
         """A frame without a motion."""
         return cls(None, np.full((6, 6), np.nan), reason)
@@ -185,7 +190,7 @@ def _motion(
 ) -> FrameMotion:
     """The motion of a region to a frame. start: relative to the reference's origin."""
     if frame == reference.frame:
-        return FrameMotion(STILL, np.zeros((6, 6)), within=1.0, residual=0.0)
+        return FrameMotion.still()
     try:
         surface = moment_surface(timeline.pose(frame).cloud, reference.origin)
     except InputError as error:

@@ -1,0 +1,76 @@
+"""The surface that deviations are measured from: the faces of a mesh, or what points show."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import InputError
+from ...mesh.nearest import NearestOnMesh
+from ...scan.estimate import with_estimates
+from ...scan.faces import Triangles, rows_of_faces
+from ...scan.noise import noise_of
+from ...scan.pose import Pose
+from ...threads import shares, together
+from ..motion.stabilise import moment_surface
+
+Float = NDArray[np.float64]
+
+
+STORED, ESTIMATED = "normals of the scan", "estimated normals"
+
+
+class DeviationReference(Protocol):
+    """A surface with two sides."""
+
+    @property
+    def outside_by(self) -> str:
+        """The source of the sides, such as STORED or ESTIMATED."""
+
+    def signed(self, positions: Float, reach: float) -> Float:
+        """The distances of positions (N, 3), absolute, from the surface, (N,) scan units; positive outside.
+        NaN where the surface is farther than a reach, over its holes, and beyond its border."""
+
+
+class PointReference:
+    """The surface that the points of a pose show: parabolas around them, see `tracking.surface_kernels`, and
+    planes where these do not fit.
+
+    Normals tell the side: those of the scan; where it has none, Scan4D estimates them.
+    """
+
+    def __init__(self, pose: Pose) -> None:
+        if not pose.count:
+            raise InputError("has no points to compare with", pose.label)
+        has_normals = pose.cloud.normals is not None
+        self.outside_by = STORED if has_normals else ESTIMATED
+        cloud = (pose if has_normals else with_estimates(pose, ("normals",))).cloud
+        self._origin = cloud.origin
+        self._surface = moment_surface(cloud, cloud.origin)
+
+        from .height_kernels import fit_range
+
+        held, noise = self._surface.held, noise_of(cloud).deviation
+        works = [lambda a=a, b=b: fit_range(held, noise, a, b) for a, b in shares(len(cloud))]
+        together(len(cloud), works)
+
+    def signed(self, positions: Float, reach: float) -> Float:
+        """Signed distances, see `DeviationReference.signed`."""
+        from .height_kernels import signed_distances
+
+        held, found = self._surface.held, np.empty(len(positions))
+        local = np.ascontiguousarray(positions - self._origin)
+        works = [
+            lambda a=a, b=b: signed_distances(held, local[a:b], reach, found[a:b])
+            for a, b in shares(len(local))
+        ]
+        together(len(local), works)
+        return found
+
+
+def deviation_reference(pose: Pose, faces: Triangles) -> DeviationReference:
+    """The surface of a pose. faces: (F, 3) of ids of its points, perhaps none. Raises InputError."""
+    rows = rows_of_faces(faces, pose.cloud.ids)
+    return NearestOnMesh(pose.cloud, rows) if len(rows) else PointReference(pose)

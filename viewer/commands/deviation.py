@@ -1,0 +1,208 @@
+"""Measure signed distances from a reference surface.
+
+Scan4D writes into DIR: deviation.csv with statistics of each frame, one NPZ file of values per frame, and
+report.json. Positive values are outside. A point beyond the border of the reference has no value.
+"""
+
+from __future__ import annotations
+
+import re
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..analysis.deviation.reference import ESTIMATED, DeviationReference, deviation_reference
+from ..analysis.deviation.statistics import DeviationStatistics
+from ..analysis.motion.stabilise import FrameMotion
+from ..csv_text import cell, save_rows
+from ..document.saved_session import known_as
+from ..errors import InputError
+from ..files import output_folder, save_json, whole_file
+from ..scan.inputs import scan_inputs
+from ..scan.timeline import Timeline
+from ..scan.times import frame_in_words
+from ._console import progress, tell, warn
+from ._outputs import add_output_argument, claim
+from ._reference import StartOfMotion, check_unit
+from ._rigid import rigid_part, tell_rigid
+from ._scans import SCAN_HELP, open_timeline, report
+
+_TABLE, _REPORT, _PARTIAL = "deviation.csv", "report.json", "transforms.partial"
+_COLUMNS = ("frame", "time", "mean", "rms", "p95", "max", "share")
+_REACH = 0.1  # of the longest edge of the box around the reference
+_FEW = 0.5  # of the points: a warning where fewer have a value
+
+
+def add_arguments(parser: ArgumentParser) -> None:
+    """The arguments of `scan4d deviation`."""
+    parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
+    parser.add_argument(
+        "--to", metavar="REFERENCE", required=True,
+        help="scan or mesh that frames are compared with; SCAN itself for its own frames",
+    )  # fmt: skip
+    parser.add_argument(
+        "--to-pose", metavar="I|I,J,...", default="0",
+        help="frame of REFERENCE, counted from 0; with --stabilise, also several frames of SCAN, such as "
+        "0,3,7 or 0:6, for their mean; default 0",
+    )  # fmt: skip
+    parser.add_argument(
+        "--stabilise", action="store_true",
+        help="first remove the rigid motion of each frame, such as that of the head",
+    )  # fmt: skip
+    parser.add_argument(
+        "--region", type=Path, metavar="FILE",
+        help="with --stabilise: JSON file of the rigid region (spheres, points or landmarks); default: "
+        "Scan4D finds it",
+    )  # fmt: skip
+    parser.add_argument(
+        "--reach", type=_reach, metavar="LENGTH",
+        help="distance from the reference beyond which a point has no value, in the unit of the scan; "
+        "default: a tenth of the longest edge of the reference",
+    )  # fmt: skip
+    add_output_argument(parser, "folder for the results", "DIR")
+
+
+def run(args: Namespace) -> int:
+    """Write the table, the values and the report."""
+    if args.region and not args.stabilise:
+        raise InputError("--region names what is stabilised", hint="Add --stabilise")
+    with open_timeline(args, args.scan) as timeline, _opened(args, timeline) as other:
+        for path in _written(args, timeline, other):
+            tell(path)
+    return 0
+
+
+@dataclass(frozen=True, eq=False)
+class _Compared:
+    """The reference, and the motions that take frames back to it.
+
+    reach: distance beyond which a point has no value, scan units. motions: from the reference to each frame;
+    None: frames stay as recorded. facts: for the report.
+    """
+
+    reference: DeviationReference
+    reach: float
+    motions: Mapping[int, FrameMotion] | None
+    facts: dict[str, Any]
+
+
+def _reach(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not 0 < value < np.inf:
+        raise ArgumentTypeError(f"'{text}' is not a positive length")
+    return value
+
+
+@contextmanager
+def _opened(args: Namespace, timeline: Timeline) -> Iterator[Timeline]:
+    """The scan of the reference. Raises InputError where its unit differs."""
+    if known_as(args.to) == known_as(args.scan):
+        yield timeline
+        return
+    with open_timeline(args, args.to) as other:
+        check_unit(other, timeline)
+        yield other
+
+
+def _written(args: Namespace, timeline: Timeline, other: Timeline) -> list[Path]:
+    """Measure all frames; gives the files that it wrote. Raises InputError."""
+    table, facts = args.out / _TABLE, args.out / _REPORT
+    files = [args.out / f"{index + 1:04d}.npz" for index in range(len(timeline))]
+    inputs = [*scan_inputs(timeline), *scan_inputs(other), *([args.region] if args.region else [])]
+    claim([table, facts, *files], inputs, args.force)
+    compared = _compared(args, timeline, other)
+    output_folder(args.out)
+    rows, left_out = [], {}
+    with progress(len(timeline)) as tick:
+        for index, file in enumerate(files):
+            if index + 1 < len(timeline):
+                timeline.request(index + 1)
+            try:
+                values = _values(compared, timeline, index)
+                _save(file, values)
+            except InputError as error:
+                left_out[index], values = error.what, np.empty(0, np.float32)
+                file.unlink(missing_ok=True)  # that of an earlier run
+            found = DeviationStatistics.of(values)
+            rows.append((index + 1, float(timeline.times[index]), *map(cell, found)))
+            tick()
+    report(timeline, 0)
+    save_rows(table, [_COLUMNS, *rows])
+    reasons = {str(index + 1): reason for index, reason in left_out.items()}
+    save_json(facts, {**compared.facts, "left_out": reasons})
+    (args.out / _PARTIAL).unlink(missing_ok=True)
+    _tell(timeline, compared, [float(row[-1] or 0) for row in rows], left_out)
+    return [table, facts, *(file for index, file in enumerate(files) if index not in left_out)]
+
+
+def _compared(args: Namespace, timeline: Timeline, other: Timeline) -> _Compared:
+    """The reference, and the motions from it to each frame. Raises InputError."""
+    start = _start(args, timeline, other)
+    found: dict[str, Any] = {"version": __version__, "scan": timeline.name, "unit": timeline.unit}
+    motions = None
+    faces = other.faces(start.pose.index).triangles()
+    if args.stabilise:
+        rigid = rigid_part(args, timeline, start, args.out / _PARTIAL)
+        start, motions, found["rigid"] = rigid.reference, rigid.known, rigid.facts(args.region or "found")
+        tell_rigid(found["rigid"], timeline)
+    reference = deviation_reference(start.pose, faces)
+    bounds = start.pose.bounds
+    reach = args.reach or _REACH * float((bounds.high - bounds.low).max())
+    found |= {"reference": {**start.facts(), "outside_by": reference.outside_by}, "reach": reach}
+    return _Compared(reference, reach, motions, found)
+
+
+def _start(args: Namespace, timeline: Timeline, other: Timeline) -> StartOfMotion:
+    """The pose of the reference. Raises InputError."""
+    option = "--to-pose"
+    if other is timeline:
+        start = StartOfMotion.in_frames(timeline, args.to_pose, option)
+        if start.rest and not args.stabilise:
+            raise InputError("the mean of several frames needs --stabilise", option)
+        return start
+    if not re.fullmatch(r"-?\d+", args.to_pose):
+        raise InputError(f"'{args.to_pose}' is not one frame of the reference", option)
+    return StartOfMotion(other.pose(int(args.to_pose)), f"{args.to} {args.to_pose}", None, scan=args.to)
+
+
+def _values(compared: _Compared, timeline: Timeline, index: int) -> np.ndarray:
+    """The deviations of a frame, (N,) float32, in the order of its file. Raises InputError."""
+    cloud = timeline.pose(index).cloud
+    found = FrameMotion.still() if compared.motions is None else compared.motions[index]
+    if found.motion is None:
+        raise InputError(found.reason)
+    values = np.full(len(cloud) + cloud.dropped, np.nan, np.float32)
+    rows = slice(None) if cloud.ids is None else cloud.ids
+    values[rows] = compared.reference.signed(found.motion.inverse.points(cloud.world()), compared.reach)
+    return values
+
+
+def _save(file: Path, values: np.ndarray) -> None:
+    with whole_file(file) as part, open(part, "wb") as stream:
+        np.savez_compressed(stream, allow_pickle=False, value=values)
+
+
+def _tell(timeline: Timeline, compared: _Compared, shares: list[float], left_out: Mapping[int, str]) -> None:
+    """The results in words."""
+    known = [share for index, share in enumerate(shares) if index not in left_out]
+    if known:
+        tell(f"On average, {np.mean(known):.1%} of the points lie above or below the reference surface")
+    tell(f"Scan4D looks up to {compared.reach:.3g} {timeline.unit} away (--reach)")
+    few = sum(share < _FEW for share in known)
+    if few:
+        warn(f"Fewer than half of the points have a value in {few} of {len(shares)} frames")
+    if compared.reference.outside_by == ESTIMATED:
+        warn("The reference has no normals. Scan4D estimates which side is outside")
+    if left_out:
+        index, reason = next(iter(left_out.items()))
+        share = f"{len(left_out)} of {len(shares)} frames have no values"
+        warn(f"{share}, such as {frame_in_words(index)}: {reason}")
