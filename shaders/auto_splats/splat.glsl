@@ -12,7 +12,7 @@ layout(std430, binding = STORAGE_LOOKS) writeonly buffer Looks { uint looks[]; }
 const float LEANING = 1.19;  // factor on how far a cell reaches, for splats that lean
 const float LEAST_ROUND = 0.25;  // of the longer half-axis, what the shorter one is at least
 const float LEAST_CUT = 0.3;  // of a splat's width, what is left where the surface ends
-const float SLACK = 1.0;  // pixels that splats reach beyond that end, so that none leaves a gap
+const float SLACK = 1.5;  // pixels that splats reach beyond that end, so that none leaves a gap
 
 // What a normal of this place points to, along the pose's axes.
 vec3 seen_from(uint row) {
