@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -74,7 +75,7 @@ class FollowedPoints:
         except InputError:  # damaged: all is found again
             shutil.rmtree(folder, ignore_errors=True)
             self._kept = PartialFrames(folder, key)
-        folder.touch()
+        os.utime(folder)  # the cache forgets what is unused for longest
         _forget_oldest(dense_folder(), folder)
         self._known = {frame for frame in range(len(timeline)) if frame in self._kept}
 
