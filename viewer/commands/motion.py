@@ -1,4 +1,4 @@
-"""Find the motion of a rigid region, such as the head, over time.
+"""Find the motion of a rigid region, such as the head.
 
 Scan4D writes into DIR: transforms.csv with the motion of each frame and how sure it is, report.json, and
 region.json with the points of the region. With --dense, displacements.npz holds the way of every point, and

@@ -189,3 +189,12 @@ def test_any_name_and_number_comes_back(names: list[str], numbers: st.DataObject
         found = read_landmarks(tmp_path / name)
         assert found.names == wanted.names
         np.testing.assert_array_equal(found.positions, wanted.positions)
+
+
+@pytest.mark.parametrize("names", [["'"], ["#", "nose"], ["nose", "*_"], ["//", "%", "!;"], [""], ["x", "#"]])
+def test_names_of_marks_alone_come_back(names: list[str], tmp_path: Path) -> None:
+    places = np.arange(3.0 * len(names)).reshape(1, -1, 3)
+    wanted = LandmarkSet.of(names, places, frames=[0], notes=LandmarkNotes("mm"))
+    for name in NAMES[:-1]:
+        write_landmarks(tmp_path / name, wanted)
+        assert read_landmarks(tmp_path / name).names == wanted.names

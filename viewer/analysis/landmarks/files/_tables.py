@@ -114,8 +114,10 @@ def read_table(path: Path) -> LandmarkSet:
     if second is not None:
         rows = chain([second], rows)
         head = [""] * (len(second[1]) == len(head) + 1) + head  # R writes no name for the first column
-    names = _plain(head)
-    if space := _space_of(names):
+    names, columns = _plain(head), _wide_columns(head)
+    # The x of a landmark whose name is only marks, such as '_x, has the plain name x.
+    only_marks = any(not plain_name(name).name for name in columns)
+    if not only_marks and (space := _space_of(names)):
         if _first(names, _NAMES) is None and second is not None:
             row = enumerate(second[1][: len(head)])
             texts = (at for at, cell in row if not _is_value(cell) and names[at] not in space[0])
@@ -124,7 +126,7 @@ def read_table(path: Path) -> LandmarkSet:
         stated = {unit for name, own in zip(names, head, strict=True)
                   if name in space[0] and (unit := plain_name(own).unit)}  # fmt: skip
         return _long(rows, names, *space, unit=stated.pop() if len(stated) == 1 else None)
-    if columns := _wide_columns(head):
+    if columns:
         return _wide(rows, names, columns, _unit_of(head))
     raise at_line(
         "the table has neither the columns x, y and z, nor three columns NAME_x, NAME_y and NAME_z for "
