@@ -146,20 +146,22 @@ vec2 side_of(int i) {
     return vec2(cos(angle), sin(angle));
 }
 
+// Programs that search and those that take neighbors that are kept find the same ends, with `precise`.
+
 // The side to which neighbors reach least, as seen from the eye, and how far they do: where a surface turns away sharply
 // or ends, none lies beyond. A unit vector of the plane, and a distance in radii of the neighborhood.
 vec4 narrowest(Extent extent, vec3 normal, vec3 to_eye) {
-    float facing = max(dot(normal, to_eye), LEAST_FACING);
-    vec3 u = tangent_of(normal), v = cross(normal, u);
-    float reaches[SIDES];
+    precise float facing = max(dot(normal, to_eye), LEAST_FACING);
+    precise vec3 u = tangent_of(normal), v = cross(normal, u);
+    precise float reaches[SIDES];
     for (int i = 0; i < SIDES; ++i) reaches[i] = 0.0;
     for (int k = 1; k < K; ++k) {
-        vec3 d = k < extent.count ? near_offsets[k] : vec3(0.0);
+        precise vec3 d = k < extent.count ? near_offsets[k] : vec3(0.0);
         d -= dot(d, normal) / facing * to_eye;
-        vec2 at = vec2(dot(d, u), dot(d, v));
+        precise vec2 at = vec2(dot(d, u), dot(d, v));
         for (int i = 0; i < SIDES; ++i) reaches[i] = max(reaches[i], dot(at, side_of(i)));
     }
-    vec4 found = vec4(0.0, 0.0, 0.0, UNKNOWN);
+    precise vec4 found = vec4(0.0, 0.0, 0.0, UNKNOWN);
     for (int i = 0; i < SIDES; ++i) {
         vec2 side = side_of(i);
         if (reaches[i] < found.w) found = vec4(side.x * u + side.y * v, reaches[i]);
@@ -176,23 +178,23 @@ const float LEAST_SLANT = 1e-3, LEAST_BEND = 1e-6;  // below, no outline is near
 // perpendicular to the line of sight along a line, and seen from the eye, this line lies on the plane half as far from the
 // point. height: of the splat over the point. Returned as `narrowest` does.
 vec4 outline(Extent extent, vec3 normal, vec3 to_eye, float height) {
-    float facing = dot(normal, to_eye);
-    vec3 along = to_eye - facing * normal, by = vec3(0.0);
-    float slant = max(length(along), LEAST_SLANT), far = facing / slant;
+    precise float facing = dot(normal, to_eye);
+    precise vec3 along = to_eye - facing * normal, by = vec3(0.0);
+    precise float slant = max(length(along), LEAST_SLANT), far = facing / slant;
     along /= slant;
-    vec3 across = cross(normal, along);
-    mat3 form = mat3(0.0);
+    precise vec3 across = cross(normal, along);
+    precise mat3 form = mat3(0.0);
     for (int k = 1; k < K; ++k) {
-        vec3 d = k < extent.count ? near_offsets[k] : vec3(0.0);
-        vec2 at = vec2(dot(d, along), dot(d, across));
-        float rise = dot(d, normal), weight = rise * rise <= dot(at, at) ? 1.0 : 0.0;  // else on another side of it
-        vec3 terms = weight * vec3(0.5 * at.x * at.x, at.x * at.y, 0.5 * at.y * at.y);
+        precise vec3 d = k < extent.count ? near_offsets[k] : vec3(0.0);
+        precise vec2 at = vec2(dot(d, along), dot(d, across));
+        precise float rise = dot(d, normal), weight = rise * rise <= dot(at, at) ? 1.0 : 0.0;  // else on another side of it
+        precise vec3 terms = weight * vec3(0.5 * at.x * at.x, at.x * at.y, 0.5 * at.y * at.y);
         form += outerProduct(terms, terms);
         by += rise * terms;
     }
-    float ridge = RIDGE * (form[0][0] + form[1][1] + form[2][2]) + 1e-12;
-    vec2 bend = (inverse(form + mat3(ridge)) * by).xy;
-    float steep = max(length(bend), LEAST_BEND), end = 0.5 * far + bend.x * height / max(far, LEAST_SLANT);
+    precise float ridge = RIDGE * (form[0][0] + form[1][1] + form[2][2]) + 1e-12;
+    precise vec2 bend = (inverse(form + mat3(ridge)) * by).xy;
+    precise float steep = max(length(bend), LEAST_BEND), end = 0.5 * far + bend.x * height / max(far, LEAST_SLANT);
     return vec4((bend.x * along + bend.y * across) / steep, max(end, 0.0) / steep);
 }
 #endif
@@ -221,12 +223,12 @@ float fit(uint n, uint row, vec3 place, float usual_radius, Extent extent) {
     bool outlier = is_outlier(extent, usual_radius, radius > FAR * typical_radius);
     bool on_line = extent.count >= LEAST_COUNT && values.y < LINE * values.z;
     bool has_plane = values.y > COLLINEAR * values.z && !outlier && !on_line;
-    float height = has_plane ? dot(mean, normal) : 0.0, shift = 0.0;
+    precise float height = has_plane ? dot(mean, normal) : 0.0, shift = 0.0;
     vec3 longer = vectors[2];
     float roundness = ELLIPTICAL && values.z > 0.0 ? values.y / values.z : 1.0;
 #if CUT
-    vec3 sight = normalize(to_eye);
-    vec4 end = narrowest(extent, normal, sight);
+    precise vec3 sight = normalize(to_eye);
+    precise vec4 end = narrowest(extent, normal, sight);
     end.w = end.w * radius + MARGIN * splat;
 #if BENDS
     vec4 bent = outline(extent, normal, sight, height);

@@ -40,9 +40,10 @@ uint pack_axes(vec3 normal, vec3 longer, float roundness) {
 // side there moves to that end, while the opposite side stays. to: unit vector of the plane. Returns how far the middle
 // lies from the point, along the shorter half-axis as it is packed. radius: becomes the shorter half-axis.
 float cut(vec3 normal, vec3 to, float end, float pixel, inout float radius, out vec3 longer, out float roundness) {
-    roundness = clamp(0.5 + 0.5 * (end + SLACK * pixel) / radius, LEAST_CUT, 1.0);
-    float shift = (roundness - 1.0) * radius;
-    radius *= roundness;
+    precise float left = clamp(0.5 + 0.5 * (end + SLACK * pixel) / radius, LEAST_CUT, 1.0);
+    precise float shift = (left - 1.0) * radius;
+    roundness = left;
+    radius *= left;
     longer = cross(normal, to);
     // Half-axes are packed as half a turn, from the tangent on.
     vec3 tangent = tangent_of(normal);
