@@ -70,8 +70,8 @@ def test_each_leaf_has_its_own_attributes() -> None:
 @pytest.mark.parametrize("stop", [Stop(), *rarely(Stop(delta=0.0), Stop(rule="depth", depth=5))])
 @pytest.mark.slow
 def test_discs_close_a_surface_however_small_its_leaves_are(stop: Stop, attributes: bool) -> None:
-    octree = build(PointCloud.from_arrays(**on_sphere(6000)), stop, attributes=attributes)
-    leaves = leaf_points(octree)
+    cloud = replace(PointCloud.from_arrays(**on_sphere(6000)), radii=None)
+    leaves = leaf_points(build(cloud, stop, attributes=attributes))
     places = sphere(2000, seed=9).world()
     distances = np.linalg.norm(places[:, None] - leaves.world(), axis=2)
     assert (distances < leaves.radii).any(axis=1).mean() > 0.999
