@@ -49,6 +49,8 @@ _BENDING = 1.5  # of the strains around a node, that they may be off
 _UNSUPPORTED = 0.04  # of the way from the nearest point that is seen, the deviation of a hidden one
 _FLOOR = 0.03  # spacings: what a standard deviation is at least
 _STARTS = 24  # nodes, far from each other, near which recurring points are looked for first
+_EXACT = 0.03  # spacings: noise up to which recurring points are taken as they are
+_MEDIAN_SQUARE = 2.366  # of three Gaussian numbers: the median of the sum of their squares
 _LOST = 2.5  # spacings: a larger standard deviation tells nothing
 
 
@@ -173,11 +175,19 @@ class DensePoints:
         found = self._matched(_torn(held, body, pose), pose, now, _REACH[1])
         known = rows >= 0
         moved = found.places - places
-        moved[known] = now.held.points[rows[known]] - self.points[known]
         is_seen = found.is_matched | known
         away = self._distances(is_seen)
-        sigma = np.sqrt((held.weights * spreads[held.nodes] ** 2).sum(axis=1) + (_UNSUPPORTED * away) ** 2)
-        sigma[known] = _FLOOR * now.spacing
+        variance = (held.weights * spreads[held.nodes] ** 2).sum(axis=1) + (_UNSUPPORTED * away) ** 2
+        ways = now.held.points[rows] - self.points
+        noise = self._noise_of(ways, known)
+        of_points = (_FLOOR * now.spacing) ** 2 + noise**2
+        if noise <= _EXACT * now.spacing:
+            moved[known], variance[known] = ways[known], of_points
+        else:  # the body tells as well, without the noise of both frames
+            share = (variance / (variance + of_points))[known]
+            moved[known] += share[:, None] * (ways - moved)[known]
+            variance[known] *= 1 - share
+        sigma = np.sqrt(variance)
         state = np.where(is_seen, PointState.SEEN, PointState.HIDDEN).astype(np.uint8)
         state[~(sigma <= _LOST * now.spacing)] = PointState.LOST
         return TrackedFrame(moved.astype(np.float32), sigma.astype(np.float32), state, pose, rows)
@@ -199,6 +209,24 @@ class DensePoints:
         some = np.arange(0, count, max(1, count // _PLACES))
         chosen = CarriedPlaces(nodes[some].astype(np.int32), *(each[some] for each in all_of_them[1:]))
         return _Carried(body, body.pose, places, all_of_them, some, chosen)
+
+    @cached_property
+    def _neighbors(self) -> NDArray[np.intp]:
+        """Some points and the six around each, (n, 7) rows."""
+        from scipy.spatial import cKDTree
+
+        some = self.points[:: max(1, len(self.points) // _PLACES)]
+        return cKDTree(self.points).query(some, [*range(1, min(7, len(self.points)) + 1)])[1]
+
+    def _noise_of(self, ways: Float, known: NDArray[np.bool_]) -> float:
+        """The standard deviation that noise of both frames gives the ways (N, 3) of points along an axis: the
+        ways of neighbours differ by it. known: (N,). 0 where no neighbours are known."""
+        rows = self._neighbors[known[self._neighbors].all(axis=1)]
+        if not len(rows) or rows.shape[1] < 2:
+            return 0.0
+        off = ways[rows[:, 0]] - ways[rows[:, 1:]].mean(axis=1)
+        variance = np.median(np.square(off).sum(axis=1)) / _MEDIAN_SQUARE
+        return float(np.sqrt(variance / (1 + 1 / (rows.shape[1] - 1))))
 
     def _distances(self, is_seen: NDArray[np.bool_]) -> Float:
         """How far each point is from those that a frame shows, at rest, (N,); inf where it shows none."""
