@@ -49,7 +49,8 @@ _BENDING = 1.5  # of the strains around a node, that they may be off
 _UNSUPPORTED = 0.04  # of the way from the nearest point that is seen, the deviation of a hidden one
 _FLOOR = 0.03  # spacings: what a standard deviation is at least
 _STARTS = 24  # nodes, far from each other, near which recurring points are looked for first
-_EXACT = 0.03  # spacings: noise up to which recurring points are taken as they are
+_EXACT = 0.06  # spacings: noise up to which recurring points are taken as they are; bending makes up to 0.055
+_AROUND = 13  # points, with the one in the middle, that tell its noise
 _MEDIAN_SQUARE = 2.366  # of three Gaussian numbers: the median of the sum of their squares
 _LOST = 2.5  # spacings: a larger standard deviation tells nothing
 
@@ -211,22 +212,29 @@ class DensePoints:
         return _Carried(body, body.pose, places, all_of_them, some, chosen)
 
     @cached_property
-    def _neighbors(self) -> NDArray[np.intp]:
-        """Some points and the six around each, (n, 7) rows."""
+    def _predictions(self) -> tuple[NDArray[np.intp], Float]:
+        """Some points and those around each, (n, 13) rows; and the shares (n, 12) of their ways that predict
+        its own, if the surface is stretched alike there."""
         from scipy.spatial import cKDTree
 
         some = self.points[:: max(1, len(self.points) // _PLACES)]
-        return cKDTree(self.points).query(some, [*range(1, min(7, len(self.points)) + 1)])[1]
+        rows = cKDTree(self.points).query(some, [*range(1, min(_AROUND, len(self.points)) + 1)])[1]
+        offsets = self.points[rows[:, 1:]] - self.points[rows[:, :1]]
+        tangents = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))[1][:, :, 1:]
+        flat = np.concatenate([np.ones((*offsets.shape[:2], 1)), offsets @ tangents], axis=2)
+        return rows, np.linalg.pinv(flat)[:, 0]
 
     def _noise_of(self, ways: Float, known: NDArray[np.bool_]) -> float:
-        """The standard deviation that noise of both frames gives the ways (N, 3) of points along an axis: the
-        ways of neighbours differ by it. known: (N,). 0 where no neighbours are known."""
-        rows = self._neighbors[known[self._neighbors].all(axis=1)]
-        if not len(rows) or rows.shape[1] < 2:
+        """The standard deviation that noise of both frames gives the ways (N, 3) of points along an axis: so
+        much are they off what those around predict. known: (N,). 0 where too few are."""
+        rows, shares = self._predictions
+        told = known[rows].all(axis=1)
+        if rows.shape[1] < _AROUND or not told.any():
             return 0.0
-        off = ways[rows[:, 0]] - ways[rows[:, 1:]].mean(axis=1)
-        variance = np.median(np.square(off).sum(axis=1)) / _MEDIAN_SQUARE
-        return float(np.sqrt(variance / (1 + 1 / (rows.shape[1] - 1))))
+        rows, shares = rows[told], shares[told]
+        off = ways[rows[:, 0]] - np.einsum("nk,nki->ni", shares, ways[rows[:, 1:]])
+        squares = np.square(off).sum(axis=1) / (1 + np.square(shares).sum(axis=1))
+        return float(np.sqrt(np.median(squares) / _MEDIAN_SQUARE))
 
     def _distances(self, is_seen: NDArray[np.bool_]) -> Float:
         """How far each point is from those that a frame shows, at rest, (N,); inf where it shows none."""
