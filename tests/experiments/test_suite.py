@@ -11,7 +11,7 @@ import pytest
 from experiments.command import experiment, found, main
 from experiments.script import Script, described_text
 from experiments.stale import commit, stale
-from experiments.suite import DOCS, ROOT, Suite, stored_runs, write_run
+from experiments.suite import DOCS, ROOT, Suite, page_named, stored_runs, write_run
 from tables_of import tables_of
 
 from viewer.bench.report.results import write_row
@@ -33,7 +33,7 @@ def suite(name: str) -> Suite:
 def test_the_tables_of_pages_are_those_of_the_stored_runs(name: str, bless: bool) -> None:
     runs = stored_runs(suite(name), name)
     assert runs, f"no run of {name} is stored"
-    (page,) = DOCS.rglob(suite(name).page)
+    page = page_named(suite(name).page)
     if bless:
         page.write_text(suite(name).filled(runs), encoding="utf-8")
     assert page.read_text(encoding="utf-8") == suite(name).filled(runs)
@@ -43,7 +43,7 @@ def test_the_tables_of_pages_are_those_of_the_stored_runs(name: str, bless: bool
 def test_described_tables_are_those_of_the_stored_runs(name: str, bless: bool) -> None:
     script = experiment(name)
     assert isinstance(script, Script)
-    (page,) = DOCS.rglob(script.described_page)
+    page = page_named(script.described_page)
     if bless:
         page.write_text(described_text(name, script), encoding="utf-8")
     assert page.read_text(encoding="utf-8") == described_text(name, script)
@@ -61,15 +61,15 @@ def test_a_run_on_a_graphics_card_alone_is_stored(
 
 def test_each_place_of_a_table_has_what_makes_it() -> None:
     """A suite or a script; and none of them makes one without a place."""
-    made = [(suite(name).page, table.name) for name in SUITES for table in suite(name).tables]
+    made = [(page_named(suite(name).page), table.name) for name in SUITES for table in suite(name).tables]
     for name, path in found().items():
         script = None if name in SUITES or path.parent.name == "window" else experiment(name)
         if isinstance(script, Script) and script.page:
-            made += [(script.page, table.__name__) for table in script.tables]
+            made += [(page_named(script.page), table.__name__) for table in script.tables]
         if isinstance(script, Script):
-            made += [(script.described_page, table.name) for table in script.described]
+            made += [(page_named(script.described_page), table.name) for table in script.described]
     places = [
-        (page.name, key)
+        (page, key)
         for page in DOCS.rglob("*.md")
         for key in re.findall(r"^<!-- (\w+) -->$", page.read_text(encoding="utf-8"), re.M)
     ]

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.pictures import renderer
-from experiments.suite import DOCS, write_run
+from experiments.suite import DOCS, page_named, write_run
 from experiments.tables import Column, Row, Table, markdown, put_tables, shown
 from viewer.bench.run import Bench, BenchSettings, slug
 from viewer.errors import InputError
@@ -87,7 +87,7 @@ class Script:
             raise Failed("\n".join(failures))
 
     def _put(self, name: str, rows: Sequence[Row]) -> None:
-        (page,) = DOCS.rglob(self.page)
+        page = page_named(self.page)
         titles = [Column(title) for title in rows[0]]
         made = markdown(titles, [[shown(cell) for cell in row.values()] for row in rows])
         text = put_tables(page.read_text(encoding="utf-8"), {name: made})
@@ -99,7 +99,7 @@ def described_text(name: str, script: Script) -> str:
     """The described page with the tables of the stored runs of a script."""
     files = sorted((DOCS / "data").glob(f"{name}-*.json"))
     runs = [json.loads(path.read_text(encoding="utf-8")) for path in files]
-    (page,) = DOCS.rglob(script.described_page)
+    page = page_named(script.described_page)
     made = {table.name: table.text(runs) for table in script.described}
     return put_tables(page.read_text(encoding="utf-8"), made)
 

@@ -27,6 +27,12 @@ _WHERE = ("device", "driver", "processors", "timer", "version", "date", "size", 
 _DIGITS = 9  # that a stored run has of a number
 
 
+def page_named(name: str) -> Path:
+    """The only page of this name in docs/. The name may begin with the folder."""
+    (page,) = DOCS.rglob(name)
+    return page
+
+
 @dataclass(frozen=True)
 class Part:
     """Rows of one kind. measure: yields them, given the bench, and the scenes if the suite has any; None:
@@ -124,7 +130,7 @@ class Suite:
 
     def filled(self, runs: Sequence[StoredRun]) -> str:
         """The page with these tables."""
-        (page,) = DOCS.rglob(self.page)
+        page = page_named(self.page)
         return put_tables(page.read_text(encoding="utf-8"), self.made(runs))
 
 

@@ -162,5 +162,5 @@ def _percent(share: float) -> str:
 EXPERIMENT = Script(
     [faces, there_and_back, sequences, dense_methods],
     {"data": None},
-    page="dense-tracking.md",
+    page="how-it-works/dense-tracking.md",
 )

@@ -175,4 +175,4 @@ def _share(errors: Sequence[Float], told: Sequence[Float]) -> str:
     return f"{np.mean(np.abs(errors) <= np.array(told)):.0%}".replace("%", " %")
 
 
-EXPERIMENT = Script([variants, references, regions, methods], page="stabilising.md")
+EXPERIMENT = Script([variants, references, regions, methods], page="how-it-works/stabilising.md")
