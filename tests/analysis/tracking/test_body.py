@@ -87,3 +87,15 @@ def test_points_far_from_all_others_are_no_part_of_it() -> None:
     body = DeformableBody(points, SPACING)
     assert body.pose.positions.max() < 100
     assert body.distance < 10 * SPACING
+
+
+@pytest.mark.parametrize("away", [100.0, 1e6])
+def test_a_node_that_is_torn_off_a_flat_body_keeps_a_map(away: float) -> None:
+    flat = np.stack(np.meshgrid(np.arange(30.0), np.arange(30.0), [0.0]), axis=-1).reshape(-1, 3)
+    body = DeformableBody(flat, 1.0)
+    pose, wanted = body.pose, body.pose.positions.copy()
+    wanted[len(wanted) // 2, 2] += away
+    pulls = np.broadcast_to(np.eye(3), (len(wanted), 3, 3))
+    for _ in range(6):
+        pose = body.strained(pose, 0.1, pulls, wanted)
+    assert np.abs(pose.turns).max() < 2

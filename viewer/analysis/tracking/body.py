@@ -43,6 +43,7 @@ _STEPS = 60  # of conjugate gradients at most
 _CAPPED = 3.0  # node distances: a longer way counts as this one where poses are compared
 _UNSTRAINED = 0.1  # of a node's edges, that hold its map to a rotation
 _EASE = 0.02  # strain of the map at which it is held by a quarter of this
+_LEAST_HELD = 1e-6  # the same at least: a node whose edges all let go keeps a map
 _PROBES = 8  # random changes that say how exactly nodes are held
 _PROBING = 2  # threads
 _USUAL = 0.75  # of the nodes, that are strained less: strains are off by a share of this at least
@@ -318,7 +319,7 @@ class DeformableBody:
         positions, products = self._moved(pose, stiffness, pulls, wanted, holds)
         moments = self._products(self._rest, holds)
         strains = ((pose.turns - rotations(pose.turns)) ** 2).sum(axis=(1, 2))
-        eased = _UNSTRAINED / (1 + strains / _EASE**2) ** 2
+        eased = np.maximum(_UNSTRAINED / (1 + strains / _EASE**2) ** 2, _LEAST_HELD)
         hold = (eased * np.trace(self._moments, axis1=1, axis2=2) + 1e-300)[:, None, None]
         turns = products + hold * rotations(products)
         return BodyPose(positions, turns @ np.linalg.inv(moments + hold * np.eye(3)))
