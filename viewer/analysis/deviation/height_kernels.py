@@ -10,6 +10,7 @@ from ..tracking.surface_kernels import (
     OWN_SPACING,
     Cells,
     fit_at,
+    in_frame,
     nearest_within,
     parabola_height,
     parabola_slopes,
@@ -47,10 +48,7 @@ def fit_range(surface: Cells, noise: float, first: int, last: int) -> None:
         count = rows_within(surface, points[0], points[1], points[2], surface.reaches[row], rows, squared)
         left = 0.0
         for i in range(count):
-            x, y, z = surface.points[rows[i]] - points
-            u = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z
-            v = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z
-            w = f[2, 0] * x + f[2, 1] * y + f[2, 2] * z
+            u, v, w = in_frame(f, surface.points[rows[i]], points)
             left += (w - parabola_height(parabola, u, v)) ** 2
         ahead = f[2, 0] * n[0] + f[2, 1] * n[1] + f[2, 2] * n[2]
         excess = left / count - _EXPLAINED * variance
@@ -77,15 +75,7 @@ def signed_distances(surface: Cells, positions: Float, reach: float, found: Floa
         row = nearest_within(surface, positions[i, 0], positions[i, 1], positions[i, 2], reach)
         if row < 0 or not fit_at(surface, row):
             continue
-        f = surface.frames[row]
-        x, y, z = (
-            positions[i, 0] - surface.points[row, 0],
-            positions[i, 1] - surface.points[row, 1],
-            positions[i, 2] - surface.points[row, 2],
-        )
-        u = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z
-        v = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z
-        w = f[2, 0] * x + f[2, 1] * y + f[2, 2] * z
+        u, v, w = in_frame(surface.frames[row], positions[i], surface.points[row])
         if not _foot(surface.parabolas[row, 0], u, v, w, foot):
             continue
         spacing = surface.reaches[row] * OWN_SPACING
@@ -132,15 +122,13 @@ def _goes_on(
     squared: Float,
 ) -> bool:
     """Whether some point around lies as far from a point as the foot does, in the direction of the foot."""
-    f, points = surface.frames[row], surface.points
+    points = surface.points
     px, py, pz = points[row, 0], points[row, 1], points[row, 2]
     count = rows_within(surface, px, py, pz, _AROUND * spacing, rows, squared)
     if count == _MOST:  # denser than around other points
         return True
     for n in range(count):
-        x, y, z = points[rows[n], 0] - px, points[rows[n], 1] - py, points[rows[n], 2] - pz
-        u = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z
-        v = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z
+        u, v, _ = in_frame(surface.frames[row], points[rows[n]], points[row])
         ahead = u * foot[0] + v * foot[1]
         if ahead >= aside * aside and ahead >= _AHEAD * aside * np.sqrt(u * u + v * v):
             return True

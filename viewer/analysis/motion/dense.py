@@ -188,7 +188,7 @@ class DensePoints:
             share = (variance / (variance + of_points))[known]
             moved[known] += share[:, None] * (ways - moved)[known]
             variance[known] *= 1 - share
-        sigma = np.sqrt(variance)
+        sigma = np.sqrt(np.maximum(variance, (_FLOOR * now.spacing) ** 2))
         state = np.where(is_seen, PointState.SEEN, PointState.HIDDEN).astype(np.uint8)
         state[~(sigma <= _LOST * now.spacing)] = PointState.LOST
         return TrackedFrame(moved.astype(np.float32), sigma.astype(np.float32), state, pose, rows)

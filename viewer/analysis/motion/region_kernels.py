@@ -10,6 +10,7 @@ from ..tracking.surface_kernels import (
     OWN_SPACING,
     Cells,
     fit_at,
+    in_frame,
     nearest_within,
     parabola_height,
     parabola_slopes,
@@ -60,14 +61,7 @@ def heights_over(surface: Cells, positions: Float, reach: float) -> tuple[Float,
         if row < 0 or not fit_at(surface, row):
             continue
         f, p = surface.frames[row], surface.parabolas[row]
-        x, y, z = (
-            positions[i, 0] - surface.points[row, 0],
-            positions[i, 1] - surface.points[row, 1],
-            positions[i, 2] - surface.points[row, 2],
-        )
-        u = f[0, 0] * x + f[0, 1] * y + f[0, 2] * z
-        v = f[1, 0] * x + f[1, 1] * y + f[1, 2] * z
-        w = f[2, 0] * x + f[2, 1] * y + f[2, 2] * z
+        u, v, w = in_frame(f, positions[i], surface.points[row])
         if u * u + v * v > (_HOLE * (surface.reaches[row] * OWN_SPACING)) ** 2:
             continue
         slope_u, slope_v = parabola_slopes(p[0], u, v)

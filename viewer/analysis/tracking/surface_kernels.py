@@ -277,6 +277,18 @@ def fit_at(
 
 
 @inlined
+def in_frame(frame: NDArray[np.float32], position: Float, middle: Float) -> tuple[float, float, float]:
+    """The coordinates of a position (3,) about a middle (3,), in a frame (3, 3) of tangents and normal."""
+    f = frame
+    x, y, z = position[0] - middle[0], position[1] - middle[1], position[2] - middle[2]
+    return (
+        f[0, 0] * x + f[0, 1] * y + f[0, 2] * z,
+        f[1, 0] * x + f[1, 1] * y + f[1, 2] * z,
+        f[2, 0] * x + f[2, 1] * y + f[2, 2] * z,
+    )
+
+
+@inlined
 def parabola_height(parabola: NDArray[np.float32], u: float, v: float) -> float:
     """The value of a parabola (6,) at (u, v) of its tangent plane."""
     p = parabola
