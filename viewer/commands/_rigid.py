@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..analysis.motion.axes import anatomical_axes, weak_directions
+from ..analysis.motion.axes import anatomical_axes
+from ..analysis.motion.facts import MotionFacts
 from ..analysis.motion.found import NoRigidRegion, found_region
 from ..analysis.motion.partial import PartialMotions
 from ..analysis.motion.region import RigidRegion
@@ -33,7 +34,6 @@ _COLUMNS = (
     "frame", "time", "qw", "qx", "qy", "qz", "tx", "ty", "tz",
     "sigma_rx", "sigma_ry", "sigma_rz", "sigma_tx", "sigma_ty", "sigma_tz", "state",
 )  # fmt: skip
-_RIGID = 0.95  # of distances: a region of which fewer are close changes its shape
 _WORLD = np.eye(3)
 
 
@@ -58,6 +58,11 @@ class RigidPart:
         """The states of the motions, by frame."""
         return {index: self.known[index].state(self.axes, self.limits) for index in sorted(self.known)}
 
+    @cached_property
+    def found(self) -> MotionFacts:
+        """The facts about the motions."""
+        return MotionFacts.of(self.known, self.reference.frame, self.axes, self.limits)
+
     def table(self) -> list[Sequence[object]]:
         """The rows of transforms.csv."""
         return [_COLUMNS, *map(self._row, self.states)]
@@ -69,7 +74,7 @@ class RigidPart:
 
     def facts(self, source: object) -> dict[str, Any]:
         """The facts for the report. source: of the region."""
-        pose, known = self.reference.pose, self.known
+        pose = self.reference.pose
         region = None
         if self.region is not None:
             region = {
@@ -78,25 +83,19 @@ class RigidPart:
                 "share_of_points": len(self.rows) / pose.count,
                 "middle": self.region.middle.tolist(),
             }
-        shares = {  # the reference frame agrees with itself
-            index: found.within
-            for index, found in known.items()
-            if found.motion and index != self.reference.frame
-        }
-        least = min(shares, key=lambda index: shares[index]) if shares else None
+        found = self.found
         return {
             "region": region,
             "within": {
-                "mean": float(np.mean(list(shares.values()))) if shares else None,
-                "least": None if least is None else shares[least],
-                "least_in_frame": None if least is None else least + 1,
+                "mean": found.fit and found.fit.mean,
+                "least": found.fit and found.fit.least,
+                "least_in_frame": found.fit and found.fit.frame + 1,
             },
             "states": {state.value: list(self.states.values()).count(state) for state in MotionState},
             "limits": {"degrees": self.limits.degrees, "length": self.limits.shift},
-            "gaps": {str(i + 1): known[i].reason for i in self.states if known[i].motion is None},
+            "gaps": {str(frame + 1): reason for frame, reason in found.gaps.items()},
             "weak_directions": [
-                {**asdict(one), "words": one.in_words(self.timeline.unit)}
-                for one in weak_directions(known, self.axes, self.limits)
+                {**asdict(one), "words": one.in_words(self.timeline.unit)} for one in found.weak
             ],
         }
 
@@ -153,26 +152,25 @@ def rigid_part(
     return RigidPart(timeline, reference, region, rows, limits, axes, known)
 
 
-def tell_rigid(found: Mapping[str, Any], timeline: Timeline) -> None:
+def tell_rigid(rigid: RigidPart) -> None:
     """The facts of the motions in words."""
-    region, within = found["region"], found["within"]
-    if region is None:
+    if rigid.region is None:
         return
-    tell(
-        f"The region has {region['points']:,} points, {region['share_of_points']:.0%} of the reference frame"
-    )
-    close = f"within ±{found['limits']['length']:.3g} {timeline.unit} of the surface"
-    if within["mean"] is not None:
-        tell(f"On average, {within['mean']:.1%} of the region lies {close} of a frame")
-    for one in found["weak_directions"]:
-        warn(f"{one['words']} (in {one['frames']} of {len(timeline)} frames)")
-    if found["gaps"]:
-        number, reason = next(iter(found["gaps"].items()))
-        share = f"{len(found['gaps'])} of {len(timeline)} frames"
-        warn(f"Scan4D finds no motion in {share}, such as {_frame(number)}: {reason}")
-    if within["least"] is not None and within["least"] < _RIGID:
-        share = f"in {_frame(within['least_in_frame'])}, only {within['least']:.1%} of it lies"
-        warn(f"The region does not stay rigid: {share} {close}. Name another region with --region")
+    frames, unit, found = len(rigid.timeline), rigid.timeline.unit, rigid.found
+    share = len(rigid.rows) / rigid.reference.pose.count
+    tell(f"The region has {len(rigid.rows):,} points, {share:.0%} of the reference frame")
+    close = f"within ±{rigid.limits.shift:.3g} {unit} of the surface"
+    if found.fit is not None:
+        tell(f"On average, {found.fit.mean:.1%} of the region lies {close} of a frame")
+    for one in found.weak:
+        warn(f"{one.in_words(unit)} (in {one.frames} of {frames} frames)")
+    if found.gaps:
+        frame, reason = next(iter(found.gaps.items()))
+        gaps = f"{len(found.gaps)} of {frames} frames"
+        warn(f"Scan4D finds no motion in {gaps}, such as {frame_in_words(frame)}: {reason}")
+    if found.fit is not None and not found.fit.is_rigid:
+        lies = f"in {frame_in_words(found.fit.frame)}, only {found.fit.least:.1%} of it lies"
+        warn(f"The region does not stay rigid: {lies} {close}. Name another region with --region")
 
 
 def region_rows(args: Namespace, file: Path, reference: StartOfMotion) -> NDArray[np.int64]:
@@ -211,8 +209,3 @@ def _places(args: Namespace, reference: StartOfMotion) -> dict[str, NDArray[np.f
         raise InputError("names landmarks, but the scan has no saved session", hint=hint)
     placed = {one.name: one.key_at(reference.frame) for one in session.document.part(Landmarks).all}
     return {name: np.array(key.position) for name, key in placed.items() if key is not None}
-
-
-def _frame(number: int | str) -> str:
-    """The words for a frame, of its number in the report."""
-    return frame_in_words(int(number) - 1)

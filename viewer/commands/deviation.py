@@ -153,7 +153,7 @@ def _compared(args: Namespace, timeline: Timeline, other: Timeline) -> _Compared
     if args.stabilise:
         rigid = rigid_part(args, timeline, start, args.out / _PARTIAL)
         start, motions, found["rigid"] = rigid.reference, rigid.known, rigid.facts(args.region or "found")
-        tell_rigid(found["rigid"], timeline)
+        tell_rigid(rigid)
     reference = deviation_reference(start.pose, faces)
     bounds = start.pose.bounds
     reach = args.reach or _REACH * float((bounds.high - bounds.low).max())

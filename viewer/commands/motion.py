@@ -86,7 +86,7 @@ def _written(args: Namespace, timeline: Timeline) -> list[Path]:
         "reference": rigid.reference.facts(),
         "rigid": rigid.facts(args.region or "found"),
     }
-    tell_rigid(found["rigid"], timeline)
+    tell_rigid(rigid)
     if args.dense:
         kept = dense_part(args, timeline, rigid.reference, followed)
         found["dense"] = dense_facts(len(timeline), rigid.reference, kept)

@@ -11,7 +11,7 @@ from rigid_hills import RigidHills, opened, truth
 from viewer.analysis.motion.axes import anatomical_axes
 from viewer.analysis.motion.stabilise import FEW, FrameMotion
 from viewer.app.tools.stabilising.choices import FOUND, LANDMARKS, PAINTED, Stabilising
-from viewer.app.tools.stabilising.stabiliser import Asked, Motions, half_millimetre, motions_folder
+from viewer.app.tools.stabilising.stabiliser import Asked, Motions, motions_folder
 from viewer.app.tools.stabilising.words import facts_of, motion_gap_spans
 from viewer.errors import InputError
 from viewer.rigid import STILL
@@ -113,8 +113,3 @@ def test_runs_of_gaps_are_marked_on_the_timeline() -> None:
     spans = motion_gap_spans({0: there, 2: gap, 1: gap, 3: FrameMotion.gap("other"), 4: gap})
     assert [one.frames for one in spans] == [range(1, 3), range(3, 4), range(4, 5)]
     assert spans[0].words == f"Not stabilised: {FEW}"
-
-
-def test_half_a_millimetre_is_close_where_the_unit_is_known() -> None:
-    assert half_millimetre("m") == pytest.approx(5e-4)
-    assert half_millimetre("units") is None

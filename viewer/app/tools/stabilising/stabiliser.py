@@ -25,13 +25,12 @@ from ....files import save_json
 from ....folders import cache_folder, forget_oldest
 from ....geometry import Vector
 from ....scan.pose import Pose
+from ....scan.spacing import typical_spacing
 from ....scan.timeline import Timeline
-from ....scan.units import conversion
 from ....task import Task, announce, over
 from ...tool_context import ToolContext
 from .choices import Stabilising
 
-CLOSE = 0.5  # mm
 _MOST_KEPT = 64 * 2**20  # bytes, of all motions that are kept
 _SAVING = 2.0  # seconds between two times that motions are kept
 
@@ -103,8 +102,7 @@ class Motions:
             rows = self._rows(pose, folder / f"{digest}-region.json")
             reference = MotionReference.of(pose, rows, frame)
             self.rows, self.pose = rows, pose
-            close = half_millimetre(self.asked.unit)
-            self.limits = WeakLimits(reference.surface.spacing if close is None else close)
+            self.limits = WeakLimits.of(self.asked.unit, reference.surface.spacing)
             with suppress(InputError):  # damaged: all is found again
                 self.known |= kept.read()
             self.reference = reference
@@ -162,10 +160,13 @@ class Stabiliser:
 
     @property
     def close(self) -> float | None:
-        """The distance up to which a region is said to fit, scan units; None as long as it is not known."""
+        """The distance up to which a region is said to fit, scan units; None where there are no points."""
         if self.motions is not None and self.motions.reference is not None:
             return self.motions.limits.shift
-        return half_millimetre(self._context.unit)
+        pose = self._context.pose
+        if pose is None or not len(pose.cloud):
+            return None
+        return WeakLimits.of(self._context.unit, typical_spacing(pose.cloud)).shift
 
     def resume(self) -> None:
         """Go on after the user has cancelled it."""
@@ -197,13 +198,6 @@ class Stabiliser:
 
     def _is_over(self, motions: Motions) -> bool:
         return motions.is_whole or self.is_stopped or bool(motions.problem)
-
-
-def half_millimetre(unit: str) -> float | None:
-    """Half a millimetre in scan units: the distance up to which a region is said to fit. None where the unit
-    is no known length; a point spacing stands for it then."""
-    factor = conversion("mm", unit)
-    return None if factor is None else CLOSE * factor
 
 
 def motions_folder() -> Path:

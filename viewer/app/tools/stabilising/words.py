@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....analysis.motion.axes import weak_directions
+from ....analysis.motion.facts import MotionFacts
 from ....analysis.motion.stabilise import FrameMotion
 from ....analysis.track import Known
 from ....output.overlays import STATE_MARKS
@@ -18,7 +18,6 @@ from ...tool_context import FrameSpan
 from .stabiliser import Motions
 
 _GAP_COLOR = STATE_MARKS[Known.GAP].color
-RIGID = 0.95  # of distances: a region of which fewer are close changes its shape
 
 
 class Facts(NamedTuple):
@@ -37,25 +36,22 @@ def facts_of(motions: Motions, known: Mapping[int, FrameMotion], axes: np.ndarra
     reference = motions.asked.choices.reference
     lines = [f"The region has {len(motions.rows):,} points, {share:.0%} of {frame_in_words(reference)}."]
     warnings = []
-    others = {frame: one for frame, one in known.items() if frame != reference}  # its own share says nothing
-    shares = {frame: one.within for frame, one in others.items() if one.motion is not None}
-    if shares:
+    found = MotionFacts.of(known, reference, axes, motions.limits)
+    if found.fit is not None:
         close = f"±{scale.factor * motions.limits.shift:.3g} {scale.unit}"
-        least = min(shares, key=lambda frame: shares[frame])
         lines.append(
-            f"Distances of the region within {close}: {np.mean(list(shares.values())):.1%}. "
-            f"Least: {shares[least]:.1%} in {frame_in_words(least)}."
+            f"Distances of the region within {close}: {found.fit.mean:.1%}. "
+            f"Least: {found.fit.least:.1%} in {frame_in_words(found.fit.frame)}."
         )
-        if shares[least] < RIGID:
+        if not found.fit.is_rigid:
             warnings.append("The region does not stay rigid in all frames. Choose another region.")
-    for one in weak_directions(known, axes, motions.limits):
+    for one in found.weak:
         amount = one if one.is_turn else replace(one, plus_minus=scale.factor * one.plus_minus)
         warnings.append(f"{amount.in_words(scale.unit)} (in {one.frames} of {len(known)} frames).")
-    gaps = {frame: one.reason for frame, one in known.items() if one.motion is None}
-    if gaps:
-        first = min(gaps)
-        number = "1 frame is a gap" if len(gaps) == 1 else f"{len(gaps)} frames are gaps"
-        warnings.append(f"{number}, shown as recorded, such as {frame_in_words(first)}: {gaps[first]}.")
+    if found.gaps:
+        first, reason = next(iter(found.gaps.items()))
+        number = "1 frame is a gap" if len(found.gaps) == 1 else f"{len(found.gaps)} frames are gaps"
+        warnings.append(f"{number}, shown as recorded, such as {frame_in_words(first)}: {reason}.")
     return Facts(tuple(lines), tuple(warnings))
 
 
