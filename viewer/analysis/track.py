@@ -18,16 +18,24 @@ class Known(IntEnum):
     """How well a place is known in a frame; the higher, the better.
 
     PENDING: nobody has looked yet. GAP: it was looked for and not found, or its place is not sure. TRACKED:
-    it was followed from where it was set. PLACED: it was set there.
+    it was followed from where it was set. CARRIED: densely tracked points carried it from there. PLACED: it
+    was set there.
     """
 
     PENDING = 0
     GAP = 1
     TRACKED = 2
-    PLACED = 3
+    CARRIED = 3
+    PLACED = 4
 
 
-STATES = {Known.PENDING: "", Known.GAP: "gap", Known.TRACKED: "tracked", Known.PLACED: "placed"}  # in tables
+STATES = {
+    Known.PENDING: "",
+    Known.GAP: "gap",
+    Known.TRACKED: "tracked",
+    Known.CARRIED: "densely tracked",
+    Known.PLACED: "placed",
+}  # in tables
 KNOWN_WORDS = STATES | {Known.PENDING: "not tracked yet", Known.GAP: "no data"}
 
 
@@ -37,7 +45,7 @@ class Track:
 
     times: (T,) seconds. positions: (T, 3) scan units, NaN where not known. covariances: (T, 3, 3) squared
     scan units, of how the place may lie off the position; NaN where not known. known: (T,) uint8 of `Known`.
-    reasons: frame -> why it is a gap, in words. carried: frames to which densely tracked points carried it.
+    reasons: frame -> why it is a gap, in words.
     """
 
     times: NDArray[np.float64]
@@ -45,7 +53,6 @@ class Track:
     covariances: NDArray[np.float64]
     known: NDArray[np.uint8]
     reasons: Mapping[int, str] = field(default_factory=dict)
-    carried: frozenset[int] = frozenset()
 
     @classmethod
     def pending(cls, times: NDArray[np.float64]) -> Track:

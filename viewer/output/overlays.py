@@ -31,6 +31,7 @@ class StateMark(NamedTuple):
 # Distinct with protanopia, deuteranopia and tritanopia too: by the colour, and by the shape.
 STATE_MARKS = {
     Known.PLACED: StateMark(0x22D6A4, 0),
+    Known.CARRIED: StateMark(0xFFD21F, 4),
     Known.TRACKED: StateMark(0xFFD21F, 4),
     Known.GAP: StateMark(0xD55E00, 3),
     Known.PENDING: StateMark(0x858B95, 6),

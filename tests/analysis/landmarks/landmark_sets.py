@@ -11,15 +11,16 @@ NAMES = ("prn", "chR", "chL", "鼻尖", 'a "b", c', "Ünter'lid", "x" * 90, "sn"
 
 
 def moving(frames: int = 6, names: tuple[str, ...] = NAMES, seed: int = 4) -> LandmarkSet:
-    """Landmarks that move, in mm, at 25 frames a second: one is a gap in two frames, one is never placed."""
+    """Landmarks that move, in mm, at 25 frames a second: one is a gap in two frames, dense
+    tracking carries one on, one is never placed."""
     rng = np.random.default_rng(seed)
     positions = 40 * rng.normal(size=(1, len(names), 3)) + rng.normal(size=(frames, len(names), 3))
     known = np.full((frames, len(names)), Known.TRACKED, np.uint8)
-    known[0] = Known.PLACED
+    known[0], known[4:, 2] = Known.PLACED, Known.CARRIED
     known[2:4, 1] = Known.GAP
     known[:, -1] = Known.PENDING
     positions[known < Known.TRACKED] = np.nan
-    sigmas = np.where(known == Known.TRACKED, rng.random(known.shape), np.nan)
+    sigmas = np.where((known > Known.GAP) & (known < Known.PLACED), rng.random(known.shape), np.nan)
     return LandmarkSet.of(
         names,
         positions,

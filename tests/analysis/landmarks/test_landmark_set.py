@@ -32,7 +32,7 @@ def test_a_set_of_tracks_is_tracks_again() -> None:
 def test_tracks_of_a_scan_of_other_frames() -> None:
     some = LandmarkSet.of(["a"], np.ones((3, 1, 3)), frames=[1, 4, 9])
     track = some.tracks(np.arange(6.0))["a"]
-    assert track.known.tolist() == [0, 3, 0, 0, 3, 0]
+    assert (track.known == Known.PLACED).tolist() == [False, True, False, False, True, False]
     assert np.isfinite(track.positions[[1, 4]]).all()
 
 
@@ -41,7 +41,7 @@ def test_a_set_has_each_frame_between_its_first_and_its_last() -> None:
     even = some.even_rows()
     np.testing.assert_array_equal(even.frames, [2, 3, 4, 5])
     np.testing.assert_allclose(even.times, [0.2, 0.3, 0.4, 0.5])
-    assert even.known[:, 0].tolist() == [3, 1, 1, 3]
+    assert even.known[:, 0].tolist() == [Known.PLACED, Known.GAP, Known.GAP, Known.PLACED]
     assert_same(moving().even_rows(), moving())
 
 

@@ -33,13 +33,12 @@ def track_of(
     from either side may be apart, scan units. so_far: holds in all but some frames.
     """
     positions, covariances = so_far.positions.copy(), so_far.covariances.copy()
-    known, reasons, carried = so_far.known.copy(), dict(so_far.reasons), set(so_far.carried)
+    known, reasons = so_far.known.copy(), dict(so_far.reasons)
     keys = [key for key in landmark.keys if key.frame < len(known)]
     at = [key.frame for key in keys]
     for frame in frames:
         number = bisect_left(at, frame)
         reasons.pop(frame, None)
-        carried.discard(frame)
         if number < len(at) and at[number] == frame:
             known[frame], positions[frame] = Known.PLACED, keys[number].position
             spread = keys[number].spread
@@ -56,13 +55,12 @@ def track_of(
         if sighting is None:
             known[frame], positions[frame], covariances[frame] = Known.PENDING, np.nan, np.nan
             continue
-        known[frame] = Known.GAP if sighting.reason else Known.TRACKED
+        there = Known.CARRIED if sighting.is_carried else Known.TRACKED
+        known[frame] = Known.GAP if sighting.reason else there
         positions[frame], covariances[frame] = sighting.position, sighting.covariance
         if sighting.reason:
             reasons[frame] = sighting.reason
-        elif sighting.is_carried:
-            carried.add(frame)
-    return Track(so_far.times, positions, covariances, known, reasons, frozenset(carried))
+    return Track(so_far.times, positions, covariances, known, reasons)
 
 
 def _between(

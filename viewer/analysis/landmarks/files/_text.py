@@ -148,7 +148,7 @@ def own_unit(values: Mapping[str, Any]) -> str | None:
 
 def without_states(landmarks: LandmarkSet, title: str) -> str | None:
     """The remark of a format that has no states, where the landmarks have some."""
-    if (landmarks.known == Known.TRACKED).any() or np.isfinite(landmarks.sigmas).any():
+    if (landmarks.is_defined & (landmarks.known < Known.PLACED)).any() or np.isfinite(landmarks.sigmas).any():
         return (
             f"{title} files do not store uncertainties, nor which landmarks Scan4D tracked. If you import "
             "the file, Scan4D treats all its landmarks as placed"

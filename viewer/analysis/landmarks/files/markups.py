@@ -36,7 +36,7 @@ _CODED_AXES = {"0": "RAS", "1": "LPS"}  # as old scenes have them
 _STATES = {"undefined": Known.PENDING, "preview": Known.PENDING, "defined": Known.PLACED}
 _CODED_STATES = {"0": "undefined", "1": "preview", "2": "defined"}
 _OWN = "scan4d"
-_OWN_STATES = (Known.GAP, Known.TRACKED)
+_OWN_STATES = (Known.GAP, Known.TRACKED, Known.CARRIED)
 _UNIT = "mm"  # in which 3D Slicer is
 
 

@@ -32,9 +32,9 @@ def draw(tool: Tool, positions: NDArray[np.float64], canvas: Canvas, view: Scree
     reaches = shown.sure * view.lengths_on_screen(tool.positions)
     regions = tool.regions
     are_corners = np.array([one.name in regions for one in shown.landmarks], bool)
-    for known, is_corner in product((Known.PLACED, Known.TRACKED), (False, True)):
+    for known, is_corner in product((Known.PLACED, Known.CARRIED, Known.TRACKED), (False, True)):
         at = drawn[(shown.known[drawn] == known) & (are_corners[drawn] == is_corner)]
-        rings = np.nan_to_num(reaches[at]) if known is Known.TRACKED else np.zeros(len(at))
+        rings = np.nan_to_num(reaches[at]) if known is not Known.PLACED else np.zeros(len(at))
         canvas.marks(positions[at], STATE_MARKS[known], alphas[at], rings, are_corners=is_corner)
     selected = shown.number(tool.selected)
     if selected is not None and selected in drawn:

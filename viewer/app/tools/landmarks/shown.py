@@ -27,7 +27,7 @@ class ShownLandmarks:
     positions: (N, 3) scan coordinates, NaN where they are not known. known: (N,) uint8 of `Known`; GAP also
     where the user says that it is not there. sure: (N,) how far off a position is at most with 95 %, along
     the line on which that is worst, scan units; NaN where not known. spacings: (N,) at their keys, 0 where
-    not known. carried: numbers of those that densely tracked points carried there.
+    not known.
     """
 
     frame: int
@@ -37,7 +37,6 @@ class ShownLandmarks:
     sure: NDArray[np.float64]
     spacings: NDArray[np.float64]
     reasons: Mapping[int, str]
-    carried: frozenset[int] = frozenset()
 
     @classmethod
     def of(cls, landmarks: Sequence[Landmark], tracks: Mapping[str, Track], frame: int) -> ShownLandmarks:
@@ -69,8 +68,7 @@ class ShownLandmarks:
         reasons = {
             number: track.reasons.get(frame, "") for number, track in tracked.items() if known[number] == gap
         }
-        carried = frozenset(number for number, track in tracked.items() if frame in track.carried)
-        return cls(frame, landmarks, positions, known, _largest(spreads), spacings, reasons, carried)
+        return cls(frame, landmarks, positions, known, _largest(spreads), spacings, reasons)
 
     @property
     def is_there(self) -> NDArray[np.bool_]:
@@ -91,7 +89,7 @@ class ShownLandmarks:
         if known is Known.GAP:
             reason = self.reasons.get(number, "")
             return f"no data: {reason}" if reason else "no data"
-        return f"{KNOWN_WORDS[known]}{' by dense tracking' if number in self.carried else ''}"
+        return KNOWN_WORDS[known]
 
 
 def names_over(shown: ShownLandmarks, regions: Mapping[str, str]) -> dict[int, str]:
