@@ -129,7 +129,7 @@ def test_an_interrupted_command_goes_on(run: Run, monkeypatch: pytest.MonkeyPatc
         assert ("are known" in said) == (folder == "same")
     partial.write_text(whole)
     done = run(*words, "out")
-    assert done.code == 0
+    assert done.code == 0, done.err
     assert "2 of 3 frames are known" in done.out
     assert Path("out/transforms.csv").read_bytes() == Path("whole/transforms.csv").read_bytes()
 
@@ -155,6 +155,26 @@ def test_a_frame_without_points_is_a_gap(run: Run) -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no small disk can be mounted")
+def test_a_found_region_is_not_looked_for_again(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    from viewer.commands import _rigid
+
+    words = ("motion", "seq", "--unit", "mm", "-o")
+    whole = run(*words, "whole")
+    assert "looks for a region" in whole.out
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(_rigid, "stabilise", interrupted)
+        assert run(*words, "out").code != 0
+    done = run(*words, "out")
+    assert done.code == 0, done.err
+    assert "looks for a region" not in done.out
+    for name in ("transforms.csv", "region.json"):
+        assert (Path("out") / name).read_bytes() == (Path("whole") / name).read_bytes()
+
+
 def test_a_full_disk_is_one_message_and_the_command_continues_elsewhere(run: Run, tmp_path: Path) -> None:
     words = ("motion", "seq", "--unit", "mm", "--region", "region.json", "-o")
     with small_disk(tmp_path / "disk", 4) as disk:

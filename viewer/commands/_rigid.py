@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..analysis.motion.axes import anatomical_axes
 from ..analysis.motion.facts import MotionFacts
-from ..analysis.motion.found import NoRigidRegion, found_region
+from ..analysis.motion.found import NoRigidRegion
 from ..analysis.motion.partial import PartialMotions
 from ..analysis.motion.region import RigidRegion
 from ..analysis.motion.stabilise import FrameMotion, MotionReference, MotionState, WeakLimits, stabilise
@@ -126,23 +126,24 @@ def rigid_part(
         close = f"one point spacing, {limits.shift:.3g}, in place of 0.5 mm"
         warn(f"The unit of the scan is no known length. Scan4D uses {close}. State it with --unit")
     axes = anatomical_axes(args.up) if args.up else anatomical_axes(pose.upright.up, pose.upright.front)
-    known: dict[int, FrameMotion] = {}
+    given = region_rows(args, args.region, reference) if args.region else None
+    positions = pose.cloud.world()
+    key = key_of_partial(args, timeline, reference, positions if given is None else positions[given])
+    kept = PartialMotions(partial, key | {"is_found": given is None})
+    known = kept.read()
     try:
-        rows = _rows(args, timeline, reference)
+        rows = _found_rows(args, timeline, reference, kept, known) if given is None else given
     except NoRigidRegion as error:
         if needed or reference.rest:
             raise
         warn(f"{error}. Each frame in transforms.csv is a gap")
-        known |= dict.fromkeys(range(len(timeline)), FrameMotion.gap(error.what))
+        known = dict.fromkeys(range(len(timeline)), FrameMotion.gap(error.what))
         return RigidPart(timeline, reference, None, np.empty(0, np.int64), limits, axes, known)
     region = MotionReference.of(pose, rows, reference.frame)
     output_folder(args.out)
     if reference.rest:
         reference = reference.averaged(timeline, region)
         region = MotionReference.of(reference.pose, rows, None)
-    key = key_of_partial(args, timeline, reference, reference.pose.cloud.world()[rows])
-    kept = PartialMotions(partial, key)
-    known |= kept.read()
     if known:
         tell(f"Scan4D continues: the motions of {len(known)} of {len(timeline)} frames are known")
     with progress(len(timeline) - len(known)) as tick:
@@ -190,13 +191,20 @@ def region_rows(args: Namespace, file: Path, reference: StartOfMotion) -> NDArra
     return rows
 
 
-def _rows(args: Namespace, timeline: Timeline, reference: StartOfMotion) -> NDArray[np.int64]:
-    """The rows of the region that counts as rigid. Raises InputError."""
-    if args.region:
-        return region_rows(args, args.region, reference)
+def _found_rows(
+    args: Namespace,
+    timeline: Timeline,
+    reference: StartOfMotion,
+    kept: PartialMotions,
+    known: Mapping[int, FrameMotion],
+) -> NDArray[np.int64]:
+    """The rows of the region that Scan4D finds, which are kept. Raises InputError."""
     output_folder(args.out)  # an error comes before the search
-    tell("Scan4D looks for a region that stays rigid in all frames")
-    return found_region(timeline, reference.pose, reference.frame)
+    if not kept.has_region:
+        tell("Scan4D looks for a region that stays rigid in all frames")
+    rows = kept.found_rows(timeline, reference.pose, reference.frame)
+    kept.save(known)
+    return rows
 
 
 def _places(args: Namespace, reference: StartOfMotion) -> dict[str, NDArray[np.float64]]:

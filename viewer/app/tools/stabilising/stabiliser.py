@@ -15,13 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .... import __version__
-from ....analysis.motion.found import found_region
 from ....analysis.motion.partial import PartialMotions
-from ....analysis.motion.region import RigidRegion
 from ....analysis.motion.stabilise import FrameMotion, MotionReference, WeakLimits, stabilise
 from ....document.recording import fingerprint
 from ....errors import InputError
-from ....files import save_json
 from ....folders import cache_folder, forget_oldest
 from ....geometry import Vector
 from ....scan.pose import Pose
@@ -99,12 +96,12 @@ class Motions:
         if self.reference is None:
             timeline.label(frame)  # raises where there is none
             pose = timeline.pose(frame)
-            rows = self._rows(pose, folder / f"{digest}-region.json")
+            with suppress(InputError):  # damaged: all is found again
+                self.known |= kept.read()
+            rows = self._rows(pose, kept)
             reference = MotionReference.of(pose, rows, frame)
             self.rows, self.pose = rows, pose
             self.limits = WeakLimits.of(self.asked.unit, reference.surface.spacing)
-            with suppress(InputError):  # damaged: all is found again
-                self.known |= kept.read()
             self.reference = reference
         saved = time.monotonic()
         try:
@@ -117,24 +114,20 @@ class Motions:
                 kept.save(self.known)
             forget_oldest(folder, _MOST_KEPT)
 
-    def _rows(self, pose: Pose, file: Path) -> NDArray[np.int64]:
-        """The rows of the region; those that Scan4D finds are kept in a file."""
+    def _rows(self, pose: Pose, kept: PartialMotions) -> NDArray[np.int64]:
+        """The rows of the region; those that Scan4D finds are kept."""
         region = self.asked.choices.rigid
         if region is not None:
             return region.rows(pose.cloud, {name: np.array(place) for name, place in self.asked.places})
-        with suppress(InputError):
-            if file.exists():
-                return RigidRegion.read(file).rows(pose.cloud, {})
         announce("Finding the rigid region")
         try:
-            rows = found_region(self.asked.timeline, pose, self.asked.choices.reference)
+            rows = kept.found_rows(self.asked.timeline, pose, self.asked.choices.reference)
         except InputError as error:
             raise InputError(error.what, error.where, "Choose the region in the section Stabilise") from None
         finally:
             over()
-        ids = rows if pose.cloud.ids is None else pose.cloud.ids[rows].astype(np.int64)
-        with suppress(InputError):
-            save_json(file, RigidRegion(np.empty((0, 4)), ids).to_json())
+        with suppress(InputError):  # where it cannot be kept, it is found again next time
+            kept.save(self.known)
         return rows
 
 
