@@ -142,3 +142,17 @@ def test_damaged_bytes_give_other_masks() -> None:
         masks, _ = coder.decode(data)
         assert masks.shape == octree.masks[-1].shape
     assert all(one != other for one, other in pairwise(levels))
+
+
+def test_octants_are_found_in_the_tree_before() -> None:
+    """Found again by looking up the places of all octants."""
+    octree, before = sphere(1500, depth=5), sphere(1200, seed=2, depth=4)
+    coder = OccupancyCoder(before.masks)
+    for level, masks in enumerate(octree.masks):
+        coder.descend(masks, coder.encode(masks)[1])
+        if level < before.depth:
+            there = {tuple(cell): node for node, cell in enumerate(before.cells(level + 1).tolist())}
+            cells = octree.cells(level + 1).tolist()
+            assert coder.counterparts.tolist() == [there.get(tuple(cell), -1) for cell in cells]
+        else:
+            assert (coder.counterparts == -1).all()

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
-from .children import Bytes, Nodes
+from .octree import Bytes, Nodes
 
 MOST_RATIO = 64  # of unpacked to packed: what packs better stays as it is, so that a file cannot promise more
 _LZMA = {
@@ -76,34 +76,29 @@ def differences(values: Bytes, above: Bytes, masks: Bytes, before: Counterparts 
 
 def restored(stored: Bytes, above: Bytes, masks: Bytes, before: Counterparts | None = None) -> Bytes:
     """(n, k) bytes of a level from their `differences`."""
+    from .attribute_kernels import add
+
     values, rows = _expected(above, masks, before)
-    values[rows] += stored.reshape(above.shape[1], -1).T
+    add(values, rows, np.array(stored.reshape(above.shape[1], -1)))  # compiled code takes none read-only
     return values
 
 
-def _expected(above: Bytes, masks: Bytes, before: Counterparts | None) -> tuple[Bytes, NDArray[np.intp]]:
+def _expected(above: Bytes, masks: Bytes, before: Counterparts | None) -> tuple[Bytes, Nodes]:
     """Bytes expected of a level, (n, k), and the nodes of which differences are stored, in their order."""
-    parents, siblings = _families(masks)
-    expected = above[parents]
-    if before is None:
-        return expected, siblings
-    known = before.nodes[siblings] >= 0
-    predicted = siblings[known]
-    expected[predicted] = before.values[before.nodes[predicted]]
-    return expected, np.concatenate([predicted, siblings[~known]])
+    from .attribute_kernels import expect
+
+    nodes, values = before or Counterparts(np.empty(0, np.int32), above[:0])
+    count = int(np.bitwise_count(masks).sum(dtype=np.int64))
+    expected = np.empty((count, above.shape[1]), np.uint8)
+    stored = np.empty(sibling_count(masks), np.int32)
+    expect(np.array(above), np.array(masks), nodes, np.array(values), expected, stored)
+    return expected, stored
 
 
 def sibling_count(masks: Bytes) -> int:
     """How many nodes below are not the only child."""
     counts = np.bitwise_count(masks)
     return int(counts[counts > 1].sum(dtype=np.int64))
-
-
-def _families(masks: Bytes) -> tuple[NDArray[np.int32], NDArray[np.intp]]:
-    """The parent of each child, (n,), and the numbers of the children that have siblings."""
-    counts = np.bitwise_count(masks)
-    parents = np.repeat(np.arange(len(masks), dtype=np.int32), counts)
-    return parents, np.flatnonzero(counts[parents] > 1)
 
 
 def color_bytes(colors: Bytes) -> Bytes:
@@ -139,23 +134,16 @@ def normal_bytes(normals: NDArray[np.float32]) -> Bytes:
     is taken, so that these are the bytes of their own `normals_of`. Cigolle et al. 2014, A Survey of
     Efficient Representations for Independent Unit Vectors.
     """
-    cells = _cells(normals).astype(np.uint16)
-    return _one_of_each()[cells[:, 0] << np.uint16(8) | cells[:, 1]]
+    return _one_of_each()[_cells(normals)]
 
 
-def _cells(normals: NDArray[np.float32]) -> Bytes:
-    length = np.abs(normals).sum(axis=1, keepdims=True)
-    flat = normals / np.where(length > 0, length, np.float32(1))
-    x, y = flat[:, 0], flat[:, 1]
-    below = flat[:, 2] < 0
-    square = np.stack(
-        [
-            np.where(below, (1 - np.abs(y)) * np.where(x < 0, -1, 1), x),
-            np.where(below, (1 - np.abs(x)) * np.where(y < 0, -1, 1), y),
-        ],
-        axis=1,
-    )
-    return np.where(length > 0, np.rint(square * 127) + 128, 0).astype(np.uint8)
+def _cells(normals: NDArray[np.float32]) -> NDArray[np.uint16]:
+    """(n,): 256 times the first byte and the second of each normal."""
+    from .attribute_kernels import cells_of
+
+    cells = np.empty(len(normals), np.uint16)
+    cells_of(np.array(normals), cells)
+    return cells
 
 
 def normals_of(stored: Bytes) -> NDArray[np.float32]:
@@ -166,10 +154,10 @@ def normals_of(stored: Bytes) -> NDArray[np.float32]:
 @cache
 def _one_of_each() -> Bytes:
     """(65536, 2): of each pair of bytes those that stand for its direction, which are their own."""
-    ones = _cells(_normals()).astype(np.uint16)
+    ones = _cells(_normals())
     for _ in range(2):
-        ones = _cells(_normals()[ones[:, 0] << np.uint16(8) | ones[:, 1]]).astype(np.uint16)
-    return ones.astype(np.uint8)
+        ones = _cells(_normals()[ones])
+    return np.stack([ones >> 8, ones & 255], axis=1).astype(np.uint8)
 
 
 @cache

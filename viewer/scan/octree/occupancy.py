@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...errors import InputError
 from ...threads import ranges, shares, together
-from .children import Bytes, Children, Nodes
+from .octree import Bytes, Nodes
 
 _PART = 1 << 16  # nodes of a part, at least, where a level has as many
 
@@ -88,11 +88,9 @@ class OccupancyCoder:
         self._learnt = learnt
         self._agrees = np.zeros(len(masks), np.bool_)
         if self._before:
-            self._agrees = np.append(self._before[0], np.uint8(0))[self.counterparts] == masks
-            children = Children(masks)
-            above_them = self.counterparts[children.parents]
-            self.counterparts = Children(self._before[0]).find(above_them, children.octants)
-            self._before = self._before[1:]
+            other, below = np.append(self._before[0], np.uint8(0)), np.empty(int(first[-1]), np.int32)
+            self._kernels.follow(padded, other, self.counterparts, self._agrees, below)
+            self.counterparts, self._before = below, self._before[1:]
         else:
             self.counterparts = np.full(int(first[-1]), -1, np.int32)
 

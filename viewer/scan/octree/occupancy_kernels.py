@@ -306,6 +306,39 @@ def _fit(sums: NDArray[np.int64], planes: NDArray[np.int32], count: int) -> None
         planes[4, i] = quality + 4 * width if is_plane else 0
 
 
+@compiled
+def follow(
+    masks: NDArray[np.uint8],
+    before: NDArray[np.uint8],
+    counterparts: NDArray[np.int32],
+    agrees: NDArray[np.bool_],
+    below: NDArray[np.int32],
+) -> None:
+    """Find the children of nodes in the tree before.
+
+    masks, before: (n + 1,), (m + 1,), of the nodes of a level and of the tree before, the last of none.
+    counterparts: (n,), the same octants there, -1: none. Filled are agrees, (n,): whether both masks are the
+    same; below: (k,), counterparts of the children.
+    """
+    first = np.empty(len(before), np.int32)
+    total = 0
+    for node in range(len(before)):
+        first[node] = total
+        total += _HOW_MANY[before[node]]
+    child = 0
+    for node in range(len(masks) - 1):
+        other = _whole(counterparts[node])
+        there = _whole(before[np.uint32(other if other >= 0 else len(before) - 1)])
+        agrees[node] = there == masks[node]
+        left = _whole(masks[node])
+        while left:
+            octant = _LOWEST[np.uint32(left)]
+            left &= left - 1
+            is_there = there >> octant & 1
+            below[child] = first[other] + _RANKS[there, np.uint32(octant)] if is_there else -1
+            child += 1
+
+
 # --- coding -------------------------------------------------------------------------------
 
 

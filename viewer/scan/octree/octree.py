@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+Bytes = NDArray[np.uint8]
+Nodes = NDArray[np.int32]  # numbers of nodes of one level, -1 for none
+
 DEEPEST = 21  # the last level: three coordinates of 21 bits are a Morton code of 63
 _AT_ONCE = 1 << 16  # nodes worked on together, so that steps between take little memory
 _TOGETHER = (  # shifts and masks that bring every third bit together

@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ..points import UNKNOWN_UNIT, PointCloud
 from . import coding
-from .children import Bytes, Nodes
 from .coding import Counterparts
 from .occupancy import OccupancyCoder
-from .octree import DEEPEST, Attributes, Octree
+from .octree import DEEPEST, Attributes, Bytes, Nodes, Octree
 
 MAGIC = b"\x8dSVO"
 VERSION = 5
