@@ -75,20 +75,36 @@ vec2 surface_beyond(Window window, vec2 around, float depth, int level) {
     return span;
 }
 
-// How far samples lie to each of eight sides of a pixel; and how much farther to that side than beside it.
+// How far samples lie to each of eight sides of a pixel; how much farther to that side than beside it; and of the nearest
+// that is ahead, within a right angle, its distance and cell.
 struct Sides {
     vec4 low, high;
     vec4 low_ahead, high_ahead;
+    vec4 low_nearest, high_nearest;
+    ivec4 low_cell, high_cell;
 };
 
-const Sides NO_SIDES = Sides(vec4(1e9), vec4(-1e9), vec4(1e9), vec4(-1e9));
+const int NO_CELL = -1;  // of what no cell shows
+const Sides NO_SIDES =
+    Sides(vec4(1e9), vec4(-1e9), vec4(1e9), vec4(-1e9), vec4(1e9), vec4(1e9), ivec4(NO_CELL), ivec4(NO_CELL));
 
-void extend(inout Sides sides, vec2 offset) {
+void extend(inout Sides sides, vec2 offset, int cell) {
     vec4 along = vec4(offset, sqrt(0.5) * vec2(offset.x + offset.y, offset.x - offset.y)), beside = abs(along.yxwz);
     sides.low = min(sides.low, along);
     sides.high = max(sides.high, along);
     sides.low_ahead = min(sides.low_ahead, along + beside);
     sides.high_ahead = max(sides.high_ahead, along - beside);
+    float away = length(offset);
+    for (int k = 0; k < 4; ++k) {
+        if (along[k] + beside[k] <= 0.0 && away < sides.low_nearest[k]) {
+            sides.low_nearest[k] = away;
+            sides.low_cell[k] = cell;
+        }
+        if (along[k] - beside[k] >= 0.0 && away < sides.high_nearest[k]) {
+            sides.high_nearest[k] = away;
+            sides.high_cell[k] = cell;
+        }
+    }
 }
 
 // Whether they lie on all sides. outside: how far the pixel may be beside them, in cells.

@@ -1,19 +1,26 @@
 // Pixels without a sample show what those of the finest target around them give (Farooq 2013, 4.3.3). Depth-aware: only
 // samples of one surface are blended, of the nearest that encloses the pixel, so that outlines do not grow (the limit of
 // 4.4.4). UPSAMPLING 0 nearest, 1 bilinear, 2 bicubic. FRAMED: samples are on a grid, so that what the picture's frame
-// cuts off is known to be surface.
+// cuts off is known to be surface; <source> says which are neighbours there.
 #include "common/item.glsl"
 #include "common/list.glsl"
 #include "common/split.glsl"
 #include <params>
 #include "pyramidal/around.glsl"
 #include "pyramidal/pixels.glsl"
+#if FRAMED
+#include <source>
+
+layout(binding = TEXTURE_BEST) uniform usamplerBuffer best;  // of the targets' cells
+#endif
 
 layout(binding = TEXTURE_SHOWN) uniform usamplerBuffer shown;  // by the targets' samples
 layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed_cells;
 
 const float SLANTED = 1.5;  // times as far apart samples of a grid may lie where a surface is seen aslant
 const float AHEAD = 0.59;   // how far beside a pixel on an outline the nearest sample may lie, in sample spacings
+const float NARROW = 2.0;   // width of a gap that is one between samples in any case, in sample spacings
+const int BETWEEN = 3;      // samples from one to the other of neighbours: a cell shows one of several
 const float LEAST = 1e-3;  // weight of samples beyond a kernel's reach, before distance
 
 float kernel(float x) {
@@ -52,9 +59,9 @@ void extend_beyond_frame(inout Sides sides, vec2 offset, Window window, float ap
     vec2 frame = vec2(before.x < after.x ? -before.x : after.x, before.y < after.y ? -before.y : after.y);
     vec2 mirrored = 2.0 * frame - offset;
     bvec2 near = lessThan(abs(frame), vec2(apart));
-    if (near.x) extend(sides, vec2(mirrored.x, offset.y));
-    if (near.y) extend(sides, vec2(offset.x, mirrored.y));
-    if (all(near)) extend(sides, mirrored);
+    if (near.x) extend(sides, vec2(mirrored.x, offset.y), NO_CELL);
+    if (near.y) extend(sides, vec2(offset.x, mirrored.y), NO_CELL);
+    if (all(near)) extend(sides, mirrored, NO_CELL);
 }
 #endif
 
@@ -99,10 +106,22 @@ Sides sides_around(ivec2 pixel, int level, float farthest, float apart) {
     EACH_CELL(window, cell) {
         vec2 offset = offset_to(window, cell);
         if (isinf(depth_of(cell)) || dot(offset, offset) > farthest * farthest) continue;
-        extend(sides, offset);
+        extend(sides, offset, cell);
         extend_beyond_frame(sides, offset, window, apart);
     }
     return sides;
+}
+
+// Whether the gap that a pixel lies in is one between samples of a grid, rather than between two parts of the subject:
+// narrow, or with neighbours in a range image on either side. apart: samples, in cells.
+bool is_between(Sides sides, float apart) {
+    for (int k = 0; k < 4; ++k) {
+        if (sides.low_nearest[k] + sides.high_nearest[k] <= NARROW * apart) return true;
+        int low = sides.low_cell[k], high = sides.high_cell[k];
+        if (low == NO_CELL || high == NO_CELL) continue;
+        if (are_neighbors(texelFetch(best, low).r, texelFetch(best, high).r, BETWEEN)) return true;
+    }
+    return false;
 }
 #endif
 
@@ -131,7 +150,7 @@ Given given_by(ivec2 pixel, int level) {
 #if FRAMED
     if (gap) {
         all_around = sides_around(pixel, level, farthest, apart);
-        bay = !is_ahead(all_around, (margin + AHEAD) * apart);
+        bay = !is_ahead(all_around, (margin + AHEAD) * apart) || !is_between(all_around, apart);
     }
 #endif
     for (int n = 0; n < SURFACES && isinf(given.surface.x); ++n) {
@@ -143,11 +162,11 @@ Given given_by(ivec2 pixel, int level) {
             if (here < span.x || here > span.y) continue;
             vec2 offset = offset_to(window, cell);
             if (dot(offset, offset) > farthest * farthest) continue;
-            extend(sides, offset);
+            extend(sides, offset, cell);
 #if FRAMED
             if (gap) extend_beyond_frame(sides, offset, window, apart);
 #endif
-            extend(all_around, offset);
+            extend(all_around, offset, cell);
             if (dot(offset, offset) < least) nearest = span;
             least = min(least, dot(offset, offset));
         }

@@ -27,8 +27,8 @@ bool is_hidden(int i, float depth, int level, int dense) {
     Sides sides = NO_SIDES;
     EACH_CELL(window, cell) {
         if (depth_of(cell) > span.y) continue;
-        extend(sides, offset_to(window, cell));
-        if (are_neighbors(texelFetch(best, cell).r, rows[i])) return false;
+        extend(sides, offset_to(window, cell), cell);
+        if (are_neighbors(texelFetch(best, cell).r, rows[i], neighbors)) return false;
     }
     return encloses(sides, 0.0);
 }

@@ -14,7 +14,7 @@ layout(binding = TEXTURE_VALUES) uniform samplerBuffer values;
 vec3 place_of(uint row) { return to_view(texelFetch(positions, int(row)).xyz); }
 
 // Points have no neighbours that are known.
-bool are_neighbors(uint row, uint other) { return false; }
+bool are_neighbors(uint row, uint other, int most) { return false; }
 
 void own_pixel(ivec2 pixel, uint item_index, inout float depth, out uint row, out Seen seen) {
     row = item_index;

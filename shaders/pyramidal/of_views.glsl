@@ -18,10 +18,10 @@ vec3 place_of(uint row) {
 }
 
 // Whether samples are near to each other in one range image, and of one surface there (Farooq 2013, algorithm 6.5).
-bool are_neighbors(uint row, uint other) {
+bool are_neighbors(uint row, uint other, int most) {
     ivec4 here = sample_of_id(row, RANGE_COUNT), there = sample_of_id(other, RANGE_COUNT);
     int apart = max(abs(here.z - there.z), abs(here.w - there.w));
-    if (here.x != there.x || apart > neighbors) return false;
+    if (here.x != there.x || apart > most) return false;
     RangeView v = range_view(here.x);
     float depth = sample_depth(sample_index(v, 0, here.zw)), beside = sample_depth(sample_index(v, 0, there.zw));
     return abs(depth - beside) <= STEEPEST * float(max(apart, 1)) * sample_spacing(v, 0, min(depth, beside));

@@ -257,6 +257,24 @@ def test_points_do_not_spill_into_bays(draw: Draw) -> None:
     assert drawn[beyond < -4].all(), "no holes but along the outline"
 
 
+def beside_slit(row: NDArray[np.float64], column: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far a place lies from an oblique slit that narrows to a point, in samples; below 0 within it."""
+    return (abs(column + 0.3 * row) - (row + 40) / 5) / np.hypot(1, 1 / 5)
+
+
+@pytest.mark.parametrize("step", [0, 8])
+def test_points_do_not_close_a_slit_between_two_parts(draw: Draw, step: int) -> None:
+    """Samples four pixels apart, of two sheets so many samples behind one another; distances in pixels."""
+    y, x = np.mgrid[:96, :96] - 47.5
+    view = heights(np.where(x + 0.3 * y < 0, -500, -500 - step), beside_slit(y, x) > 0)
+    camera, size = straight_above((64, 64), 4.0)
+    surface = draw((view,), camera, size, "pyramidal", params={"primitive": "points"})
+    beside = 4 * beside_slit(*((np.mgrid[: size[1], : size[0]] + 0.5) / 4 - 32))
+    drawn = np.isfinite(surface.depth)
+    assert np.quantile(-beside[drawn & (beside < 0)], 0.95) <= 2
+    assert drawn[beside > 4].all(), "no holes but along the slit"
+
+
 y, x = np.mgrid[:64, :64] - 31.5
 OUTLINES = {
     "square": (np.maximum(abs(x), abs(y)) < 20, 0.0),

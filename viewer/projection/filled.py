@@ -160,7 +160,7 @@ def _fill(
     surface.stats.counted["cells"] = targets.read_holes
     with gpu.timers.measure("fill"):
         defines = {"UPSAMPLING": _UPSAMPLING[upsampling], **source.defines(channels)}
-        program = gpu.compute("pyramidal/fill.comp", defines, params=source.params)
+        program = gpu.compute("pyramidal/fill.comp", defines, source.parts, source.params)
         _bind(surface, source, channels)
         targets.bind()
         holes.texels.bind(Texture.LISTED)
