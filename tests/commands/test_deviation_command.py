@@ -74,6 +74,27 @@ def test_stabilised_frames_of_a_rigid_patch_do_not_deviate(run: Run) -> None:
     assert json.loads(Path("mean/report.json").read_text())["reference"]["mean"]["frames"] == [1, 2, 3]
 
 
+def test_m3c2_tells_the_least_that_it_detects(run: Run) -> None:
+    Path("region.json").write_text('{"spheres": [[0, 0, 0, 16]]}')
+    words = ("deviation", "seq", "--unit", "mm", "--to", "seq", "--method", "m3c2", "--reach", "9")
+    recorded = run(*words, "--cylinder", "3", "--whole-cylinder", "-o", "out")
+    assert recorded.code == 0, recorded.err
+    moved = np.load("out/0003.npz")
+    assert moved["value"].dtype == moved["detectable"].dtype == np.float32
+    assert table("out/deviation.csv")[0]["detected"] == "0.0"
+    assert float(table("out/deviation.csv")[2]["detected"]) > 0.5
+    report = json.loads(Path("out/report.json").read_text())["m3c2"]
+    assert (report["cylinder"], report["whole"]) == (3.0, True)
+    still = run(
+        *words, "--cylinder", "3", "--whole-cylinder", "--stabilise", "--region", "region.json", "-o", "still"
+    )
+    assert still.code == 0, still.err
+    settled = np.load("still/0003.npz")
+    known = np.isfinite(settled["value"]) & np.isfinite(moved["value"])
+    assert np.abs(settled["value"][known]).mean() < 0.2 * np.abs(moved["value"][known]).mean()
+    assert (settled["detectable"][known] > 0).all(), "the motion is not sure"
+
+
 def test_a_frame_that_cannot_be_read_has_an_empty_row_and_a_reason(run: Run) -> None:
     Path("above/1.xyz").write_text("no numbers here\n")
     done = run("deviation", "above", "--to", "floor.obj", "-o", "out")
@@ -94,6 +115,10 @@ def test_a_frame_that_cannot_be_read_has_an_empty_row_and_a_reason(run: Run) -> 
         (("--to", "floor.obj", "--region", "region.json"), "Add --stabilise"),
         (("--to", "floor.obj", "--reach", "0"), "not a positive length"),
         (("--to", "floor.obj", "--reach", "far"), "not a positive length"),
+        (("--to", "floor.obj", "--cylinder", "2"), "Add --method m3c2"),
+        (("--to", "floor.obj", "--whole-cylinder"), "Add --method m3c2"),
+        (("--to", "floor.obj", "--method", "m3c2", "--normal", "-1"), "not a positive length"),
+        (("--to", "floor.obj", "--method", "c2c"), "m3c2"),
         ((), "--to"),
     ],
 )

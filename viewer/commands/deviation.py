@@ -1,7 +1,8 @@
 """Measure signed distances from a reference surface.
 
 Scan4D writes into DIR: deviation.csv with statistics of each frame, one NPZ file of values per frame, and
-report.json. Positive values are outside. A point beyond the border of the reference has no value.
+report.json. Positive values are outside. A point beyond the border of the reference has no value. With
+M3C2, values are distances between means of points, and each has a level of detection.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..analysis.deviation.m3c2 import M3C2Reference
 from ..analysis.deviation.reference import ESTIMATED, DeviationReference, deviation_reference
-from ..analysis.deviation.statistics import DeviationStatistics
+from ..analysis.deviation.statistics import DeviationStatistics, detected_share
 from ..analysis.motion.stabilise import FrameMotion
 from ..csv_text import cell, save_rows
 from ..document.saved_session import known_as
@@ -36,6 +38,9 @@ from ._scans import SCAN_HELP, open_timeline, report
 _TABLE, _REPORT, _PARTIAL = "deviation.csv", "report.json", "transforms.partial"
 _COLUMNS = ("frame", "time", "mean", "rms", "p95", "max", "share")
 _REACH = 0.1  # of the longest edge of the box around the reference
+_SURFACE, _M3C2 = "surface", "m3c2"
+_VALUE, _DETECTABLE, _DETECTED = "value", "detectable", ("detected",)
+_NONE = {_VALUE: np.empty(0, np.float32), _DETECTABLE: np.empty(0, np.float32)}
 _FEW = 0.5  # of the points: a warning where fewer have a value
 
 
@@ -61,9 +66,28 @@ def add_arguments(parser: ArgumentParser) -> None:
         "Scan4D finds it",
     )  # fmt: skip
     parser.add_argument(
-        "--reach", type=_reach, metavar="LENGTH",
+        "--reach", type=_length, metavar="LENGTH",
         help="distance from the reference beyond which a point has no value, in the unit of the scan; "
         "default: a tenth of the longest edge of the reference",
+    )  # fmt: skip
+    parser.add_argument(
+        "--method", choices=(_SURFACE, _M3C2), default=_SURFACE,
+        help="distance from the nearest place of the reference surface, or M3C2 (Lague et al. 2013): "
+        "distance between the means of the points in a cylinder; default surface",
+    )  # fmt: skip
+    parser.add_argument(
+        "--cylinder", type=_length, metavar="RADIUS",
+        help="with M3C2: radius of the cylinder; default: 2.5 times the spacing of the reference",
+    )  # fmt: skip
+    parser.add_argument(
+        "--normal", type=_length, metavar="RADIUS",
+        help="with M3C2: radius around a point whose plane gives its normal; default: 3 times the spacing "
+        "of the reference, or 12.5 times its noise if that is more",
+    )  # fmt: skip
+    parser.add_argument(
+        "--whole-cylinder", action="store_true",
+        help="with M3C2: average all points up to the reach, as the paper has it; default: the cylinder "
+        "grows until it holds the surface",
     )  # fmt: skip
     add_output_argument(parser, "folder for the results", "DIR")
 
@@ -72,6 +96,8 @@ def run(args: Namespace) -> int:
     """Write the table, the values and the report."""
     if args.region and not args.stabilise:
         raise InputError("--region names what is stabilised", hint="Add --stabilise")
+    if args.method != _M3C2 and (args.cylinder or args.normal or args.whole_cylinder):
+        raise InputError("--cylinder, --normal and --whole-cylinder belong to M3C2", hint="Add --method m3c2")
     with open_timeline(args, args.scan) as timeline, _opened(args, timeline) as other:
         for path in _written(args, timeline, other):
             tell(path)
@@ -83,16 +109,17 @@ class _Compared:
     """The reference, and the motions that take frames back to it.
 
     reach: distance beyond which a point has no value, scan units. motions: from the reference to each frame;
-    None: frames stay as recorded. facts: for the report.
+    None: frames stay as recorded. middle: of the region that the motions are of, (3,). facts: for the report.
     """
 
     reference: DeviationReference
     reach: float
     motions: Mapping[int, FrameMotion] | None
+    middle: np.ndarray | None
     facts: dict[str, Any]
 
 
-def _reach(text: str) -> float:
+def _length(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
@@ -121,26 +148,28 @@ def _written(args: Namespace, timeline: Timeline, other: Timeline) -> list[Path]
     claim([table, facts, *files], inputs, args.force)
     compared = _compared(args, timeline, other)
     output_folder(args.out)
-    rows, left_out = [], {}
+    rows, shares, left_out = [], [], {}
     with progress(len(timeline)) as tick:
         for index, file in enumerate(files):
             if index + 1 < len(timeline):
                 timeline.request(index + 1)
             try:
-                values = _values(compared, timeline, index)
-                _save(file, values)
+                arrays = _measured(compared, timeline, index)
+                _save(file, arrays)
             except InputError as error:
-                left_out[index], values = error.what, np.empty(0, np.float32)
+                left_out[index], arrays = error.what, _NONE
                 file.unlink(missing_ok=True)  # that of an earlier run
-            found = DeviationStatistics.of(values)
-            rows.append((index + 1, float(timeline.times[index]), *map(cell, found)))
+            found = DeviationStatistics.of(arrays[_VALUE])
+            shares.append(found.share)
+            beyond = [detected_share(**arrays)] if args.method == _M3C2 else []
+            rows.append((index + 1, float(timeline.times[index]), *map(cell, [*found, *beyond])))
             tick()
     report(timeline, 0)
-    save_rows(table, [_COLUMNS, *rows])
+    save_rows(table, [_COLUMNS + (_DETECTED if args.method == _M3C2 else ()), *rows])
     reasons = {str(index + 1): reason for index, reason in left_out.items()}
     save_json(facts, {**compared.facts, "left_out": reasons})
     (args.out / _PARTIAL).unlink(missing_ok=True)
-    _tell(timeline, compared, [float(row[-1] or 0) for row in rows], left_out)
+    _tell(timeline, compared, shares, left_out)
     return [table, facts, *(file for index, file in enumerate(files) if index not in left_out)]
 
 
@@ -148,17 +177,27 @@ def _compared(args: Namespace, timeline: Timeline, other: Timeline) -> _Compared
     """The reference, and the motions from it to each frame. Raises InputError."""
     start = _start(args, timeline, other)
     found: dict[str, Any] = {"version": __version__, "scan": timeline.name, "unit": timeline.unit}
-    motions = None
+    motions = middle = None
     faces = other.faces(start.pose.index).triangles()
     if args.stabilise:
         rigid = rigid_part(args, timeline, start, args.out / _PARTIAL)
         start, motions, found["rigid"] = rigid.reference, rigid.known, rigid.facts(args.region or "found")
         tell_rigid(rigid)
-    reference = deviation_reference(start.pose, faces)
+        middle = None if rigid.region is None else rigid.region.middle
+    reference: DeviationReference
+    if args.method == _M3C2:
+        reference = M3C2Reference(start.pose, args.cylinder, args.normal, args.whole_cylinder)
+        found["m3c2"] = {
+            "cylinder": reference.cylinder,
+            "normal": reference.normal,
+            "whole": args.whole_cylinder,
+        }
+    else:
+        reference = deviation_reference(start.pose, faces)
     bounds = start.pose.bounds
     reach = args.reach or _REACH * float((bounds.high - bounds.low).max())
     found |= {"reference": {**start.facts(), "outside_by": reference.outside_by}, "reach": reach}
-    return _Compared(reference, reach, motions, found)
+    return _Compared(reference, reach, motions, middle, found)
 
 
 def _start(args: Namespace, timeline: Timeline, other: Timeline) -> StartOfMotion:
@@ -174,21 +213,32 @@ def _start(args: Namespace, timeline: Timeline, other: Timeline) -> StartOfMotio
     return StartOfMotion(other.pose(int(args.to_pose)), f"{args.to} {args.to_pose}", None, scan=args.to)
 
 
-def _values(compared: _Compared, timeline: Timeline, index: int) -> np.ndarray:
-    """The deviations of a frame, (N,) float32, in the order of its file. Raises InputError."""
-    cloud = timeline.pose(index).cloud
+def _measured(compared: _Compared, timeline: Timeline, index: int) -> dict[str, np.ndarray]:
+    """The deviations of a frame, and with M3C2 the least that noise does not explain: (N,) float32, in the
+    order of its file. Raises InputError."""
+    cloud, reference = timeline.pose(index).cloud, compared.reference
     found = FrameMotion.still() if compared.motions is None else compared.motions[index]
     if found.motion is None:
         raise InputError(found.reason)
-    values = np.full(len(cloud) + cloud.dropped, np.nan, np.float32)
+    positions = found.motion.inverse.points(cloud.world())
+    if isinstance(reference, M3C2Reference):
+        distances = reference.distances(positions, compared.reach)
+        moved: np.ndarray | float = 0.0
+        if compared.middle is not None:
+            moved = found.deviations_at(positions, distances.directions, compared.middle)
+        known = {_VALUE: distances.values, _DETECTABLE: distances.detectable(moved)}
+    else:
+        known = {_VALUE: reference.signed(positions, compared.reach)}
     rows = slice(None) if cloud.ids is None else cloud.ids
-    values[rows] = compared.reference.signed(found.motion.inverse.points(cloud.world()), compared.reach)
-    return values
+    arrays = {name: np.full(len(cloud) + cloud.dropped, np.nan, np.float32) for name in known}
+    for name, values in known.items():
+        arrays[name][rows] = values
+    return arrays
 
 
-def _save(file: Path, values: np.ndarray) -> None:
+def _save(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
     with whole_file(file) as part, open(part, "wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, value=values)
+        np.savez_compressed(stream, allow_pickle=False, **arrays)
 
 
 def _tell(timeline: Timeline, compared: _Compared, shares: list[float], left_out: Mapping[int, str]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from ...mesh.nearest import NearestOnMesh
 from ...scan.estimate import with_estimates
 from ...scan.faces import Triangles, rows_of_faces
 from ...scan.noise import noise_of
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...threads import shares, together
 from ..motion.stabilise import moment_surface
@@ -34,19 +35,31 @@ class DeviationReference(Protocol):
         NaN where the surface is farther than a reach, over its holes, and beyond its border."""
 
 
+class Sided(NamedTuple):
+    """A cloud with normals, and where they come from: STORED or ESTIMATED."""
+
+    cloud: PointCloud
+    by: str
+
+
+def sided(pose: Pose) -> Sided:
+    """The cloud of a pose with the normals of the scan. Where it has none, Scan4D estimates them."""
+    if pose.cloud.normals is not None:
+        return Sided(pose.cloud, STORED)
+    return Sided(with_estimates(pose, ("normals",)).cloud, ESTIMATED)
+
+
 class PointReference:
     """The surface that the points of a pose show: parabolas around them, see `tracking.surface_kernels`, and
     planes where these do not fit.
 
-    Normals tell the side: those of the scan; where it has none, Scan4D estimates them.
+    Normals tell the side, see `sided`.
     """
 
     def __init__(self, pose: Pose) -> None:
         if not pose.count:
             raise InputError("has no points to compare with", pose.label)
-        has_normals = pose.cloud.normals is not None
-        self.outside_by = STORED if has_normals else ESTIMATED
-        cloud = (pose if has_normals else with_estimates(pose, ("normals",))).cloud
+        cloud, self.outside_by = sided(pose)
         self._origin = cloud.origin
         self._surface = moment_surface(cloud, cloud.origin)
 

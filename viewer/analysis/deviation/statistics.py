@@ -33,3 +33,10 @@ class DeviationStatistics(NamedTuple):
         return cls(
             float(known.mean()), float(rms), float(np.quantile(sizes, 0.95)), float(sizes.max()), share
         )
+
+
+def detected_share(value: NDArray[np.floating], detectable: NDArray[np.floating]) -> float:
+    """The share of values (N,) that exceed the least detectable one (N,); of all that are known, NaN if none
+    is."""
+    known = np.isfinite(value)
+    return float((np.abs(value[known]) > detectable[known]).mean()) if known.any() else np.nan

@@ -95,6 +95,17 @@ class FrameMotion:
         variances = [np.einsum("ai,ij,aj->a", axes, block, axes) for block in (turn, shift)]
         return np.sqrt(np.concatenate(variances)) * np.repeat([np.degrees(1.0), 1.0], 3)
 
+    def deviations_at(self, positions: Float, directions: Float, middle: Float) -> Float:
+        """Standard deviations of the place of positions (N, 3) along directions (N, 3), (N,), scan units.
+
+        All are of the reference, and so is the middle (3,) of the region. None of it in a gap.
+        """
+        assert self.motion is not None
+        ahead = self.motion.directions(directions)
+        turned = np.cross(self.motion.directions(positions - middle), ahead)
+        both = np.concatenate([ahead, turned], axis=1)
+        return np.sqrt(np.einsum("ni,ij,nj->n", both, self.covariance, both))
+
     def spread(self, axes: Float) -> Float:
         """The ± that Scan4D reports: 1.96 of the `deviations`."""
         return _TOLD * self.deviations(axes)
