@@ -204,7 +204,7 @@ def shown(app: App) -> dict[str, Any]:
         "landmarks": landmarks(app),
         "followed": {name: track.is_whole for name, track in app.tools.followed.tracks.items()},
         "measured": {name: one.values.tolist() for name, one in app.tools.followed.series.items()},
-        "motion": {name: one.values.tolist() for name, one in app.tools.followed.motion.items()},
+        "curves": {name: one.values.tolist() for name, one in app.tools.followed.all_curves.items()},
         "distances": distances(app),
         "camera": document.camera and document.camera.to_json(),
         "document": plain(document),

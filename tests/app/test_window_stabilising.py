@@ -114,10 +114,10 @@ def test_from_opening_to_a_stabilised_film_coloured_by_distance_in_eight_actions
         assert (pictures[0] == pictures[1]).all(), "its colours are computed again"
         assert np.abs(pictures[0] - pictures[2]).mean() < 1
         assert len(np.unique(pictures[0].reshape(-1, 3), axis=0)) > 1000, "it is coloured"
-        rises = app.state.motion["Residual (RMS)"]
+        rises = app.state.curves["Residual (RMS)"]
         assert 0 < rises[1] < 0.5
         assert np.isnan(rises[GAP])
-        turn = np.array([app.state.motion[f"Rotation, {axis}"] for axis in AXES])[:, 2]
+        turn = np.array([app.state.curves[f"Rotation, {axis}"] for axis in AXES])[:, 2]
         wanted = Rotation.from_matrix(truth(2, 0).rotation).magnitude()
         assert np.linalg.norm(np.radians(turn)) == pytest.approx(wanted, abs=0.01)
         app.press("shift+u")
@@ -136,7 +136,7 @@ def test_a_region_is_painted_shown_and_taken_back(tmp_path: Path, scan: Path, sc
     ):
         app.press("Right")
         app.choose(PANEL, "##region", "###painted")
-        app.act(PANEL, ("item_click", "###paint"))
+        app.act(PANEL, ("item_click", "###paint region"))
         assert app.settle().frame == 0, "painting is in the reference frame"
         assert app.state.clicking == "stabilising"
         left, top, width, height = app.view()
@@ -152,6 +152,13 @@ def test_a_region_is_painted_shown_and_taken_back(tmp_path: Path, scan: Path, sc
         more = app.settle().document["parts"]["stabilising"]
         assert len(more["spheres"]) == len(painted["spheres"]) + 1, "a click paints, too"
         app.press("ctrl+z")
+        assert app.state.document["parts"]["stabilising"] == painted
+        app.act(PANEL, ("item_click", "###erase region"))
+        app.drag((left + width * 0.5, y), (left + width * 0.55, y))
+        erased = app.settle().document["parts"]["stabilising"]["spheres"]
+        assert [one[3] < 0 for one in erased].count(True) >= 1, "the eraser removes what lies within it"
+        assert app.state.undoes == "Erase from region"
+        app.press("ctrl+z", "shift+g")
         assert app.state.document["parts"]["stabilising"] == painted
         app.do(("mousemove", left + 5, top + height - 5), ("click", 1))
         app.told("No surface here")

@@ -15,6 +15,7 @@ from PIL import Image
 from rigid_hills import pose_of_head
 from virtual_screen import PANEL, ROOT, RunningApp, Screen, running_app, virtual_screen, wait_until_stored
 
+from viewer.analysis.motion.curves import PATH
 from viewer.document.recording import Recording
 from viewer.look import Look
 from viewer.scan import formats
@@ -113,7 +114,8 @@ def test_colors_are_chosen_and_points_are_there_after_the_next_start(
 def chosen(app: RunningApp, folder: Path, scan: Path) -> list[float]:
     """Follow points, and colour them in several ways; gives the ends of the colour map."""
     app.act(PANEL, ("item_click", "Follow points"))
-    assert app.settle().document["parts"]["dense_tracking"] == {"is_on": True, "reference": 0}
+    parts = app.settle().document["parts"]
+    assert parts["dense_tracking"] == {"is_on": True, "reference": 0, "spheres": []}
     app.press("Right")
     for name in ("normal displacement", "first principal strain", "area change"):
         app.choose(PANEL, "##motion color", f"###{name}")
@@ -123,7 +125,15 @@ def chosen(app: RunningApp, folder: Path, scan: Path) -> list[float]:
     app.choose(PANEL, "##motion color", "###point speed")
     look = app.settle().document["look"]
     assert (look["low"], look["color_map"]) == (0, "batlow")
-    app.press("Right")
+    app.act(PANEL, ("item_click", "###paint tracked region"))
+    left, top, width, height = app.settle() and app.view()
+    app.drag((left + width * 0.45, top + height // 2), (left + width * 0.5, top + height // 2))
+    app.press("Escape")
+    distances = app.see(lambda state: PATH[3] in state.curves).curves[PATH[3]]
+    assert distances[0] == 0
+    assert len(distances) == FRAMES
+    assert np.diff(distances).min() > 0.1, "the region moves along with the whole"
+    app.press("Right", "Right")
     app.act(PANEL, ("item_click", "###reference of points"))
     assert app.settle().document["parts"]["dense_tracking"]["reference"] == 2
     assert not {where for where in app.state.cut if "tracking" in str(where).lower()}

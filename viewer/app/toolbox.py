@@ -119,6 +119,7 @@ class Slot:
             act=partial(self.do, entry.act),
             is_on=None if is_on is None else lambda: bool(self.ask(is_on)),
             can=lambda: bool(self.ask(entry.can)),
+            is_there=lambda: bool(self.ask(entry.is_there)),
         )
 
     def _items(self, listing: Listing) -> Iterator[Item]:

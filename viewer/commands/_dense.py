@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.motion.dense import DensePoints, PointState, follow_points
-from ..analysis.motion.displacements import Displacements
+from ..analysis.motion.displacements import mean_path_of
 from ..analysis.motion.partial_frames import PartialFrames
 from ..csv_text import cell
 from ..scan.timeline import Timeline
@@ -65,7 +65,7 @@ def path_rows(
     table: list[Sequence[object]] = [_COLUMNS]
     for file, rows in paths.items():
         frames = map(kept.read, range(len(timeline)))
-        path = Displacements.of(reference, frames, rows).mean_path(np.arange(len(rows)))
+        path = mean_path_of(reference, frames, rows)
         for index, position in enumerate(path.positions):
             motion = rigid.known[index].motion
             stabilised = np.full(3, np.nan) if motion is None else motion.inverse.points(position)

@@ -23,6 +23,7 @@ from viewer.analysis.motion.quantities import (
     SPEED,
     TANGENTIAL,
 )
+from viewer.analysis.motion.region import RigidRegion
 from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known
 from viewer.analysis.tracking import Tracker
@@ -94,6 +95,18 @@ def numbers(
     """A number at all points of a frame."""
     rows = points.rows_nearest(points.timeline.pose(frame))
     return points.of_pose(name, frame, rows, still if motions is None else motions.get)
+
+
+def test_a_region_has_a_mean_path() -> None:
+    points = followed(opened())
+    cloud = points.timeline.pose(0).cloud
+    region = RigidRegion(np.array([[4.0, 2.0, 0.0, 3.0]]), np.empty(0, np.int64))
+    middle = cloud.world()[region.rows(cloud, {})].mean(axis=0)
+    path = points.mean_path(region)
+    right = [(middle[0] * (1 + STRETCH * each), middle[1], RISE * each) for each in range(FRAMES)]
+    assert np.allclose(path.positions, right, atol=0.02)
+    with pytest.raises(InputError, match="no followed points"):
+        points.mean_path(RigidRegion(np.array([[0.0, 0, 99.0, 1.0]]), np.empty(0, np.int64)))
 
 
 def test_numbers_of_a_sheet_that_stretches_and_rises() -> None:

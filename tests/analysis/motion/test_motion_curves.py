@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from viewer.analysis.measures.curves import unit_of
 from viewer.analysis.motion.axes import anatomical_axes
-from viewer.analysis.motion.curves import RESIDUAL, SHIFTS, TURNS, motion_curves
+from viewer.analysis.motion.curves import LOST, PATH, RESIDUAL, SHIFTS, TURNS, motion_curves, path_curves
+from viewer.analysis.motion.displacements import MeanPath
 from viewer.analysis.motion.stabilise import FEW, FrameMotion
 from viewer.analysis.track import Known
 from viewer.rigid import Rigid, rigid_matrix
@@ -42,3 +43,21 @@ def test_curves_are_along_the_axes_of_the_subject_and_have_its_gaps() -> None:
     assert np.isnan(vertical.values[1:]).all()
     assert vertical.note(2) == FEW
     assert [unit_of(curves[name].quantity, "mm") for name in (TURNS[0], SHIFTS[0])] == ["°", "mm"]
+
+
+def test_the_mean_path_of_a_region_begins_at_0_and_has_gaps() -> None:
+    axes, times = anatomical_axes("+z", 90.0), np.arange(4) / 25
+    positions = MIDDLE + np.array([[1.0, 0, 0], [4, 4, 0], [np.nan] * 3, [1, 0, 2]])
+    path = MeanPath(positions, np.array([0, 0.1, np.nan, 0.2]), np.ones(4))
+    recorded = path_curves(path, 0, times, axes)
+    assert tuple(recorded) == PATH
+    along = np.array([recorded[name].values for name in PATH[:3]])
+    np.testing.assert_allclose(along[:, 1], axes @ [3.0, 4, 0], atol=1e-9)
+    distance = recorded[PATH[3]]
+    np.testing.assert_allclose(distance.values, [0, 5, np.nan, 2], atol=1e-9)
+    np.testing.assert_allclose(distance.sigmas, [0, 0.1, np.nan, 0.2])
+    assert distance.note(2) == LOST
+    still = (Rigid(), Rigid(rigid_matrix(np.eye(3), np.array([0, -4.0, 0]))), Rigid(), None)
+    seen = path_curves(path, 0, times, axes, still)[PATH[3]]
+    np.testing.assert_allclose(seen.values, [0, 3, np.nan, np.nan], atol=1e-9)
+    assert "not stabilised" in seen.note(3)

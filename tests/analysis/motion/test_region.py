@@ -24,6 +24,7 @@ CLOUD = PointCloud.from_arrays(np.array([[0, 0, 0], [np.nan, 0, 0], [10, 0, 0], 
         ({"landmarks": ["n"]}, [1]),
         ({"landmarks": ["n"], "radius": 0.9}, []),
         ({"points": [3], "spheres": [[0, 0, 0, 1]]}, [0, 2]),
+        ({"points": [3], "spheres": [[0, 0, 0, 30], [10, 0, 0, -1], [20, 0, 0, -1]]}, [0]),
     ],
 )
 def test_a_region_is_all_that_its_parts_hold(data: dict[str, Any], rows: list[int]) -> None:
@@ -40,7 +41,7 @@ def test_a_region_is_all_that_its_parts_hold(data: dict[str, Any], rows: list[in
         ('{"spheres": []}', "has no region"),
         ('{"sphere": [[0, 0, 0, 1]]}', "'sphere'. Did you mean 'spheres'"),
         ('{"spheres": [[0, 0, 0]]}', "'spheres' is not a list"),
-        ('{"spheres": [[0, 0, 0, -1]]}', "'spheres' is not a list"),
+        ('{"spheres": [[0, 0, 0, 0]]}', "'spheres' is not a list"),
         ('{"spheres": [[0, 0, NaN, 1]]}', "'spheres' is not a list"),
         ('{"points": [1.5]}', "'points' is not a list"),
         ('{"points": [true]}', "'points' is not a list"),

@@ -1,4 +1,5 @@
-"""The motion of a region over time: three turns, three shifts, and how far the region is off."""
+"""The motion of a region over time: three turns, three shifts, and how far the region is off; and its mean
+path."""
 
 from __future__ import annotations
 
@@ -7,16 +8,20 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...rigid import Rigid
+from ...rigid import STILL, Rigid
 from ..measures import Quantity, Series
 from ..track import Known
 from ..words import SURE
 from .axes import NAMES
+from .displacements import MeanPath
 from .stabilise import FrameMotion
 
 TURNS = tuple(f"Rotation, {name}" for name in NAMES)
 SHIFTS = tuple(f"Translation, {name}" for name in NAMES)
 RESIDUAL = "Residual (RMS)"
+PATH = (*(f"Region path, {name}" for name in NAMES), "Region path, distance")
+
+LOST = "dense tracking lost the points of the region"
 
 Float = NDArray[np.float64]
 
@@ -43,6 +48,34 @@ def motion_curves(
     return {
         name: Series(name, quantity, times, values[row], sigmas[row], states, reasons=reasons)
         for row, (name, quantity) in enumerate(_names())
+    }
+
+
+def path_curves(
+    path: MeanPath, start: int, times: Float, axes: Float, still: Sequence[Rigid | None] | None = None
+) -> dict[str, Series]:
+    """How far the mean of a region is from where it was in a frame: PATH, along axes (3, 3) by row and
+    straight, scan units.
+
+    start: that frame. times: (T,) seconds. still: a motion of each frame that the path is seen after; where
+    there is none, it has a gap.
+    """
+    positions, reasons = path.positions.copy(), {}
+    for frame, position in enumerate(path.positions):
+        motion = STILL if still is None else still[frame]
+        if np.isnan(position).any():
+            reasons[frame] = LOST
+        elif motion is None:
+            reasons[frame], positions[frame] = "the frame is not stabilised", np.nan
+        else:
+            positions[frame] = motion.points(position)
+    moved = (positions - positions[start]) @ axes.T
+    lengths = np.sqrt((moved**2).sum(axis=1))
+    states = np.where(np.isfinite(lengths), Known.CARRIED, Known.GAP).astype(np.uint8)
+    sigmas = np.where(np.isfinite(lengths), path.sigma, np.nan)
+    return {
+        name: Series(name, "length", times, values, sigmas, states, reasons=reasons)
+        for name, values in zip(PATH, (*moved.T, lengths), strict=True)
     }
 
 

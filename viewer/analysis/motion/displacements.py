@@ -175,6 +175,11 @@ class Displacements:
         return StrainGauge(self.reference, self._tree)
 
 
+def mean_path_of(reference: Float, frames: Iterable[TrackedFrame], rows: NDArray[np.integer]) -> MeanPath:
+    """The mean path of some points of a reference, (N, 3), by rows (n,), through frames."""
+    return Displacements.of(reference, frames, rows).mean_path(np.arange(len(rows)))
+
+
 def save_displacements(
     path: Path, reference: Float, frames: int, frame: Callable[[int], TrackedFrame]
 ) -> None:

@@ -24,9 +24,10 @@ from ...scan.timeline import Timeline
 from ..surface_point import SurfacePoint
 from ..tracking.follower import Sighting
 from .dense import DensePoints, PointState, TrackedFrame, follow_points
-from .displacements import Displacements
+from .displacements import Displacements, MeanPath, mean_path_of
 from .partial_frames import PartialFrames
 from .quantities import QUANTITIES, PointQuantities, StandingFrame, frames_needed
+from .region import RigidRegion
 
 _MOST_KEPT = 4 * 2**30  # bytes, of all scans
 _REACH = 3.0  # spacings from a followed point, that it tells about
@@ -178,6 +179,14 @@ class FollowedPoints:
                 else:
                     into[frame] = Sighting.gap(_LOST)
         return sightings
+
+    def mean_path(self, region: RigidRegion) -> MeanPath:
+        """The mean path of the points in a region of the reference frame, without landmarks. Frames that are
+        not known are found first. Raises InputError, also where the region has no points."""
+        rows = region.rows(self._points.pose.cloud, {})
+        if not len(rows):
+            raise InputError("The region has no followed points.", hint="Paint the region again")
+        return mean_path_of(self._points.reference, map(self.frame, range(len(self.timeline))), rows)
 
     def _held(self, spots: Sequence[SurfacePoint]) -> list[tuple[NDArray[np.int64], Float] | None]:
         """The rows of the points that carry each spot, and their places in its frame, (k, 3); None where no

@@ -1,6 +1,7 @@
 """The region of a subject that counts as rigid, as files tell it.
 
-    {"spheres": [[x, y, z, radius], ...]}    what lies within any of them, scan units
+    {"spheres": [[x, y, z, radius], ...]}    what lies within any of them, scan units; one whose radius is
+                                             negative removes what lies within it from those before
     {"points": [id, ...]}                    points of the reference frame, by their numbers in its file
     {"landmarks": [name, ...], "radius": r}  what lies within a radius of landmarks of the scan's session
 
@@ -37,8 +38,9 @@ _HINT = (
 class RigidRegion:
     """A region of the reference frame.
 
-    spheres: (S, 4), middles and radii, scan units. points: (P,), ids. landmarks: names, each the middle of a
-    sphere of `radius`, scan units; None: see `radius_in`.
+    spheres: (S, 4), middles and radii, scan units; with a negative radius, one removes what lies within it
+    from the region of the points and the spheres before. points: (P,), ids. landmarks: names, each the
+    middle of a sphere of `radius`, scan units; None: see `radius_in`.
     """
 
     spheres: Float
@@ -106,7 +108,7 @@ class RigidRegion:
         around = [np.append(places[name], self.radius_in(cloud)) for name in self.landmarks]
         positions = cloud.world()
         for sphere in [*self.spheres, *around]:
-            is_in |= ((positions - sphere[:3]) ** 2).sum(axis=1) <= sphere[3] ** 2
+            is_in[((positions - sphere[:3]) ** 2).sum(axis=1) <= sphere[3] ** 2] = sphere[3] > 0
         return np.flatnonzero(is_in)
 
 
@@ -116,7 +118,7 @@ def _is_number(value: Any) -> bool:
 
 def _spheres(given: Any) -> Float:
     is_right = isinstance(given, list) and all(
-        isinstance(one, list) and len(one) == 4 and all(map(_is_number, one)) and one[3] > 0 for one in given
+        isinstance(one, list) and len(one) == 4 and all(map(_is_number, one)) and one[3] != 0 for one in given
     )
     if not is_right:
         raise InputError("'spheres' is not a list of [x, y, z, radius]", hint=_HINT)

@@ -128,7 +128,7 @@ class Tool:
 
     def is_bare(self) -> bool:
         """Whether there is nothing to plot yet: the drawer is then as low as its words."""
-        return not self.landmarks.measures and not self.context.followed.motion
+        return not self.landmarks.measures and not any(self.context.followed.curves.values())
 
     def below(self, ui: Ui) -> None:
         """Declare the curves under the timeline."""
@@ -137,10 +137,9 @@ class Tool:
     def update(self) -> None:
         """Find what is plotted now."""
         paths = self.paths.trajectories(self.settings, self.choices)
-        followed, count = self.context.followed, len(self.times)
-        series = {**followed.series, **followed.motion}
+        count = len(self.times)
         fitting = {
-            name: one for name, one in series.items() if len(one.times) == count
+            name: one for name, one in self.context.followed.all_curves.items() if len(one.times) == count
         }  # not of a scan before
         self.shown.take(fitting, self.choices, self.settings, self.context.scale, paths)
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from imgui_bundle import ImVec2
 from imgui_bundle import icons_fontawesome_6 as icons
 from numpy.typing import NDArray
 
@@ -23,14 +22,13 @@ from ....output.overlays import NOTHING_DRAWN, DrawnMarks, Stabilised
 from ....rigid import STILL, Rigid
 from ....scan.pose import Pose
 from ...commands import Command
-from ...scene.canvas import Canvas, ScreenView
-from ...tool_context import Click, FrameSpan, ToolContext
+from ...tool_context import FrameSpan, ToolContext
 from ...ui import Ui
 from .._cached import Cached
+from .._painting import Painted, Painting, PaintingTool, Sphere
 from . import panel
-from .choices import Settings, Stabilising
+from .choices import PAINTED, Settings, Stabilising
 from .motion_colors import REGION, MotionColors
-from .painting import Painting
 from .stabiliser import Asked, Stabiliser
 from .words import Facts, facts_of, motion_gap_spans
 
@@ -38,7 +36,7 @@ TITLE = "Stabilise"
 _COLORED = 4.0  # times the limit of what is close: the distance that has the last colour
 
 
-class Tool:
+class Tool(PaintingTool):
     """The tool that stabilises the scan. stabiliser: has motions found. colors: has numbers found to colour
     by. painting: the brush that paints the region.
 
@@ -49,7 +47,13 @@ class Tool:
         self.context = context
         self.stabiliser = Stabiliser(context)
         self.colors = MotionColors(context)
-        self.painting = Painting(context)
+        self.painting = Painting(
+            context,
+            Painted(
+                "region", lambda: self.choices.reference, lambda: self.choices.spheres, self._paint,
+                "Drag over the parts that stay rigid, such as the forehead and the nose.",
+            ),
+        )  # fmt: skip
         self._cached = Cached()
         self._laid: tuple[object, ...] = ()
 
@@ -75,6 +79,15 @@ class Tool:
         if is_shown:
             self.stabiliser.resume()
             self.context.reveal()
+
+    def _paint(self, step: str, spheres: tuple[Sphere, ...]) -> None:
+        self.choose(step, region=PAINTED, spheres=spheres)
+
+    def paint(self, *, erasing: bool = False) -> None:
+        """Have drags paint the region, or erase from it, or do neither. Raises InputError for a scan of one
+        frame, and where there is nothing to erase."""
+        self._check_frames()
+        self.painting.toggle(erasing=erasing)
 
     @property
     def is_colored(self) -> bool:
@@ -138,7 +151,7 @@ class Tool:
         is_wanted = choices.is_shown and not (self.painting.is_on or choices.is_empty)
         is_new = self.stabiliser.advance(asked, is_wanted)
         self.colors.advance(self.stabiliser.motions, self.is_colored or self.shows_region)
-        self.context.followed.motion = self._curves()
+        self.context.followed.curves[self.context.name] = self._curves()
         return self._lay() or is_new
 
     def _lay(self) -> bool:
@@ -225,39 +238,6 @@ class Tool:
         choices, is_gap = self.choices, self.context.followed.still[frame] is None
         return DrawnMarks(stabilised=Stabilised(choices.words, choices.reference, is_gap))
 
-    def overlay(self, canvas: Canvas, view: ScreenView) -> None:
-        """Draw what is painted, while drags paint."""
-        self.painting.draw(canvas, view)
-
-    def prompt(self) -> str:
-        """The words that say what a drag does."""
-        return self.painting.prompt()
-
-    def on_click(self, click: Click) -> bool:
-        """Paint where the user clicked."""
-        self.painting.take(click, ends=True)
-        return True
-
-    def on_press(self, mouse: ImVec2) -> bool:
-        """Whether a drag paints."""
-        return self.painting.is_on
-
-    def on_drag(self, click: Click, ends: bool) -> None:
-        """Paint over a position."""
-        self.painting.take(click, ends)
-
-    def on_escape(self) -> bool:
-        """Put the brush away; whether it was there."""
-        return self.painting.put_away()
-
-    def is_under_way(self) -> bool:
-        """Whether something is being painted."""
-        return self.painting.is_under_way
-
-    def abandon(self) -> None:
-        """Let go of what is being painted."""
-        self.painting.abandon()
-
     def spans(self) -> list[FrameSpan]:
         """The gaps, while the scan is shown stabilised."""
         known = self.stabiliser.known
@@ -266,6 +246,17 @@ class Tool:
             if self.choices.is_shown
             else []
         )
+
+
+def _brush(name: str, title: str, short: str, key: str, icon: str, erasing: bool) -> Command:
+    """A command that takes up the brush or the eraser. The toolbar has both while the region is painted."""
+    return Command(
+        name, title, lambda tool: tool.paint(erasing=erasing), key,
+        is_on=lambda tool: tool.painting.is_on and tool.painting.is_erasing == erasing,
+        can=lambda tool: len(tool.context.timeline) > 1 and not (erasing and tool.painting.is_empty),
+        is_there=lambda tool: tool.painting.is_on or tool.choices.region == PAINTED,
+        short=short, icon=icon,
+    )  # fmt: skip
 
 
 COMMANDS = {
@@ -279,6 +270,11 @@ COMMANDS = {
             "distance_colors", "Colour by distance from reference", Tool.toggle_colors, "Shift+U",
             is_on=lambda tool: tool.is_colored, can=lambda tool: len(tool.context.timeline) > 1,
         ),
+        _brush("paint_region", "Paint rigid region", "Paint", "Shift+G", icons.ICON_FA_PAINTBRUSH, False),
+        _brush("erase_region", "Erase from rigid region", "Erase", "Shift+E", icons.ICON_FA_ERASER, True),
     )
 }  # fmt: skip
-MOUSE = (("Drag, while painting a region", "Add the surface under the brush to the rigid region"),)
+MOUSE = (
+    ("Drag, while painting a region", "Add the surface under the brush to the rigid region"),
+    ("Drag, while erasing", "Remove the surface under the eraser from the region"),
+)

@@ -10,8 +10,8 @@ import numpy as np
 from ....analysis.motion.region import RigidRegion
 from ....document.part import Part
 from ....params import param
+from .._painting import Sphere, painted_region
 
-Sphere = tuple[float, float, float, float]  # middle and radius
 FOUND, PAINTED, LANDMARKS = "found", "painted", "landmarks"
 REGION_WORDS = {FOUND: "Found by Scan4D", PAINTED: "Painted", LANDMARKS: "Around landmarks"}
 
@@ -19,8 +19,8 @@ REGION_WORDS = {FOUND: "Found by Scan4D", PAINTED: "Painted", LANDMARKS: "Around
 @dataclass(frozen=True)
 class Stabilising(Part, name="stabilising"):
     """is_shown: whether the scan is shown stabilised, not as recorded. reference: the frame that motions
-    begin in. region: how the region that counts as rigid is chosen. spheres: those that were painted in the
-    reference frame, scan units. landmarks: names, each the middle of a sphere of `radius`, scan units.
+    begin in. region: how the region that counts as rigid is chosen. spheres: that were painted in the
+    reference frame, see `RigidRegion`. landmarks: names, each the middle of a sphere of `radius`, scan units.
     """
 
     is_shown: bool = False
@@ -33,7 +33,8 @@ class Stabilising(Part, name="stabilising"):
     @property
     def words(self) -> str:
         """The region in words, without names of landmarks."""
-        count = {PAINTED: len(self.spheres), LANDMARKS: len(self.landmarks)}.get(self.region, 0)
+        painted = sum(sphere[3] > 0 for sphere in self.spheres)
+        count = {PAINTED: painted, LANDMARKS: len(self.landmarks)}.get(self.region, 0)
         what = {PAINTED: "painted spheres", LANDMARKS: f"landmarks, {self.radius:g} around each"}
         return f"{count} {what[self.region]}" if self.region in what else "found by Scan4D"
 
@@ -62,8 +63,7 @@ class Stabilising(Part, name="stabilising"):
     def rigid(self) -> RigidRegion | None:
         """The region that the user has chosen; None: Scan4D finds it."""
         if self.region == PAINTED:
-            spheres = np.array(self.spheres, np.float64).reshape(-1, 4)
-            return RigidRegion(spheres, np.empty(0, np.int64))
+            return painted_region(self.spheres)
         if self.region == LANDMARKS:
             return RigidRegion(np.empty((0, 4)), np.empty(0, np.int64), self.landmarks, self.radius)
         return None

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 from ....scan.times import frame_in_words
 from ... import widgets
 from ...ui import Ui
+from .._painting import length_field
 from .choices import FOUND, LANDMARKS, PAINTED, REGION_WORDS, Settings
 
 if TYPE_CHECKING:
@@ -41,18 +42,7 @@ def _draw_region(tool: Tool, ui: Ui) -> None:
         radius = choices.radius or tool.painting.radius
         tool.choose("Choose region", region=region, radius=radius)
     if region == PAINTED:
-        row = ui.row(widgets.labelled("Stop painting" if tool.painting.is_on else "Paint", "paint"), "Clear")
-        if row.button():
-            tool.painting.toggle()
-        widgets.tooltip("Drag over the parts that stay rigid, in the reference frame")
-        imgui.begin_disabled(not choices.spheres)
-        if row.button():
-            tool.choose("Clear region", spheres=())
-        imgui.end_disabled()
-        widgets.tooltip("Delete what you have painted. Undo restores it")
-        brush = _draw_radius(tool, "Brush", "Radius of the brush", tool.painting.radius)
-        if brush is not None:
-            tool.painting.radius = brush
+        tool.painting.panel(ui, "Drag over the parts that stay rigid, in the reference frame")
     if region == LANDMARKS:
         _draw_landmarks(tool)
 
@@ -69,20 +59,8 @@ def _draw_landmarks(tool: Tool) -> None:
             others = tuple(one for one in choices.landmarks if one != name)
             tool.choose("Choose region", landmarks=(*others, name) if is_on else others)
     about = "Radius of the region around each landmark"
-    if (radius := _draw_radius(tool, "Radius", about, choices.radius)) is not None:
+    if (radius := length_field(tool.context, "Radius", about, choices.radius)) is not None:
         tool.choose("Set radius of region", merge=True, radius=radius)
-
-
-def _draw_radius(tool: Tool, title: str, about: str, radius: float) -> float | None:
-    """A field for a radius, scan units; None where it is not edited."""
-    scale = tool.context.scale
-    widgets.label(title, about)
-    shown = scale.factor * radius
-    speed = 0.01 * shown or 0.01
-    changed, new = imgui.drag_float(
-        f"##{title}", shown, speed, 0.0, 1e9, widgets.number_format("%.3g", scale.unit)
-    )
-    return max(float(f"{new / scale.factor:.6g}"), 1e-9) if changed else None
 
 
 def _draw_state(tool: Tool, ui: Ui) -> None:

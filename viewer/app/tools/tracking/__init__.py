@@ -17,23 +17,34 @@ from ....scan.pose import Pose
 from ...commands import Command
 from ...tool_context import ToolContext
 from ...ui import Ui
+from .._painting import Painted, Painting, PaintingTool, Sphere
 from . import panel
 from .choices import DenseTracking
 from .point_colors import PointColors
 from .point_follower import PointFollower
+from .region_path import RegionPath
 
 TITLE = "Dense tracking"
 _SIGNED_MAP = "vik"  # readable with colour-blindness; its middle is 0
 _GREY = "#6e6e6e"  # of points without a number: in neither map
 
 
-class Tool:
-    """The tool that follows points. follower: has them followed. colors: has numbers of them found."""
+class Tool(PaintingTool):
+    """The tool that follows points. follower: has them followed. colors: has numbers of them found.
+    painting: the brush that paints a region. region_path: has its mean path found."""
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context
         self.follower = PointFollower(context)
         self.colors = PointColors(context)
+        self.region_path = RegionPath(context)
+        self.painting = Painting(
+            context,
+            Painted(
+                "tracked region", lambda: self.choices.reference, lambda: self.choices.spheres, self._paint,
+                "Drag over the part whose mean path you want, such as a corner of the mouth.",
+            ),
+        )  # fmt: skip
         self._laid: tuple[object, ...] = ()
         self._ends: tuple[object, ...] = ()  # of the colour map, as the tool has set them last
 
@@ -56,6 +67,9 @@ class Tool:
     def choose(self, step: str, **changes: Any) -> None:
         """Change choices. step: what Undo calls it."""
         self.context.change(step, self.choices.changed(**changes))
+
+    def _paint(self, step: str, spheres: tuple[Sphere, ...]) -> None:
+        self.choose(step, spheres=spheres)
 
     def follow(self) -> None:
         """Follow the points and colour them by displacement; or colour as usual. Raises InputError for a scan
@@ -92,7 +106,9 @@ class Tool:
         choices = self.choices
         is_new = self.follower.advance(choices.reference, choices.is_on or bool(self.color))
         work = self.follower.work
-        self.context.followed.points = None if work is None or not work.is_whole else work.points
+        points = self.context.followed.points = None if work is None or not work.is_whole else work.points
+        self.region_path.advance(points, choices.spheres)
+        self.context.followed.curves[self.context.name] = self.region_path.curves(choices.reference)
         self.colors.advance(self.follower.points, self.color)
         self._fit_ends()
         return self._lay() or is_new

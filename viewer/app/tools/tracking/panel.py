@@ -51,6 +51,19 @@ def draw(tool: Tool, ui: Ui) -> None:
     if name != now:
         tool.color_by("" if name == _NONE else name)
     _draw_state(tool, ui)
+    _draw_region(tool, ui)
+
+
+def _draw_region(tool: Tool, ui: Ui) -> None:
+    """The region whose mean path is plotted."""
+    widgets.label("Region", "The part of the subject whose mean path Scan4D plots")
+    tool.painting.panel(ui, "Drag over the part whose mean path you want, in the reference frame")
+    if tool.painting.is_empty:
+        return
+    if tool.region_path.path is None:
+        widgets.faint("The path of the region follows once the points are known in all frames.")
+    else:
+        widgets.faint("V plots the mean path of the region.")
 
 
 def _draw_state(tool: Tool, ui: Ui) -> None:
