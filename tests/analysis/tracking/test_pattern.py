@@ -14,7 +14,7 @@ from viewer.analysis.landmarks import Landmark
 from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known, Track
 from viewer.analysis.tracking import track_landmarks
-from viewer.analysis.tracking.pattern import PointPattern, RecurringPoints
+from viewer.analysis.tracking.pattern import ExpectedPoints, PointPattern, RecurringPoints
 from viewer.analysis.tracking.surface import MomentSurface
 from viewer.geometry import vector
 from viewer.scan.points import PointCloud
@@ -89,6 +89,27 @@ def test_noise_takes_matches_and_makes_few_wrong_ones() -> None:
     assert shares[0] > 0.97
     assert shares[3] < 0.02
     assert (np.diff(shares) <= 0).all()
+
+
+def test_a_way_that_is_known_about_tells_noisy_points() -> None:
+    """The search from nothing finds none of these; a way that is off by a spacing, or a few matches, do."""
+    chance = np.random.default_rng(0)
+    places = scattered(0)
+    one = sheet(places, 0.3) + chance.normal(0, 0.09, (len(places), 3))
+    orders = chance.permutation(len(places))
+    other = (sheet(places, 0.5, (9.0, 0.0, 0.0)) + chance.normal(0, 0.09, (len(places), 3)))[orders]
+    right = np.argsort(orders)
+    assert (matched(one, other) < 0).all()
+    surfaces = MomentSurface(one, 1.0), MomentSurface(other, 1.0)
+    maps = np.tile(np.eye(3), (len(one), 1, 1))
+    none = np.full(len(one), -1)
+    few = np.where(places[:, 0] < 4, right, -1)
+    for known, off in ((none, 0.7), (few, 0.0)):
+        there = one + np.array([9.0 + off, off, 0.0])
+        expected = ExpectedPoints(known, there, maps)
+        found = RecurringPoints(*surfaces, NOWHERE, NOWHERE, expected).matches
+        assert (found == right).mean() > 0.25
+        assert ((found >= 0) & (found != right)).mean() < 0.05
 
 
 @pytest.mark.each_value

@@ -26,7 +26,7 @@ from ...scan.timeline import Timeline
 from ...task import checkpoint
 from ...threads import ranges, threads_for, together
 from ..tracking.body import BodyPose, DeformableBody
-from ..tracking.pattern import RecurringPoints
+from ..tracking.pattern import ExpectedPoints, RecurringPoints
 from ..tracking.surface import MomentSurface
 from .stabilise import outward
 
@@ -48,7 +48,6 @@ _ALIKE = 14.0  # places whose errors are alike, as their parabolas share points
 _BENDING = 1.5  # of the strains around a node, that they may be off
 _UNSUPPORTED = 0.04  # of the way from the nearest point that is seen, the deviation of a hidden one
 _FLOOR = 0.03  # spacings: what a standard deviation is at least
-_STARTS = 24  # nodes, far from each other, near which recurring points are looked for first
 _EXACT = 0.06  # spacings: noise up to which recurring points are taken as they are; bending makes up to 0.055
 _AROUND = 13  # points, with the one in the middle, that tell its noise
 _MEDIAN_SQUARE = 2.366  # of three Gaussian numbers: the median of the sum of their squares
@@ -163,15 +162,11 @@ class DensePoints:
         """
         body, rest, places, held, *_ = self._carried
         recurring = RecurringPoints(before, now, np.empty((0, 3)), np.empty((0, 3)))
-        rows = np.where(beside.rows >= 0, recurring.matches[beside.rows], -1).astype(np.int32)
         last = beside.pose or rest
         step = body.reformed(last, earlier.pose or rest)
         step.go_to(now.held.points, recurring)
         start = BodyPose(step.pose.positions, step.pose.turns @ last.turns)
-        if (recurring.matches >= 0).any():
-            motions = start.positions - rest.positions
-            direct = RecurringPoints(self.surface, now, rest.positions[:_STARTS], motions[:_STARTS])
-            rows = np.where(direct.matches >= 0, direct.matches, rows).astype(np.int32)
+        rows = self._recurring(start, now, np.where(beside.rows >= 0, recurring.matches[beside.rows], -1))
         pose, spreads = self._refined(start, now, rows)
         found = self._matched(_torn(held, body, pose), pose, now, _REACH[1])
         known = rows >= 0
@@ -192,6 +187,19 @@ class DensePoints:
         state = np.where(is_seen, PointState.SEEN, PointState.HIDDEN).astype(np.uint8)
         state[~(sigma <= _LOST * now.spacing)] = PointState.LOST
         return TrackedFrame(moved.astype(np.float32), sigma.astype(np.float32), state, pose, rows)
+
+    def _recurring(self, start: BodyPose, now: MomentSurface, known: NDArray[np.int64]) -> NDArray[np.int32]:
+        """The rows of the points in a frame, (N,), -1 where they do not recur. start: about where the body
+        is. known: (N,), the rows that the frame beside tells, or -1."""
+        from .dense_kernels import carry_places
+
+        _, _, places, held, *_ = self._carried
+        there = np.empty_like(places)
+        carry_places(held, start.positions, start.turns, 0, len(places), there)
+        expected = ExpectedPoints(known, there + (self.points - places), start.turns[held.nodes[:, 0]])
+        nowhere = np.empty((0, 3))
+        direct = RecurringPoints(self.surface, now, nowhere, nowhere, expected)
+        return np.where(direct.matches >= 0, direct.matches, known).astype(np.int32)
 
     @cached_property
     def _carried(self) -> _Carried:

@@ -12,7 +12,7 @@ looked for.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,10 +30,10 @@ _CERTAIN = 1e-6  # chance of points at random to fit as well anywhere where a pa
 _DISTINCT = np.log(4.0)  # a point, in information: residuals of other positions are twice as large at least
 _SEARCH = 5.0  # spacings that a pattern may be from where it is looked for
 _SEED_SEARCH = 12.0  # the same for patterns that matches grow from
+_NEAR_SEARCH = 3.0  # the same where the way is known about
 _SEEDS = 24  # patterns that are tried in a round
-_LEAPS = 3  # rounds, each over what is not matched yet
+_LEAPS = 3  # rounds at most, each over what growth has not reached yet
 _FARTHEST = 15.0  # the same in spacings of the pattern
-_BESIDE = 13  # points that tell where one of them goes
 _MATCHED = 0.3  # local spacings that matched points of a pattern are off at most
 _STRAY = 3.0  # times the median, that they may be off where the surface is deformed
 _NEXT = 8  # points next to the position, of which half have to be matched
@@ -167,6 +167,18 @@ class PointPattern:
         return FoundPattern(position, linear, rows, covariance)
 
 
+class ExpectedPoints(NamedTuple):
+    """How the N points of a frame are expected in the next one, to a few spacings.
+
+    matches: (N,), rows of the next frame, which hold where those around bear them out; -1 where none is
+    known. places: (N, 3). maps: (N, 3, 3), how the surface is turned and stretched.
+    """
+
+    matches: Rows
+    places: Float
+    maps: Float
+
+
 class RecurringPoints:
     """The points of a frame that recur in the next one.
 
@@ -174,29 +186,40 @@ class RecurringPoints:
     surface there is turned and stretched.
     """
 
-    def __init__(self, before: MomentSurface, now: MomentSurface, starts: Float, motions: Float) -> None:
+    def __init__(
+        self,
+        before: MomentSurface,
+        now: MomentSurface,
+        starts: Float,
+        motions: Float,
+        expected: ExpectedPoints | None = None,
+    ) -> None:
         """starts: (n, 3), positions near which patterns are tried first; motions: (n, 3), where these are
-        expected to go."""
+        expected to go. expected: matches grow from those that are known, and patterns are looked for near."""
         count = len(before.held.points)
-        self._before, self._now = before, now
+        self._before, self._now, self._expected = before, now, expected
         self.matches, self.maps = np.full(count, -1), np.zeros((count, 3, 3))
         self._grown, self._taken = self.matches.copy(), np.full(len(now.held.points), -1)
         self._queue, self._queued = np.empty(count, np.int64), 0
-        self._around: NDArray[np.int32] | None = None
+        self._is_reached = np.zeros(count, bool)
+        if expected is not None:
+            known = np.flatnonzero(expected.matches >= 0)
+            self._grow(known, expected.matches[known], expected.maps[known])
         for position, motion in zip(starts, motions, strict=True):
-            self._grow_from(position, position + motion, np.eye(3))
-        for _ in range(_LEAPS):
-            left = before.held.points[self._grown < 0]
+            self._grow_from(position, position + motion, np.eye(3), _SEED_SEARCH)
+        for _ in range(_LEAPS if expected is None else 1):
+            left = np.flatnonzero(~self._is_reached)
             if not len(left):
                 break
-            for position in _spread(left):
-                self._grow_from(position, *self._expected(position))
-            if self._around is None:
+            queued = self._queued
+            for row in left[_spread(before.held.points[left])]:
+                self._grow_from(before.held.points[row], *self._expected_at(row))
+            if self._queued == queued:
                 break
-        if self._around is not None:
+        if self._queued:
             from .pattern_growth_kernels import prove_matches
 
-            prove_matches(before.held, now.held, self._around, self._grown, self.maps, self.matches)
+            prove_matches(before.held, now.held, before.around, self._grown, self.maps, self.matches)
 
     def carried(self, rows: Rows, linear: Float) -> tuple[Rows, Float]:
         """Rows (n,) of the frame, or -1, in the next one, and a map to the frame, (3, 3), as one to the next,
@@ -218,52 +241,60 @@ class RecurringPoints:
         arms = np.einsum("nij,nj->ni", self.maps[rows], positions - points[nearest])
         return self._now.held.points[self.matches[rows]] + arms, away <= reach
 
-    def _expected(self, position: Float) -> tuple[Float, Float]:
-        """Predict where a position goes, (3,), and how it turns, (3, 3): as the nearest matched point
-        does."""
-        known = self._queue[: self._queued]
+    def _expected_at(self, row: int) -> tuple[Float, Float, float]:
+        """Predict where a point goes, (3,), how it turns, (3, 3), and to how many spacings: as the nearest
+        matched point does, unless it is known."""
+        if self._expected is not None:
+            return self._expected.places[row], self._expected.maps[row], _NEAR_SEARCH
+        position, known = self._before.held.points[row], self._queue[: self._queued]
         if not len(known):
-            return position, np.eye(3)
+            return position, np.eye(3), _SEED_SEARCH
         away = position - self._before.held.points[known]
         nearest = np.argmin((away**2).sum(axis=1))
-        row = known[nearest]
-        return self._now.held.points[self._grown[row]] + self.maps[row] @ away[nearest], self.maps[row]
+        one = known[nearest]
+        place = self._now.held.points[self._grown[one]] + self.maps[one] @ away[nearest]
+        return place, self.maps[one], _SEED_SEARCH
 
-    def _grow_from(self, position: Float, expected: Float, linear: Float) -> None:
+    def _grow_from(self, position: Float, expected: Float, linear: Float, search: float) -> None:
         """Grow matches from the pattern around a position, where it is found near another one."""
-        from scipy.spatial import cKDTree
+        pattern = PointPattern.around(self._before, position)
+        if pattern is None or self._is_reached[pattern.rows[0]]:
+            return
+        found = pattern.found(self._now, expected, linear, search)
+        if found is not None:
+            is_known = found.rows >= 0
+            maps = np.broadcast_to(found.linear, (int(is_known.sum()), 3, 3))
+            self._grow(pattern.rows[is_known], found.rows[is_known], maps)
 
+    def _grow(self, rows: Rows, matches: Rows, maps: Float) -> None:
+        """Grow from matches (n,) of rows (n,), of those that have none yet. maps: (n, 3, 3)."""
         from .pattern_growth_kernels import MatchGrowth, grow_matches
 
-        pattern = PointPattern.around(self._before, position)
-        if pattern is None or self._grown[pattern.rows[0]] >= 0:
-            return
-        found = pattern.found(self._now, expected, linear, _SEED_SEARCH)
-        if found is None:
-            return
-        for row, match in zip(pattern.rows.tolist(), found.rows.tolist(), strict=True):
-            if match >= 0 and self._grown[row] < 0 and self._taken[match] < 0:
-                self._grown[row], self._taken[match], self.maps[row] = match, row, found.linear
-                self._queue[self._queued] = row
-                self._queued += 1
-        here, there = self._before.held, self._now.held
-        if self._around is None:
-            nearest = cKDTree(here.points).query(here.points, min(_BESIDE, len(here.points)))[1]
-            self._around = nearest.astype(np.int32)
+        is_free = (self._grown[rows] < 0) & (self._taken[matches] < 0)
+        is_first = np.zeros(len(rows), bool)
+        is_first[np.unique(matches, return_index=True)[1]] = True
+        is_new = is_free & is_first
+        rows, matches, maps = rows[is_new], matches[is_new], maps[is_new]
+        self._grown[rows], self._taken[matches], self.maps[rows] = matches, rows, maps
+        self._is_reached[rows] = True
+        first, last = self._queued, self._queued + len(rows)
+        self._queue[first:last] = rows
         self._queued = grow_matches(
-            here,
-            there,
-            self._around,
-            MatchGrowth(self._grown, self._taken, self.maps, self._queue),
-            self._queued,
+            self._before.held,
+            self._now.held,
+            self._before.around,
+            MatchGrowth(self._grown, self._taken, self.maps, self._queue, self._is_reached),
+            first,
+            last,
         )
 
 
-def _spread(points: Float) -> Float:
-    """Some of the points, spread over them, (n, 3)."""
+def _spread(points: Float) -> Rows:
+    """The rows of some of the points, spread over them, (n,)."""
     from .body_kernels import spread_out
 
-    some = np.ascontiguousarray(points[:: max(1, len(points) // 10_000)])
+    step = max(1, len(points) // 10_000)
+    some = np.ascontiguousarray(points[::step])
     chosen = np.empty(min(_SEEDS, len(some)), np.int64)
     spread_out(some, chosen)
-    return some[chosen]
+    return chosen * step

@@ -60,26 +60,27 @@ class MatchGrowth(NamedTuple):
     taken: NDArray[np.int64]  # (M,), the rows that they are of, or -1
     maps: Float  # (N, 3, 3) of matched points
     queue: NDArray[np.int64]  # (N,), matched rows in the order of their match
+    is_reached: NDArray[np.bool_]  # (N,), whether a point is matched, or lies around one that is
 
 
 @compiled
 def grow_matches(
-    before: Cells, now: Cells, around: NDArray[np.int32], growth: MatchGrowth, queued: int
+    before: Cells, now: Cells, around: NDArray[np.int32], growth: MatchGrowth, at: int, queued: int
 ) -> int:
     """Grow matches of the points of a moment with those of the next over the surface, breadth first.
 
-    around: (N, n), the rows nearest to each. queued: how many rows of the queue are matched. Gives how many
-    are then.
+    around: (N, n), the rows nearest to each. at, queued: growth begins from these rows of the queue, the
+    second not included. Gives how many rows it has then.
     """
-    matches, taken, maps, queue = growth
+    matches, taken, maps, queue, is_reached = growth
     nearest, squared = np.empty(2, np.int32), np.empty(2)
     tries = np.zeros(len(matches), np.int8)
     linear, position = np.empty((3, 3)), np.empty(3)
-    at = 0
     while at < queued:
         row = queue[at]
         at += 1
         for other in around[row]:
+            is_reached[other] = True
             if matches[other] >= 0 or tries[other] >= _TRIES:
                 continue
             tries[other] += 1

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...scan.points import strided
 from ...scan.pose import Pose
+from ...threads import threads_for
 
 _CELL = 2.0  # spacings
 _MOST_CELLS = 1 << 22
 _BODY = 0.01, 0.99  # quantiles between which the body of the points lies
 _MARGIN = 0.1  # of its longest edge, that the grid reaches farther
+_AROUND = 13  # points, with the one in the middle, that tell where it goes
 _MOST_IN_REACH = 1 << 16  # points that a patch is chosen from
 # Brightness, red against green, yellow against blue: of a byte a channel, nearly independent of each other.
 _OPPONENT = np.array([[1, 1, 1], [1, -1, 0], [0.5, 0.5, -1]]) / [[3], [2], [2]] / 255
@@ -95,6 +99,15 @@ class MomentSurface:
             reaches=np.empty_like(held.reaches),
         )
         return other
+
+    @cached_property
+    def around(self) -> NDArray[np.int32]:
+        """The rows of the points nearest to each, itself the first, (N, 13); fewer where there are fewer."""
+        from scipy.spatial import cKDTree
+
+        points = self.held.points
+        nearest = cKDTree(points).query(points, min(_AROUND, len(points)), workers=threads_for(len(points)))
+        return nearest[1].reshape(len(points), -1).astype(np.int32)
 
     def rows_around(self, position: Float, reach: float) -> NDArray[np.int32]:
         """Rows of the points within reach of a position, increasing."""
