@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..analysis.deviation.chosen import search_reach
 from ..analysis.deviation.m3c2 import M3C2Reference
 from ..analysis.deviation.reference import ESTIMATED, DeviationReference, deviation_reference
 from ..analysis.deviation.statistics import DeviationStatistics, detected_share
@@ -37,7 +38,6 @@ from ._scans import SCAN_HELP, open_timeline, report
 
 _TABLE, _REPORT, _PARTIAL = "deviation.csv", "report.json", "transforms.partial"
 _COLUMNS = ("frame", "time", "mean", "rms", "p95", "max", "share")
-_REACH = 0.1  # of the longest edge of the box around the reference
 _SURFACE, _M3C2 = "surface", "m3c2"
 _VALUE, _DETECTABLE, _DETECTED = "value", "detectable", ("detected",)
 _NONE = {_VALUE: np.empty(0, np.float32), _DETECTABLE: np.empty(0, np.float32)}
@@ -194,8 +194,7 @@ def _compared(args: Namespace, timeline: Timeline, other: Timeline) -> _Compared
         }
     else:
         reference = deviation_reference(start.pose, faces)
-    bounds = start.pose.bounds
-    reach = args.reach or _REACH * float((bounds.high - bounds.low).max())
+    reach = args.reach or search_reach(start.pose)
     found |= {"reference": {**start.facts(), "outside_by": reference.outside_by}, "reach": reach}
     return _Compared(reference, reach, motions, middle, found)
 

@@ -31,6 +31,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..analysis.deviation import chosen
+from ..analysis.deviation.chosen import Deviations, ReferenceChoice
 from ..analysis.motion import distances
 from ..analysis.motion.followed_points import FollowedPoints
 from ..analysis.motion.quantities import QUANTITIES
@@ -51,6 +53,7 @@ from ..output.legend import Legend, Marks
 from ..output.overlays import (
     LINE_COLOR,
     LINE_SLACK,
+    DeviationMarks,
     DrawnLandmark,
     DrawnMarks,
     DrawnPath,
@@ -134,6 +137,36 @@ class FollowedNumbers:
 
 
 @dataclass(frozen=True)
+class DeviationNumbers:
+    """Deviations, by what they are found from again, see `DeviationMarks` and `ReferenceChoice`."""
+
+    first: PoseNumber
+    last: PoseNumber
+    file: ScanName | None
+    motion: Matrix | None
+
+    @classmethod
+    def of(cls, marks: DeviationMarks) -> DeviationNumbers:
+        """The marks that a tool gives."""
+        reference, motion = marks.reference, marks.motion
+        rows = None if motion is None else _rows_of(motion)
+        return cls(reference.first, reference.last, reference.file or None, rows)
+
+    def values(self, pose: Pose, timeline: Timeline) -> NDArray[np.float32]:
+        """The deviations of a pose, (N,) by row of its cloud; NaN in a gap. Raises InputError."""
+        if self.motion is None:
+            return np.full(len(pose.cloud), np.nan, np.float32)
+        found = _deviations_of_film(timeline, ReferenceChoice(self.first, self.last, self.file or ""))
+        return found.of(pose.cloud, Rigid(np.array(self.motion)))
+
+    def moved(self, origin: NDArray[np.float64]) -> DeviationNumbers:
+        """The deviations with the motion in coordinates relative to an origin, (3,)."""
+        if self.motion is None:
+            return self
+        return replace(self, motion=_rows_of(Rigid(np.array(self.motion)).in_frame(origin)))
+
+
+@dataclass(frozen=True)
 class Entry:
     """One picture that was shown: all that is needed to draw it again.
 
@@ -145,6 +178,7 @@ class Entry:
     `anonymous_request` has it. notes: of the
     scan, where the marks show them. stabilised: how the place was found, None where it is as recorded.
     followed: how numbers of followed points were found, None where the picture is not coloured by any.
+    deviation: likewise of deviations.
     labels: where those over the view stand. scale: of width and height, at
     which it was drawn. automatic: what the renderer was chosen for and expected to take, None where a user or
     the scan says which it is. reading: corrections of how Scan4D reads the scan, as documents have them.
@@ -175,6 +209,7 @@ class Entry:
     plot: DrawnPlot | None = None
     stabilised: Stabilised | None = None
     followed: FollowedNumbers | None = None
+    deviation: DeviationNumbers | None = None
     labels: tuple[LabelSpot, ...] = ()
     scale: DrawnScale = 1.0
     automatic: Automatic | None = None
@@ -244,6 +279,7 @@ class Entry:
             plot=drawn.plot if marks.plot else None,
             stabilised=drawn.stabilised,
             followed=None if drawn.followed is None else FollowedNumbers.of(drawn.followed),
+            deviation=None if drawn.deviation is None else DeviationNumbers.of(drawn.deviation),
         )
 
     def request(self, pose: Pose, scalars: Mapping[str, NDArray[np.generic]] | None = None) -> Request:
@@ -258,6 +294,10 @@ class Entry:
         name = self.look.color_by
         if self.followed is not None and name in QUANTITIES:
             return {name: self._of_followed(self.followed, timeline)}
+        if self.deviation is not None and name == chosen.NAME:
+            pose = timeline.drawn(self.pose)
+            deviation = self.deviation.moved(-middle_of(pose)) if self.anonymous else self.deviation
+            return {name: deviation.values(pose, timeline)}
         if self.stabilised is None or name != distances.NAME:
             return {}
         pose = timeline.drawn(self.pose)
@@ -328,6 +368,7 @@ class Entry:
         return replace(
             self, landmarks=landmarks, trajectories=moved(self.trajectories), held=held,
             measure_lines=moved(self.measure_lines), followed=self.followed and self.followed.moved(origin),
+            deviation=self.deviation and self.deviation.moved(origin),
         )  # fmt: skip
 
     def to_json(self, before: Entry | None = None) -> dict[str, Any]:
@@ -355,6 +396,7 @@ class Entry:
         )
         return replace(
             self, scan=None, unit=unit, shown_unit=shown, anonymous=True, notes=(), automatic=None,
+            deviation=None if self.deviation and self.deviation.file else self.deviation,
             landmarks=tuple(replace(one, name="") for one in self.landmarks),
             measure_lines=tuple(replace(one, name="") for one in self.measure_lines),
             plot=self.plot and self.plot.without_names(), labels=(),
@@ -374,6 +416,12 @@ def followed_points(timeline: Timeline, reference: int) -> FollowedPoints:
 
 
 _followed_of_film = lru_cache(maxsize=1)(followed_points)  # all frames of a film share them
+
+
+@lru_cache(maxsize=1)
+def _deviations_of_film(timeline: Timeline, reference: ReferenceChoice) -> Deviations:
+    """The deviations from a reference."""
+    return reference.read(timeline)
 
 
 @lru_cache(maxsize=1)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.deviation import chosen
 from ..analysis.motion import distances
 from ..analysis.motion.quantities import QUANTITIES
 from ..camera import Camera
@@ -22,7 +23,7 @@ Color = tuple[int, int, int, int]  # sRGB and alpha, bytes
 
 _MEASURED: Color = (150, 150, 150, 255)
 # Units of the numbers that looks colour by; "{}" is the unit of length.
-_UNITS = dict.fromkeys(("depth", "height", distances.NAME), "{}")
+_UNITS = dict.fromkeys(("depth", "height", distances.NAME, chosen.NAME), "{}")
 _OF_KINDS = {"length": "{}", "speed": "{}/s", "strain": "%"}
 _UNITS |= {name: _OF_KINDS[one.kind] for name, one in QUANTITIES.items()}
 _BAR_SHARE = 1 / 6  # of the picture's width that a scale bar takes at most

@@ -10,6 +10,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from ..analysis.deviation import chosen
+from ..analysis.deviation.chosen import ReferenceChoice
 from ..analysis.motion import distances
 from ..analysis.motion.quantities import QUANTITIES
 from ..analysis.track import Known
@@ -137,13 +139,22 @@ class FollowedMarks:
     motions: Mapping[int, Rigid]
 
 
+@dataclass(frozen=True, eq=False)
+class DeviationMarks:
+    """Deviations of a frame, by what they are found from again. motion: from the frame to the reference; None
+    in a gap."""
+
+    reference: ReferenceChoice
+    motion: Rigid | None
+
+
 @dataclass(frozen=True)
 class DrawnMarks:
     """Landmarks and lines that tools draw over a frame, in the scan's coordinates.
 
     held: the motion that brings the trajectories to where they are about this frame. plot: None where none is
     shown. stabilised: None where the frame stands as recorded. followed: None unless the colours are numbers
-    of followed points.
+    of followed points. deviation: likewise of deviations.
     """
 
     landmarks: tuple[DrawnLandmark, ...] = ()
@@ -153,12 +164,14 @@ class DrawnMarks:
     plot: DrawnPlot | None = None
     stabilised: Stabilised | None = None
     followed: FollowedMarks | None = None
+    deviation: DeviationMarks | None = None
 
     @property
     def replayable(self) -> tuple[str, ...]:
         """The numbers of tools that a recording can compute again, and so colour by."""
         of_motion = () if self.stabilised is None else (distances.NAME,)
-        return of_motion if self.followed is None else (*of_motion, *QUANTITIES)
+        of_points = () if self.followed is None else tuple(QUANTITIES)
+        return (*of_motion, *of_points, *(() if self.deviation is None else (chosen.NAME,)))
 
     def with_more(self, other: DrawnMarks) -> DrawnMarks:
         """Add the marks of another tool."""
@@ -166,6 +179,7 @@ class DrawnMarks:
             (*self.landmarks, *other.landmarks), (*self.trajectories, *other.trajectories),
             other.held.after(self.held), (*self.measure_lines, *other.measure_lines),
             other.plot or self.plot, other.stabilised or self.stabilised, other.followed or self.followed,
+            other.deviation or self.deviation,
         )  # fmt: skip
 
 

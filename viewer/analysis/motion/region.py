@@ -11,7 +11,7 @@ these: the region is all of them together.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,10 +106,15 @@ class RigidRegion:
                 )
                 raise InputError(what, hint=did_you_mean(name, places) + hint)
         around = [np.append(places[name], self.radius_in(cloud)) for name in self.landmarks]
-        positions = cloud.world()
-        for sphere in [*self.spheres, *around]:
-            is_in[((positions - sphere[:3]) ** 2).sum(axis=1) <= sphere[3] ** 2] = sphere[3] > 0
+        put_in_spheres([*self.spheres, *around], cloud.world(), is_in)
         return np.flatnonzero(is_in)
+
+
+def put_in_spheres(spheres: Iterable[Float], positions: Float, is_in: NDArray[np.bool_]) -> None:
+    """Set for positions (N, 3) whether they are in a region, (N,), by its spheres, (4,) each, in their
+    order; see `RigidRegion`."""
+    for sphere in spheres:
+        is_in[((positions - sphere[:3]) ** 2).sum(axis=1) <= sphere[3] ** 2] = sphere[3] > 0
 
 
 def _is_number(value: Any) -> bool:

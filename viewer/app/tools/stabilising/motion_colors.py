@@ -4,16 +4,15 @@ reference frame, and whether it is of the rigid region."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ....analysis.motion import distances
 from ....analysis.motion.distances import distances_from, in_region, unknown_distances
-from ....scan.pose import Life, Pose
-from ....task import Task
+from ....scan.pose import Pose
 from ...tool_context import ToolContext
+from .._frame_numbers import FrameNumbers
 from .stabiliser import Motions
 
 Values = Mapping[str, NDArray[np.float32]]
@@ -21,61 +20,36 @@ REGION = "rigid region"  # 1 in the region, 0 elsewhere
 
 
 class MotionColors:
-    """The numbers of the frames that are in memory; each goes with its frame."""
+    """The numbers of the frames that are in memory."""
 
     def __init__(self, context: ToolContext) -> None:
-        self._context = context
         self._motions: Motions | None = None
-        self._found: WeakKeyDictionary[Life, Values] = WeakKeyDictionary()
-        self._unknown: WeakKeyDictionary[Life, Values] = WeakKeyDictionary()
-        self._task: Task | None = None
+        self._numbers = FrameNumbers[Values](context, "Measuring distances", _unknown)
 
     def of(self, pose: Pose) -> Values:
         """The numbers of a pose by name, by row of its cloud; NaN as long as they are not known."""
-        if (found := self._found.get(pose.life)) is not None:
-            return found
-        if (unknown := self._unknown.get(pose.life)) is None:
-            unknown = self._unknown[pose.life] = _unknown(pose)
-        return unknown
+        return self._numbers.of(pose)
 
     def advance(self, motions: Motions | None, is_wanted: bool) -> None:
         """Have found what the view shows, then what it shows next. is_wanted: whether the view shows any."""
         if motions is not self._motions:
-            self._motions, self._found = motions, WeakKeyDictionary()
-        if self._task is not None and any(work.task is self._task for work in self._context.works):
-            return
+            self._motions = motions
+            self._numbers.forget()
         if motions is None or motions.reference is None or not is_wanted:
             return
-        pose = self._next(motions)
-        if pose is None:
-            return
-        motion, found = motions.known[pose.index].motion, self._found
-        if motion is None:
-            found[pose.life] = _unknown(pose)
-            return
-        reference, rows, back = motions.reference, motions.rows, motion.inverse
+        reference, rows, known = motions.reference, motions.rows, motions.known
 
-        def find() -> Values:
-            surface, origin, cloud = reference.surface, reference.origin, pose.cloud
+        def find(pose: Pose) -> Values:
+            motion, cloud = known[pose.index].motion, pose.cloud
+            if motion is None:
+                return _unknown(pose)
+            surface, origin = reference.surface, reference.origin
             return {
-                distances.NAME: distances_from(surface, origin, cloud, back),
-                REGION: in_region(surface, origin, cloud, back, rows),
+                distances.NAME: distances_from(surface, origin, cloud, motion.inverse),
+                REGION: in_region(surface, origin, cloud, motion.inverse, rows),
             }
 
-        def take(values: Values) -> None:
-            found[pose.life] = values
-
-        self._task = self._context.run("Measuring distances", find, take)
-
-    def _next(self, motions: Motions) -> Pose | None:
-        """The first pose from the one that is shown on, in memory, whose distances are not known yet."""
-        timeline, shown = self._context.timeline, self._context.index
-        for step in range(len(timeline)):
-            frame = (shown + step) % len(timeline)
-            pose = timeline.ready(frame) if frame in motions.known else None
-            if pose is not None and pose.life not in self._found:
-                return pose
-        return None
+        self._numbers.advance(dict.fromkeys(list(known), motions), find)
 
 
 def _unknown(pose: Pose) -> Values:

@@ -24,8 +24,9 @@ from ....geometry import Vector
 from ....scan.pose import Pose
 from ....scan.spacing import typical_spacing
 from ....scan.timeline import Timeline
-from ....task import Task, announce, over
+from ....task import announce, over
 from ...tool_context import ToolContext
+from .._resumed import Resumed
 from .choices import Stabilising
 
 _MOST_KEPT = 64 * 2**20  # bytes, of all motions that are kept
@@ -131,25 +132,20 @@ class Motions:
         return rows
 
 
-class Stabiliser:
+class Stabiliser(Resumed[Motions]):
     """Has the motions of the open scan found.
 
-    motions: that are being found, or were; None before the first. known: the motions of frames as far as the
-    window has taken them in; another object after each change. is_stopped: whether the user has cancelled it,
-    until something else is asked for or `resume` is called.
+    known: the motions of frames as far as the window has taken them in; another object after each change.
     """
 
     def __init__(self, context: ToolContext) -> None:
-        self._context = context
-        self.motions: Motions | None = None
+        super().__init__(context, "Stabilising")
         self.known: Mapping[int, FrameMotion] = {}
-        self.is_stopped = False
-        self._task: Task | None = None
 
     @property
-    def is_running(self) -> bool:
-        """Whether motions are being found."""
-        return any(work.task is self._task for work in self._context.works)
+    def motions(self) -> Motions | None:
+        """The motions that are being found, or were; None before the first."""
+        return self.work
 
     @property
     def close(self) -> float | None:
@@ -161,36 +157,15 @@ class Stabiliser:
             return None
         return WeakLimits.of(self._context.unit, typical_spacing(pose.cloud)).shift
 
-    def resume(self) -> None:
-        """Go on after the user has cancelled it."""
-        self.is_stopped = False
-
     def advance(self, asked: Asked, is_wanted: bool) -> bool:
-        """Have found what is asked for, and take in what was; whether there is something new.
-
-        is_wanted: whether to begin, or to go on; what has begun goes on by itself.
-        """
+        """Have found what is asked for, and take in what was; whether there is something new. is_wanted: see
+        `take`."""
+        has_changed = self.take(lambda work: work.asked == asked, lambda: Motions(asked), is_wanted)
         motions = self.motions
-        if self._task is not None and not self.is_running:
-            self.is_stopped |= self._task.cancelled
-            self._task = None
-        if motions is not None and motions.asked != asked:
-            if self._task is not None:
-                self._task.cancel()
-            motions, self.is_stopped, self._task = None, False, None
-        if motions is None and is_wanted:
-            motions = Motions(asked)
-        has_changed = motions is not self.motions
-        self.motions = motions
         known = {} if motions is None or motions.reference is None else dict(motions.known)
         if len(known) != len(self.known) or has_changed:
             self.known, has_changed = known, True
-        if motions is not None and is_wanted and self._task is None and not self._is_over(motions):
-            self._task = self._context.run("Stabilising", motions.find, lambda _: None)
         return has_changed
-
-    def _is_over(self, motions: Motions) -> bool:
-        return motions.is_whole or self.is_stopped or bool(motions.problem)
 
 
 def motions_folder() -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from imgui_bundle import icons_fontawesome_6 as icons
@@ -11,12 +10,12 @@ from numpy.typing import NDArray
 
 from ....analysis.motion.quantities import DISPLACEMENT, QUANTITIES, frames_needed
 from ....errors import InputError
-from ....look import Look
 from ....output.overlays import NOTHING_DRAWN, DrawnMarks, FollowedMarks
 from ....scan.pose import Pose
 from ...commands import Command
 from ...tool_context import ToolContext
 from ...ui import Ui
+from .._colored import Colored
 from .._painting import Painted, Painting, PaintingTool, Sphere
 from . import panel
 from .choices import DenseTracking
@@ -25,18 +24,18 @@ from .point_follower import PointFollower
 from .region_path import RegionPath
 
 TITLE = "Dense tracking"
-_SIGNED_MAP = "vik"  # readable with colour-blindness; its middle is 0
-_GREY = "#6e6e6e"  # of points without a number: in neither map
 
 
 class Tool(PaintingTool):
     """The tool that follows points. follower: has them followed. colors: has numbers of them found.
-    painting: the brush that paints a region. region_path: has its mean path found."""
+    colored: sets their colours. painting: the brush that paints a region. region_path: has its mean path
+    found."""
 
     def __init__(self, context: ToolContext) -> None:
         self.context = context
         self.follower = PointFollower(context)
         self.colors = PointColors(context)
+        self.colored = Colored(context, {name: one.is_signed for name, one in QUANTITIES.items()})
         self.region_path = RegionPath(context)
         self.painting = Painting(
             context,
@@ -46,7 +45,6 @@ class Tool(PaintingTool):
             ),
         )  # fmt: skip
         self._laid: tuple[object, ...] = ()
-        self._ends: tuple[object, ...] = ()  # of the colour map, as the tool has set them last
 
     @property
     def choices(self) -> DenseTracking:
@@ -61,8 +59,7 @@ class Tool(PaintingTool):
     @property
     def color(self) -> str:
         """The number of followed points that the colours show; "" for none."""
-        name = self.context.document.look.color_by
-        return name if name in QUANTITIES else ""
+        return self.colored.name
 
     def choose(self, step: str, **changes: Any) -> None:
         """Change choices. step: what Undo calls it."""
@@ -81,23 +78,13 @@ class Tool(PaintingTool):
     def color_by(self, name: str) -> None:
         """Colour by a number of QUANTITIES, for which points are followed; "": as usual. Raises InputError
         for a scan of one frame."""
-        look, usual = self.context.document.look, Look()
-        grey, plain = (_GREY, usual.plain) if name else (usual.plain, _GREY)
-        look = replace(look, plain=grey if look.plain == plain else look.plain)
-        is_own = not self.color or look.color_map != _map_of(self.color)  # the map that the user has chosen
-        color_map = look.color_map if is_own else usual.color_map
         if not name:
-            look = replace(look, color_by=usual.color_by, color_map=color_map, low=usual.low, high=usual.high)
-            self.context.change("Change colours", look=look)
+            self.colored.reset()
             return
         if len(self.context.timeline) < 2:
             raise InputError("The scan has one frame, so there is no motion to follow.")
-        color_map = _SIGNED_MAP if QUANTITIES[name].is_signed else color_map
-        low, high = _ends(name, self.colors.end(name) or 1.0)
-        look = replace(look, color_by=name, color_map=color_map, low=low, high=high)
         step = "Colour by displacement" if self.choices.is_on else "Follow points"
-        self.context.change(step, self.choices.changed(is_on=True), look=look)
-        self._ends = name, low, high
+        self.colored.show(step, name, self.colors.end(name) or 1.0, self.choices.changed(is_on=True))
         self.follower.resume()
         self._lay()  # the numbers, not known yet, are there before the next picture asks for them
 
@@ -110,17 +97,8 @@ class Tool(PaintingTool):
         self.region_path.advance(points, choices.spheres)
         self.context.followed.curves[self.context.name] = self.region_path.curves(choices.reference)
         self.colors.advance(self.follower.points, self.color)
-        self._fit_ends()
+        self.colored.fit(self.color, self.colors.end(self.color))
         return self._lay() or is_new
-
-    def _fit_ends(self) -> None:
-        """Have the colour map end where the numbers do, unless the user has set its ends."""
-        name, look = self.color, self.context.document.look
-        end = self.colors.end(name) if name and (name, look.low, look.high) == self._ends else None
-        if end is not None and (name, *_ends(name, end)) != self._ends:
-            low, high = _ends(name, end)
-            self._ends = name, low, high
-            self.context.amend(look=replace(look, low=low, high=high))
 
     def _lay(self) -> bool:
         """Lay the numbers over the frame that is shown; whether others than before."""
@@ -149,16 +127,6 @@ class Tool(PaintingTool):
     def panel(self, ui: Ui) -> None:
         """Declare the section of the panel."""
         panel.draw(self, ui)
-
-
-def _map_of(name: str) -> str:
-    """The colour map that the tool sets for a number; "" where it leaves that of the user."""
-    return _SIGNED_MAP if QUANTITIES[name].is_signed else ""
-
-
-def _ends(name: str, end: float) -> tuple[float, float]:
-    """The ends of the colour map of a number, alike on both sides of 0 where it has a sign."""
-    return (-end if QUANTITIES[name].is_signed else 0.0), end
 
 
 COMMANDS = {

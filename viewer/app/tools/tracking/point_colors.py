@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 from weakref import WeakKeyDictionary
@@ -16,9 +15,9 @@ from ....rigid import Rigid
 from ....scan.pose import Life, Pose
 from ....task import Task, checkpoint
 from ...tool_context import ToolContext
+from .._colored import rounded_up
 
 _LEAST = {"length": 0.1, "speed": 0.1, "strain": 1.0}  # where a colour map ends at least: spacings, percent
-_ROUND = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
 
 _Key = tuple[object, ...]  # of what the numbers of a frame depend on
 
@@ -66,7 +65,7 @@ class PointColors:
             return None
         kind = QUANTITIES[name].kind
         least = _LEAST[kind] * (1.0 if kind == "strain" else self._points.spacing)
-        return _rounded_up(max(*known, least))
+        return rounded_up(max(*known, least))
 
     def advance(self, points: FollowedPoints | None, name: str) -> None:
         """Have found what the view shows, the range, then what the view shows next. name: of the number that
@@ -159,9 +158,3 @@ def _key_of(motions: Mapping[int, Rigid | None]) -> _Key:
     return tuple(
         (frame, None if one is None else one.matrix.tobytes()) for frame, one in sorted(motions.items())
     )
-
-
-def _rounded_up(value: float) -> float:
-    """The next number of few digits."""
-    power = 10.0 ** math.floor(math.log10(value))
-    return next(float(f"{step * power:.3g}") for step in _ROUND if step * power >= value * (1 - 1e-9))
