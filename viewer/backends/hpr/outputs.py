@@ -20,6 +20,7 @@ from .reconstruction import fill_between
 from .splats import SectorSplats
 
 _LEFT = 0.4  # share of the noise that is left in steadied points
+_FINE = 2  # times the sectors along an edge, where each point counts: most have a sector of their own then
 OUTPUTS = ("points", "faces", "splats", "reconstruction")
 
 
@@ -36,7 +37,8 @@ def show_visible(
     """
     params, splats = frame.params, surface.cached(SectorSplats)
     if params.output != "points" or wants_normals(surface.look):
-        nearest = splats.of_visible(pose, seen, calibration, surface)
+        fine = 1 if params.output == "splats" else _FINE
+        nearest = splats.of_visible(pose, seen, calibration, surface, fine)
     else:
         surface.stats.skipped["splats"] = "points without light need no normals"
     if params.output == "faces":

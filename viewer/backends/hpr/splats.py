@@ -22,7 +22,6 @@ from ...visibility.spacing import is_steadied, spacing_texels, steady_points
 
 _INFINITE = 1e12  # weight, from which on nearness alone counts but for ties
 _MOST_SECTORS = 1 << 22  # of which 24 bytes are kept
-_FINE = 2  # times the sectors along an edge of those of which half would have a point: most differ then
 _GAPS = 2  # times the usual steps between visible points, for gaps where some were not found
 _AROUND = 8.0  # sectors around one, each of which adds 1 at most
 _FINEST = 2.0**-16  # of what they add
@@ -62,18 +61,21 @@ class SectorSplats:
         seen: Candidates | Covering | ExactlySeen,
         calibration: EyeCalibration,
         surface: Surface,
+        fine: int = 1,
     ) -> Candidates:
         """Find the splats of the visible points, unless they are known. Returns sectors whose rows are those
         of them that are nearest to their directions, as a flip at an infinite radius gives them.
 
-        seen: knows which points are visible. calibration: says how densely they lie.
+        seen: knows which points are visible. calibration: says how densely they lie. fine: times the sectors
+        along an edge of those of which half would have a point.
         """
-        if self._map is not None and self._state is seen.state:
-            surface.stats.skipped["splats"] = "the visible points are the same as in the last picture"
-            return self._map
         sectors = calibration.sectors
         most = math.isqrt(_MOST_SECTORS * sectors.edge**2 // sectors.count)
-        sectors, steps, _ = calibration.with_sectors(min(_FINE * sectors.edge, most))
+        edge = min(fine * sectors.edge, most)
+        if self._map is not None and self._state is seen.state and self._map.sectors.edge == edge:
+            surface.stats.skipped["splats"] = "the visible points are the same as in the last picture"
+            return self._map
+        sectors, steps, _ = calibration.with_sectors(edge)
         if self._map is None or not self._map.fits(sectors, len(pose.cloud)):
             self._gpu.discard(self._map)
             self._map = None
