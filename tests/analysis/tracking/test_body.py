@@ -13,6 +13,7 @@ from viewer.analysis.surface_point import SurfacePoint
 from viewer.analysis.track import Known
 from viewer.analysis.tracking import track_landmarks
 from viewer.analysis.tracking.body import DeformableBody
+from viewer.analysis.tracking.registration import rotations
 from viewer.geometry import vector
 from viewer.scan.points import PointCloud
 from viewer.scan.timeline import Timeline
@@ -99,3 +100,19 @@ def test_a_node_that_is_torn_off_a_flat_body_keeps_a_map(away: float) -> None:
     for _ in range(6):
         pose = body.strained(pose, 0.1, pulls, wanted)
     assert np.abs(pose.turns).max() < 2
+
+
+def test_nearest_rotations_are_those_of_the_singular_values() -> None:
+    chance = np.random.default_rng(0)
+    matrices = chance.normal(size=(400, 3, 3))
+    matrices[:100] *= 1e-9
+    matrices[100:200, :, 2] = 0.0  # as of the edges of a flat node
+    left, _, right = np.linalg.svd(matrices)
+    left[..., 2] *= np.linalg.det(left @ right)[:, None]
+    assert np.allclose(rotations(matrices), left @ right, atol=1e-10)
+    lines = chance.normal(size=(20, 3, 1)) * chance.normal(size=(20, 1, 3))  # which leave a turn open
+    found = rotations(np.concatenate([lines, np.zeros((1, 3, 3))]))
+    assert np.allclose(found @ found.transpose(0, 2, 1), np.eye(3))
+    assert np.allclose(np.linalg.det(found), 1)
+    along = (found[:20] * lines).sum(axis=(1, 2))
+    assert np.allclose(along, np.linalg.norm(lines, axis=(1, 2)))

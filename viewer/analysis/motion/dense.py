@@ -312,8 +312,8 @@ class DensePoints:
             find_beside(now.held, reach, first, last, found)
 
         each(find, count)
-        rows = np.unique(found.rows)
-        rows = rows[np.searchsorted(rows, 0) :]
+        rows = found.rows[found.rows >= 0]
+        rows = np.unique(rows[now.held.state[rows] == 0])
         each(lambda first, last: fit_surface(now.held, rows, first, last), len(rows))
         each(lambda first, last: match_places(now.held, held, pose.turns, first, last, found), count)
         return found

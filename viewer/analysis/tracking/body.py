@@ -345,9 +345,12 @@ class DeformableBody:
 
     def _kept(self, pose: BodyPose, ones: NDArray[np.intp], others: NDArray[np.intp]) -> Float:
         """`_holds` of edges between nodes (...)."""
-        edges = self._rest[others] - self._rest[ones]
-        off = self._strained(pose, ones, others)
-        return 1 / (1 + (off**2).sum(axis=-1) / (_YIELD**2 * (edges**2).sum(axis=-1) + 1e-300))
+        from .body_kernels import edge_holds
+
+        ones, others = np.broadcast_arrays(ones, others)
+        holds = np.empty(ones.size)
+        edge_holds(pose.positions, pose.turns, self._rest, ones.ravel(), others.ravel(), _YIELD, holds)
+        return holds.reshape(ones.shape)
 
     def _products(self, positions: Float, holds: Float) -> Float:
         """The sums of the products of each node's edges, at positions (N, 3) and at rest, (N, 3, 3)."""

@@ -158,6 +158,27 @@ def settle_nodes(
 
 
 @compiled
+def edge_holds(
+    at: Float, turns: Float, rest: Float, ones: NDArray[np.int64], others: NDArray[np.int64], bound: float,
+    holds: Float,
+) -> None:  # fmt: skip
+    """Fill how much of its stiffness each edge (E,) between nodes keeps (Geman and McClure 1985).
+
+    at, rest: (N, 3), positions now and at rest. turns: (N, 3, 3). bound: of its length that an edge is off,
+    at which it keeps half.
+    """
+    for e in range(len(ones)):
+        n, m = ones[e], others[e]
+        x, y, z = rest[m, 0] - rest[n, 0], rest[m, 1] - rest[n, 1], rest[m, 2] - rest[n, 2]
+        off = 0.0
+        for k in range(3):
+            a, b = turns[n, k], turns[m, k]
+            way = 0.5 * ((a[0] + b[0]) * x + (a[1] + b[1]) * y + (a[2] + b[2]) * z)
+            off += (at[m, k] - at[n, k] - way) ** 2
+        holds[e] = 1.0 / (1.0 + off / (bound * bound * (x * x + y * y + z * z) + 1e-300))
+
+
+@compiled
 def edge_products(body: BodyEdges, positions: Float, products: Float) -> None:
     """Fill the sums (N, 3, 3) of the products of each node's edges, now and at rest. positions: (N, 3)."""
     firsts, others, edges, holds = body

@@ -70,9 +70,11 @@ class Placement:
 
 def rotations(matrices: Float) -> Float:
     """The rotations nearest to matrices (..., 3, 3) (Kabsch 1976)."""
-    left, _, right = np.linalg.svd(matrices)
-    left[..., 2] *= np.sign(np.linalg.det(left @ right))[..., None]
-    return left @ right
+    from .rotation_kernels import nearest_rotations
+
+    found = np.empty(matrices.shape)
+    nearest_rotations(np.ascontiguousarray(matrices, np.float64).reshape(-1, 3, 3), found.reshape(-1, 3, 3))
+    return found
 
 
 def patch_of(surface: MomentSurface, position: Float, radius: float, points: int) -> SurfacePatch | None:
