@@ -1,20 +1,13 @@
-"""Where every point of a reference frame is in the other frames.
-
-The nodes of a body (`tracking.body`) carry the points along (embedded deformation: Sumner, Schmid and Pauly
-2007). The body first moves onto a frame as a whole, in the shape that it has in the frame beside. Then places
-all over the reference frame draw its nodes: along the normals of the surface beside them (point to plane,
-Chen and Medioni 1992), along it where colours change (Park, Zhou and Koltun 2017), and to the points
-themselves where these recur (`tracking.pattern`). Where the subject opens, nodes let go of each other. These
-places are always compared with the reference frame, never with the frame before: errors do not add up.
-"""
+"""Where every point of a reference frame is in the other frames: its surface deforms (`tracking.deformation`)
+and carries the points along."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,34 +17,17 @@ from ...scan.pose import Pose
 from ...scan.spacing import typical_spacing
 from ...scan.timeline import Timeline
 from ...task import checkpoint
-from ...threads import ranges, threads_for, together
-from ..tracking.body import BodyPose, DeformableBody
-from ..tracking.pattern import ExpectedPoints, RecurringPoints
+from ..tracking.body import BodyPose
+from ..tracking.deformation import FLOOR, LOST, MOST_PLACES, DeformingSurface
 from ..tracking.surface import MomentSurface
 from .stabilise import outward
 
-if TYPE_CHECKING:
-    from .dense_kernels import CarriedPlaces, PlaceMatches, PullScales
-
 Float = NDArray[np.float64]
 
-_PLACES = 25_000  # of the reference frame that draw the body
-_ROUNDS = 10
-_REACH = 3.0, 2.0  # spacings that a place is drawn over, first and last
-_LOOSE = 6.0, 4.0  # of the usual deviations, at which a residual counts as an outlier, first and last
-_STIFF = 0.3, 0.1  # of the body, first and last
-_LEAST_OFF = 0.02  # spacings: deviations of distances are taken to be this at least
-_LEAST_COLOR = 0.002  # of a byte's range, as of colours
-_DEVIATION = 1.4826  # standard deviation of Gaussian residuals, by their median absolute deviation
-_RIDGE = 1e-9
-_ALIKE = 14.0  # places whose errors are alike, as their parabolas share points
-_BENDING = 1.5  # of the strains around a node, that they may be off
 _UNSUPPORTED = 0.04  # of the way from the nearest point that is seen, the deviation of a hidden one
-_FLOOR = 0.03  # spacings: what a standard deviation is at least
 _EXACT = 0.06  # spacings: noise up to which recurring points are taken as they are; bending makes up to 0.055
 _AROUND = 13  # points, with the one in the middle, that tell its noise
 _MEDIAN_SQUARE = 2.366  # of three Gaussian numbers: the median of the sum of their squares
-_LOST = 2.5  # spacings: a larger standard deviation tells nothing
 
 
 class PointState(IntEnum):
@@ -77,18 +53,6 @@ class TrackedFrame:
     state: NDArray[np.uint8]
     pose: BodyPose | None
     rows: NDArray[np.int32]
-
-
-class _Carried(NamedTuple):
-    """A body, how it lies at rest, the places that it carries there, (N, 3), and those that draw it, by
-    rows."""
-
-    body: DeformableBody
-    rest: BodyPose
-    places: Float
-    held: CarriedPlaces
-    some: NDArray[np.int64]
-    chosen: CarriedPlaces
 
 
 class DensePoints:
@@ -160,64 +124,30 @@ class DensePoints:
 
         beside, earlier: the points there, and in the frame before that.
         """
-        body, rest, places, held, *_ = self._carried
-        recurring = RecurringPoints(before, now, np.empty((0, 3)), np.empty((0, 3)))
-        last = beside.pose or rest
-        step = body.reformed(last, earlier.pose or rest)
-        step.go_to(now.held.points, recurring)
-        start = BodyPose(step.pose.positions, step.pose.turns @ last.turns)
-        rows = self._recurring(start, now, np.where(beside.rows >= 0, recurring.matches[beside.rows], -1))
-        pose, spreads = self._refined(start, now, rows)
-        found = self._matched(_torn(held, body, pose), pose, now, _REACH[1])
+        deforming = self._deforming
+        deformed = deforming.follow(now, before, beside.pose, earlier.pose, beside.rows)
+        rows, found = deformed.rows, deforming.find(deforming.held, deformed, now)
         known = rows >= 0
-        moved = found.places - places
-        is_seen = found.is_matched | known
-        away = self._distances(is_seen)
-        variance = (held.weights * spreads[held.nodes] ** 2).sum(axis=1) + (_UNSUPPORTED * away) ** 2
+        moved = found.positions - deforming.places
+        is_seen = found.is_seen | known
+        variance = found.variances + (_UNSUPPORTED * self._distances(is_seen)) ** 2
         ways = now.held.points[rows] - self.points
         noise = self._noise_of(ways, known)
-        of_points = (_FLOOR * now.spacing) ** 2 + noise**2
+        of_points = (FLOOR * now.spacing) ** 2 + noise**2
         if noise <= _EXACT * now.spacing:
             moved[known], variance[known] = ways[known], of_points
         else:  # the body tells as well, without the noise of both frames
             share = (variance / (variance + of_points))[known]
             moved[known] += share[:, None] * (ways - moved)[known]
             variance[known] *= 1 - share
-        sigma = np.sqrt(np.maximum(variance, (_FLOOR * now.spacing) ** 2))
+        sigma = np.sqrt(np.maximum(variance, (FLOOR * now.spacing) ** 2))
         state = np.where(is_seen, PointState.SEEN, PointState.HIDDEN).astype(np.uint8)
-        state[~(sigma <= _LOST * now.spacing)] = PointState.LOST
-        return TrackedFrame(moved.astype(np.float32), sigma.astype(np.float32), state, pose, rows)
-
-    def _recurring(self, start: BodyPose, now: MomentSurface, known: NDArray[np.int64]) -> NDArray[np.int32]:
-        """The rows of the points in a frame, (N,), -1 where they do not recur. start: about where the body
-        is. known: (N,), the rows that the frame beside tells, or -1."""
-        from .dense_kernels import carry_places
-
-        _, _, places, held, *_ = self._carried
-        there = np.empty_like(places)
-        carry_places(held, start.positions, start.turns, 0, len(places), there)
-        expected = ExpectedPoints(known, there + (self.points - places), start.turns[held.nodes[:, 0]])
-        nowhere = np.empty((0, 3))
-        direct = RecurringPoints(self.surface, now, nowhere, nowhere, expected)
-        return np.where(direct.matches >= 0, direct.matches, known).astype(np.int32)
+        state[~(sigma <= LOST * now.spacing)] = PointState.LOST
+        return TrackedFrame(moved.astype(np.float32), sigma.astype(np.float32), state, deformed.pose, rows)
 
     @cached_property
-    def _carried(self) -> _Carried:
-        """The body at rest, and the places of the points on the surface, without their noise."""
-        from .dense_kernels import CarriedPlaces
-        from .region_kernels import fit_rows
-
-        body = DeformableBody(self.points, self.surface.spacing)
-        count, held = len(self.points), self.surface.held
-        places, normals, fitted = self.points.copy(), np.zeros((count, 3)), np.zeros(count, bool)
-        fit_rows(held, np.arange(count), places, normals, fitted)
-        colors = np.ascontiguousarray(held.parabolas[:, 1:, 0], np.float64)
-        colors[~fitted] = 0.0
-        nodes, weights, offsets = body.around(places)
-        all_of_them = CarriedPlaces(nodes.astype(np.int32), weights, offsets, normals, colors)
-        some = np.arange(0, count, max(1, count // _PLACES))
-        chosen = CarriedPlaces(nodes[some].astype(np.int32), *(each[some] for each in all_of_them[1:]))
-        return _Carried(body, body.pose, places, all_of_them, some, chosen)
+    def _deforming(self) -> DeformingSurface:
+        return DeformingSurface(self.surface)
 
     @cached_property
     def _predictions(self) -> tuple[NDArray[np.intp], Float]:
@@ -225,7 +155,7 @@ class DensePoints:
         its own, if the surface is stretched alike there."""
         from scipy.spatial import cKDTree
 
-        some = self.points[:: max(1, len(self.points) // _PLACES)]
+        some = self.points[:: max(1, len(self.points) // MOST_PLACES)]
         rows = cKDTree(self.points).query(some, [*range(1, min(_AROUND, len(self.points)) + 1)])[1]
         offsets = self.points[rows[:, 1:]] - self.points[rows[:, :1]]
         tangents = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))[1][:, :, 1:]
@@ -250,97 +180,9 @@ class DensePoints:
 
         away = np.zeros(len(self.points))
         if not is_seen.all():
-            some = self.points[is_seen][:: max(1, int(is_seen.sum()) // _PLACES)]
+            some = self.points[is_seen][:: max(1, int(is_seen.sum()) // MOST_PLACES)]
             away[~is_seen] = cKDTree(some).query(self.points[~is_seen])[0] if len(some) else np.inf
         return away
-
-    def _refined(self, pose: BodyPose, now: MomentSurface, rows: NDArray[np.int32]) -> tuple[BodyPose, Float]:
-        """A pose drawn by places to a frame, and the standard deviations of its nodes, (K,).
-
-        rows: (N,), of the points of the frame that are known to be the same, or -1.
-        """
-        from .dense_kernels import gather_pulls
-
-        body, _, places, _, some, held = self._carried
-        known = np.full((len(some), 3), np.nan)
-        matches = rows[some]
-        is_known = matches >= 0
-        known[is_known] = (now.held.points[matches] + (places - self.points)[some])[is_known]
-        pulls, pushes = np.empty_like(pose.turns), np.empty_like(pose.positions)
-        share = held.weights.sum() / len(pose.positions)  # of places, that draw a node
-        stiffness, off = _STIFF[1], 0.0
-        for part in np.linspace(0, 1, _ROUNDS):
-            reach = now.spacing * _REACH[0] ** (1 - part) * _REACH[1] ** part
-            torn = _torn(held, body, pose)
-            found = self._matched(torn, pose, now, reach)
-            scales = _scales(found, now)
-            loose = _LOOSE[0] ** (1 - part) * _LOOSE[1] ** part
-            gather_pulls(torn, found, known, scales, loose, pulls, pushes)
-            pulls /= share
-            pushes /= share
-            ways = np.linalg.solve(pulls + _RIDGE * np.eye(3), pushes[..., None])[..., 0]
-            stiffness, off = _STIFF[0] ** (1 - part) * _STIFF[1] ** part, scales.off
-            pose = body.strained(pose, stiffness, pulls, pose.positions + ways)
-        noise = off * np.sqrt(_ALIKE / share)
-        deviations = body.deviations(pose, stiffness, pulls, noise, _BENDING)
-        return pose, np.hypot(deviations, _FLOOR * now.spacing)
-
-    def _matched(self, held: CarriedPlaces, pose: BodyPose, now: MomentSurface, reach: float) -> PlaceMatches:
-        """Places as a body in a pose carries them, beside the surface of a frame."""
-        from .dense_kernels import PlaceMatches, carry_places, find_beside, fit_surface, match_places
-
-        count, channels = held.colors.shape
-        if now.held.colors.shape[1] != channels:  # one of the frames has no colours
-            channels = 0
-        found = PlaceMatches(
-            np.empty((count, 3)),
-            np.empty(count, np.int64),
-            np.zeros(count, bool),
-            np.empty(count),
-            np.empty((count, 3)),
-            np.empty((count, channels)),
-            np.empty((count, channels, 3)),
-        )
-        points = len(now.held.points)
-
-        def each(work: Callable[[int, int], object], count: int) -> None:
-            borders = np.linspace(0, count, threads_for(points) + 1).astype(np.int64)
-            together(points, [partial(work, first, last) for first, last in ranges(borders)])
-
-        def find(first: int, last: int) -> None:
-            carry_places(held, pose.positions, pose.turns, first, last, found.places)
-            find_beside(now.held, reach, first, last, found)
-
-        each(find, count)
-        rows = found.rows[found.rows >= 0]
-        rows = np.unique(rows[now.held.state[rows] == 0])
-        each(lambda first, last: fit_surface(now.held, rows, first, last), len(rows))
-        each(lambda first, last: match_places(now.held, held, pose.turns, first, last, found), count)
-        return found
-
-
-def _torn(held: CarriedPlaces, body: DeformableBody, pose: BodyPose) -> CarriedPlaces:
-    """Places that go along with the nearest of their nodes, and with the others as far as these do."""
-    weights = held.weights * body.intact(pose)[held.nodes[:, 0]]
-    return held._replace(weights=weights / weights.sum(axis=1, keepdims=True))
-
-
-def _scales(found: PlaceMatches, now: MomentSurface) -> PullScales:
-    """The standard deviations of the distances and colours of matched places.
-
-    They are those of the frame's points from the parabolas around them: where the body is changes nothing.
-    """
-    from .dense_kernels import PullScales
-
-    rows, channels = found.rows[found.is_matched], found.colors.shape[1]
-    least = np.array([_LEAST_OFF * now.spacing, *[_LEAST_COLOR] * channels])
-    shifts, scales = np.zeros(channels), least
-    if len(rows):
-        heights = now.held.parabolas[rows, : 1 + channels, 0]
-        heights[:, 1:] -= now.held.colors[rows, :channels]
-        shifts = np.median(found.colors[found.is_matched], axis=0)
-        scales = np.maximum(_DEVIATION * np.median(np.abs(heights), axis=0), least)
-    return PullScales(float(scales[0]), scales[1:], shifts)
 
 
 def _surface(pose: Pose, origin: Float) -> MomentSurface:

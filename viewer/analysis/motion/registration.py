@@ -66,7 +66,7 @@ class RegionSurface:
     @classmethod
     def of(cls, surface: MomentSurface, rows: NDArray[np.integer]) -> RegionSurface | None:
         """The surface at some rows, increasing; None where too few points have a surface around them."""
-        from .region_kernels import fit_rows
+        from ..tracking.deformation_kernels import fit_rows
 
         some = np.linspace(0, len(rows) - 1, min(len(rows), _POINTS)).astype(np.int64)
         chosen = rows[some].astype(np.int64)

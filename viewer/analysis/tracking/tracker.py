@@ -21,6 +21,7 @@ from ..surface_point import SurfacePoint, followed
 from ..track import Track
 from .blending import track_of
 from .body import DeformableBody
+from .carrier import Carrier
 from .follower import Follower, Sighting
 from .pattern import RecurringPoints
 from .settings import TrackingSettings
@@ -28,6 +29,7 @@ from .surface import MomentSurface
 
 _MOMENTS = 5  # that are held: two in each direction, and one in which landmarks were set
 _APART = 0.04, 3.0  # of the scan's size, and spacings: changes of distances that ask for a body
+_MANY = 100  # landmarks of a frame, for which one body costs less than a patch for each
 _THREADS = max(1, min(4, os.cpu_count() or 1))
 
 
@@ -114,6 +116,7 @@ class Tracker:
         self._moments: OrderedDict[int, _Moment] = old._moments if old else OrderedDict()
         self._passes: dict[tuple[SurfacePoint, int], _Pass] = {}
         self._bodies: dict[int, tuple[int, DeformableBody]] = {}  # by direction: in which frame, and which
+        self._carriers: dict[tuple[int, int], Carrier] = old._carriers if old else {}  # by key, direction
         for landmark in self._landmarks:
             for part in _passes_of(landmark, len(timeline)):
                 name = part.spot, part.direction
@@ -186,6 +189,7 @@ class Tracker:
             part.follower = None if not part.left else part.follower
         self._moments.clear()
         self._bodies.clear()
+        self._carriers.clear()
 
     def _carried(self) -> Iterator[int]:
         """Carry the spots of passes that have not begun; gives the frames of which something new is known."""
@@ -246,6 +250,9 @@ class Tracker:
 
     def _follow(self, parts: Sequence[_Followed], frame: int, pool: ThreadPoolExecutor) -> None:
         """Have passes that are at one frame look at the next one."""
+        parts = self._carry_along(parts, frame)
+        if not parts:
+            return
         shares = [parts[thread::_THREADS] for thread in range(_THREADS)]
         for thread, share in enumerate(shares):  # made here: what a thread makes, another one must not
             for _, *moments in share:
@@ -270,6 +277,31 @@ class Tracker:
                 part.seen[frame] = sighting
         if left:
             self._follow_surface(left, frame, pool, followers, unmoved, points)
+
+    def _carry_along(self, parts: Sequence[_Followed], frame: int) -> Sequence[_Followed]:
+        """Have passes look at the next frame that set out from one frame together with many others; gives
+        those that are left."""
+        assert self._origin is not None
+        left: list[_Followed] = []
+        groups: dict[int, list[_Followed]] = {}
+        for one in parts:
+            groups.setdefault(one[0].spot.frame, []).append(one)
+        for start, group in groups.items():
+            part, key, _, moment = group[0]
+            carrier = self._carriers.get((start, part.direction))
+            if carrier is not None and (carrier.at - part.at) * part.direction > 0:
+                carrier = None  # it is ahead
+            if carrier is None and key is not None and part.at == start and len(group) > _MANY:
+                carrier = Carrier(start, key.surface(0), self._origin)
+                self._carriers[start, part.direction] = carrier
+            if carrier is None:
+                left += group
+                continue
+            carrier.move_to(frame, moment.surface(0))
+            spots = [one[0].spot for one in group]
+            for one, sighting in zip(group, carrier.sightings(spots), strict=True):
+                one[0].seen[frame] = sighting
+        return left
 
     def _follow_surface(
         self,

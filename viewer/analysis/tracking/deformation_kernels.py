@@ -1,4 +1,4 @@
-"""Loops over the places of a reference frame that a body carries, compiled by numba; see `dense`."""
+"""Loops over the places of a reference frame that a body carries, compiled by numba; see `deformation`."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import compiled
-from ..tracking.robust_kernels import tukey_weight
-from ..tracking.surface_kernels import Cells, fit_at, nearest_within, parabola_height, parabola_slopes
+from .robust_kernels import tukey_weight
+from .surface_kernels import Cells, fit_at, nearest_within, parabola_height, parabola_slopes
 
 Float = NDArray[np.float64]
 
@@ -65,6 +65,28 @@ def find_beside(surface: Cells, reach: float, first: int, last: int, found: Plac
     for i in range(first, last):
         x, y, z = found.places[i, 0], found.places[i, 1], found.places[i, 2]
         found.rows[i] = nearest_within(surface, x, y, z, reach)
+
+
+@compiled
+def fit_rows(
+    surface: Cells, rows: NDArray[np.int64], points: Float, normals: Float, fitted: NDArray[np.bool_]
+) -> None:
+    """Fit the surface at rows (n,): fills points (n, 3), moved onto it, its normals (n, 3), and whether there
+    is one, (n,)."""
+    normal = np.empty(3)
+    for i in range(len(rows)):
+        row = rows[i]
+        fitted[i] = fit_at(surface, row)
+        if not fitted[i]:
+            continue
+        f, p = surface.frames[row], surface.parabolas[row]
+        squared = 0.0
+        for k in range(3):
+            points[i, k] = surface.points[row, k] + p[0, 0] * f[2, k]
+            normal[k] = f[2, k] - p[0, 1] * f[0, k] - p[0, 2] * f[1, k]
+            squared += normal[k] * normal[k]
+        for k in range(3):
+            normals[i, k] = normal[k] / np.sqrt(squared)
 
 
 @compiled
@@ -142,8 +164,9 @@ def gather_pulls(
 ) -> None:
     """Fill pulls (N, 3, 3), the weights with which places draw nodes, and pushes (N, 3), weights times ways.
 
-    known: (P, 3), where places are known to be, NaN elsewhere. loose: see `dense`. A place draws each of its
-    nodes by its share: that bounds the squared distance from above (Jensen), so each step lowers the sum.
+    known: (P, 3), where places are known to be, NaN elsewhere. loose: see `deformation`. A place draws each
+    of its nodes by its share: that bounds the squared distance from above (Jensen), so each step lowers the
+    sum.
     """
     pulls[:], pushes[:] = 0.0, 0.0
     one, way = np.empty((3, 3)), np.empty(3)
