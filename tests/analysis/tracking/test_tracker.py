@@ -55,7 +55,7 @@ def test_a_hole_is_a_gap_and_the_landmark_is_found_again() -> None:
         timeline_of(MovingHills(FRAMES, hole=hole)), [placed("middle", key(0.0, 0.0, 0))]
     )
     track = tracks["middle"]
-    assert track.known.tolist() == [3, 2, 2, 1, 1, 2, 2]
+    assert track.known.tolist() == [4, 2, 2, 1, 1, 2, 2]
     assert sorted(track.reasons) == [3, 4]
     assert "hole" in track.reasons[3]
     assert np.isnan(track.positions[3]).all()
@@ -66,7 +66,7 @@ def test_a_hole_is_a_gap_and_the_landmark_is_found_again() -> None:
 def test_between_keys_both_sides_count_and_a_key_that_was_moved_is_met() -> None:
     first, last = key(0.0, 0.0, 0), key(0.5, 0.0, 6)  # the second one is set half a unit beside
     track = track_landmarks(timeline_of(MovingHills(FRAMES)), [placed("middle", first, last)])["middle"]
-    assert track.known.tolist() == [3, 2, 2, 2, 2, 2, 3]
+    assert track.known.tolist() == [4, 2, 2, 2, 2, 2, 4]
     off = errors(track, (0.0, 0.0))
     assert (np.diff(off) > -0.1).all()
     assert 0.15 < off[3] < 0.4
@@ -76,7 +76,7 @@ def test_between_keys_both_sides_count_and_a_key_that_was_moved_is_met() -> None
 def test_what_is_marked_as_missing_is_a_gap() -> None:
     landmark = replace(placed("middle", key(0.0, 0.0, 0)), missing=(2,))
     track = track_landmarks(timeline_of(MovingHills(4)), [landmark])["middle"]
-    assert track.known.tolist() == [3, 2, 1, 2]
+    assert track.known.tolist() == [4, 2, 1, 2]
     assert track.reasons == {2: "you marked the landmark as not visible"}
 
 
@@ -84,11 +84,11 @@ def test_a_broken_frame_is_a_gap() -> None:
     source = MovingHills(5, broken=frozenset({2}))
     landmarks = [placed("middle", key(0.0, 0.0, 0)), placed("beside", key(6.0, -5.0, 4))]
     track = track_landmarks(timeline_of(source), landmarks)["middle"]
-    assert track.known.tolist() == [3, 2, 1, 2, 2]
+    assert track.known.tolist() == [4, 2, 1, 2, 2]
     assert "damaged" in track.reasons[2]
     assert source.read.count(2) == 1
     lost = track_landmarks(timeline_of(source), [placed("middle", key(0.0, 0.0, 2))])["middle"]
-    assert lost.known.tolist() == [1, 1, 3, 1, 1]
+    assert lost.known.tolist() == [1, 1, 4, 1, 1]
     assert source.read.count(2) == 2, "once for each scan"
 
 
@@ -118,7 +118,7 @@ def test_only_what_changed_is_tracked_anew() -> None:
     corrected = landmarks[0].with_key(key(*PLACES["middle"], 4))
     after = Tracker(timeline, [corrected, landmarks[1]], known=before)
     assert after.tracks["beside"] is before.tracks["beside"]
-    assert after.tracks["middle"].known.tolist() == [3, 2, 2, 2, 3, 0, 0]
+    assert after.tracks["middle"].known.tolist() == [4, 2, 2, 2, 4, 0, 0]
     assert sorted(after.run()) == [0, 1, 2, 3, 5, 6]
     assert after.tracks["beside"] is before.tracks["beside"]
     assert after.tracks["middle"].is_whole
@@ -134,7 +134,7 @@ def test_a_cancelled_tracker_goes_on_later() -> None:
         task.cancel()
         with pytest.raises(Cancelled):
             next(run)
-    assert tracker.tracks["middle"].known.tolist() == [3, 2, 0, 0]
+    assert tracker.tracks["middle"].known.tolist() == [4, 2, 0, 0]
     assert list(tracker.run()) == [2, 3]
     assert tracker.tracks["middle"].is_whole
 
@@ -172,8 +172,8 @@ def test_landmarks_in_one_place_are_each_followed_as_far_as_they_go(names: tuple
     first = key(0.0, 0.0, 0)
     landmarks = {"far": placed("far", first), "near": placed("near", first, key(0.0, 0.0, 2))}
     tracks = track_landmarks(timeline_of(MovingHills(5)), [landmarks[name] for name in names])
-    assert tracks["far"].known.tolist() == [3, 2, 2, 2, 2]
-    assert tracks["near"].known.tolist() == [3, 2, 3, 2, 2]
+    assert tracks["far"].known.tolist() == [4, 2, 2, 2, 2]
+    assert tracks["near"].known.tolist() == [4, 2, 4, 2, 2]
 
 
 def test_where_points_are_the_same_a_place_that_follows_none_is_followed_by_its_surface() -> None:
@@ -188,7 +188,7 @@ def test_where_points_are_the_same_a_place_that_follows_none_is_followed_by_its_
     farther = Tracker(timeline, [landmark.without_key(2)], known=before)
     list(farther.run())
     track = farther.tracks["middle"]
-    assert track.known.tolist() == [3, 2, 2, 2, 2]
+    assert track.known.tolist() == [4, 2, 2, 2, 2]
     assert errors(track, (0.0, 0.0)).max() < 0.25 * SPACING
 
 
@@ -205,7 +205,7 @@ def test_keys_that_are_certain_are_blended_half_and_half() -> None:
         Track.pending(np.arange(3.0)),
         range(3),
     )
-    assert track.known.tolist() == [3, 2, 3]
+    assert track.known.tolist() == [4, 2, 4]
     assert track.positions[1].tolist() == [2, 0, 0]
     assert track.sigmas[1] == 1
 
@@ -217,7 +217,7 @@ def test_a_scan_of_one_frame_and_landmarks_that_are_not_placed() -> None:
         timeline_of(MovingHills(1)),
         [placed("middle", key(0.0, 0.0, 0)), Landmark("none"), placed("late", key(0.0, 0.0, 3))],
     )
-    assert tracks["middle"].known.tolist() == [3]
+    assert tracks["middle"].known.tolist() == [4]
     assert "none" not in tracks
     assert tracks["late"].known.tolist() == [1]
 
@@ -232,12 +232,12 @@ def test_what_an_earlier_tracker_saw_of_a_key_is_told_where_another_key_changes(
     timeline = timeline_of(MovingHills(FRAMES))
     landmark = replace(placed("middle", key(0.0, 0.0, 0), key(0.0, 0.0, 4)), missing=(6, FRAMES + 3))
     before = Tracker(timeline, [landmark])
-    assert before.tracks["middle"].known.tolist() == [3, 0, 0, 0, 3, 0, 1]
+    assert before.tracks["middle"].known.tolist() == [4, 0, 0, 0, 4, 0, 1]
     for _ in before.run():
         pass
     changed = replace(landmark.without_key(0), missing=(5,))
     after = Tracker(timeline, [changed], known=before).tracks["middle"]
-    assert after.known.tolist() == [2, 2, 2, 2, 3, 1, 2]
+    assert after.known.tolist() == [2, 2, 2, 2, 4, 1, 2]
     np.testing.assert_array_equal(after.known == Known.GAP, [key in after.reasons for key in range(FRAMES)])
 
 

@@ -163,6 +163,20 @@ def resampled_demo(
     return _all_there(KeptFrames(scan, clouds, times), names, paths, typical_spacing(clouds[0]))
 
 
+def scattered_demo(scan: str, noise: float, landmarks: int, *, behind: float, seed: int = 0) -> KnownScan:
+    """The demo or a variant, sampled anew in each frame, with random places of the first one as landmarks.
+
+    behind: see `ResampledDemo`.
+    """
+    source = ResampledDemo(scan, noise, seed, behind)
+    clouds = [source.load(index) for index in range(len(source))]
+    paths = source.paths(0, range(len(source)))
+    rows = np.random.default_rng(seed).choice(paths.shape[1], landmarks, replace=False)
+    names = tuple(f"point {row}" for row in rows)
+    kept = KeptFrames(scan, clouds, source.times())
+    return _all_there(kept, names, paths[:, rows], typical_spacing(clouds[0]))
+
+
 def resampled_mesh(
     source: FrameSource, name: str, landmarks: int = 21, *, noise: float = 0.0, seed: int = 0
 ) -> KnownScan:

@@ -77,7 +77,7 @@ def judge_tracks(known: KnownScan, tracks: Mapping[str, Track], seconds: float =
     states = np.stack([tracks[name].known for name in known.names], axis=1)
     positions = np.stack([tracks[name].positions for name in known.names], axis=1)
     sigmas = np.stack([tracks[name].sigmas for name in known.names], axis=1)
-    tracked = (states == Known.TRACKED) & known.counted
+    tracked = np.isin(states, (Known.TRACKED, Known.CARRIED)) & known.counted
     errors = np.linalg.norm(positions - known.paths, axis=2)[tracked]
     gaps = states == Known.GAP
     asked = known.counted & (states != Known.PLACED)

@@ -7,7 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from experiments.landmarks.known import KnownScan, resampled_demo, scanned_demo, shuffled_mesh
+from experiments.landmarks.known import (
+    KnownScan,
+    resampled_demo,
+    resampled_mesh,
+    scanned_demo,
+    scattered_demo,
+    shuffled_mesh,
+)
 from experiments.landmarks.landmark_judge import Judgement, judge_tracking
 from experiments.script import Script
 from experiments.tables import Row
@@ -19,6 +26,8 @@ from viewer.scan.open import find_source
 CASES = (("smile", 2, (0.0, 0.1, 0.25)), ("sway", 2, (0.1,)), ("cough", 2, (0.1,)), ("sway", 1, (0.1,)))
 MESHES = {"crane": "crane_175", "horse-gallop": "horse_gallop_48"}
 SEEDS = range(5)  # of the vertices that are landmarks
+MANY = 500  # landmarks, at random
+BEHIND = -25.0  # mm: what is farther back is left out
 JUMPS = range(0, 64, 8)  # frames of a smile of which each is far from the one before
 
 
@@ -43,6 +52,26 @@ def tracked_files(options: Namespace) -> Iterator[Row]:
     yield _filed("`demo:smile:1`, every 8th", resampled_demo("demo:smile:1", 0.1, JUMPS))
 
 
+def tracked_many(options: Namespace) -> Iterator[Row]:
+    """Errors and times of as many landmarks as one surface carries."""
+    for variant in ("smile", "sway", "cough"):
+        scan = f"demo:{variant}:1"
+        yield _carried(scattered_demo(scan, 0.1, MANY, behind=BEHIND), 1, " mm")
+    for name, folder in MESHES.items():
+        known = resampled_mesh(find_source(options.data / "sequences" / folder), name, MANY)
+        yield _carried(known, known.spacing, " spacings")
+
+
+def _carried(known: KnownScan, unit: float, name: str) -> Row:
+    """A row of `tracked_many`."""
+    found = judge_tracking(known, track_landmarks)
+    return {
+        "scan": f"`{known.name}`", "frames": str(found.frames), **_lengths(found, unit, name),
+        "within 2 sigma": _share(found.within), "gaps": _share(found.gaps_false),
+        "s a frame": f"{found.seconds:.2f}",
+    }  # fmt: skip
+
+
 def _filed(name: str, known: KnownScan) -> Row:
     """A row of `tracked_files`."""
     found = judge_tracking(known, track_landmarks, from_file=True)
@@ -64,4 +93,4 @@ def _share(share: float) -> str:
     return "" if np.isnan(share) else f"{100 * share:.1f} %"
 
 
-EXPERIMENT = Script([tracked, tracked_files], {"data": None}, "landmarks.md")
+EXPERIMENT = Script([tracked, tracked_files, tracked_many], {"data": None}, "landmarks.md")
