@@ -98,7 +98,7 @@ def test_references_and_a_region_are_chosen(tmp_path: Path, scan: Path, scale: i
         virtual_screen(folder, (1024 * scale, 640 * scale), scale) as screen,
         running_app(screen, tmp_path, scan, before=alone(tmp_path)) as app,
     ):
-        app.act(PANEL, ("item_click", "###deviation"))
+        app.act(PANEL, ("item_click", "###show deviation"))
         app.press("Right", "Right")
         app.act(PANEL, ("item_click", "###reference of deviations"))
         assert app.settle().document["parts"]["deviation"]["first"] == 2

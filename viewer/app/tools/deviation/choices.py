@@ -10,7 +10,7 @@ from ....document.part import Part
 from .._painting import Sphere
 
 FRAME, MEAN, FILE = "frame", "mean", "file"
-KIND_WORDS = {FRAME: "A frame", MEAN: "Mean of frames", FILE: "Another scan or mesh"}
+KIND_WORDS = {FRAME: "A frame", MEAN: "Mean of frames", FILE: "Scan or mesh file"}
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,6 @@ import numpy as np
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from ....analysis.deviation.reference import ESTIMATED
-from ....analysis.deviation.statistics import DeviationStatistics
 from ....look import color_table
 from ....scan.times import frame_in_words
 from ... import widgets
@@ -32,7 +32,7 @@ _ROWS = (
 def draw(tool: Tool, ui: Ui) -> None:
     """Declare the section of the panel."""
     is_on = tool.choices.is_on
-    if ui.row(widgets.labelled("Hide deviation" if is_on else "Show deviation", "deviation")).button():
+    if ui.row(widgets.labelled("Hide deviation" if is_on else "Show deviation", "show deviation")).button():
         tool.toggle()
     ui.tooltip("Measure how far each frame is from a reference, and colour the scan by it", "deviation")
     _draw_reference(tool, ui)
@@ -124,7 +124,7 @@ def _draw_numbers(tool: Tool) -> None:
             widgets.tooltip(about)
             for one in columns.values():
                 imgui.table_next_column()
-                imgui.text(_length(tool, one, name))
+                imgui.text(_length(tool, getattr(one, name), found.whole.max))
         imgui.table_next_column()
         imgui.text_disabled("Has a value")
         widgets.tooltip("Share of the points that lie above or below the reference. Other points are grey")
@@ -134,10 +134,14 @@ def _draw_numbers(tool: Tool) -> None:
         imgui.end_table()
 
 
-def _length(tool: Tool, one: DeviationStatistics, name: str) -> str:
-    value = getattr(one, name)
+def _length(tool: Tool, value: float, largest: float) -> str:
+    """A length in words, with as many decimals as give the largest one three digits."""
     scale = tool.context.scale
-    return f"{scale.factor * value:.3g} {scale.unit}" if np.isfinite(value) else "-"
+    if not np.isfinite(value):
+        return "-"
+    top = scale.factor * largest
+    decimals = max(2 - math.floor(math.log10(top)), 0) if top > 0 else 0
+    return f"{scale.factor * value:.{decimals}f} {scale.unit}"
 
 
 def _draw_histogram(tool: Tool) -> None:
