@@ -156,7 +156,7 @@ class DensePoints:
         from scipy.spatial import cKDTree
 
         some = self.points[:: max(1, len(self.points) // MOST_PLACES)]
-        rows = cKDTree(self.points).query(some, [*range(1, min(_AROUND, len(self.points)) + 1)])[1]
+        rows = cKDTree(self.points).query(some, _AROUND)[1]
         offsets = self.points[rows[:, 1:]] - self.points[rows[:, :1]]
         tangents = np.linalg.eigh(np.einsum("nki,nkj->nij", offsets, offsets))[1][:, :, 1:]
         flat = np.concatenate([np.ones((*offsets.shape[:2], 1)), offsets @ tangents], axis=2)
@@ -165,9 +165,11 @@ class DensePoints:
     def _noise_of(self, ways: Float, known: NDArray[np.bool_]) -> float:
         """The standard deviation that noise of both frames gives the ways (N, 3) of points along an axis: so
         much are they off what those around predict. known: (N,). 0 where too few are."""
+        if known.sum() < _AROUND:
+            return 0.0
         rows, shares = self._predictions
         told = known[rows].all(axis=1)
-        if rows.shape[1] < _AROUND or not told.any():
+        if not told.any():
             return 0.0
         rows, shares = rows[told], shares[told]
         off = ways[rows[:, 0]] - np.einsum("nk,nki->ni", shares, ways[rows[:, 1:]])

@@ -30,6 +30,8 @@ _SHARE = 4  # points to a node, at least
 _TARGETS = 900  # points of a frame by which poses are compared
 _LOOKED_AT = 10_000  # points at most that nodes are chosen from and drawn to
 _BESIDE = 8  # nodes that hold a node
+_WAY = 6.0  # node distances along the surface, within which nodes hold each other
+_STARTS = 100  # nodes at a time, of which the ways to the others are found
 _JOINED = 2.5  # local spacings between points that lie beside each other on the surface
 _STRAY = 8.0  # spacings to the fourth neighbour, from which on a point belongs to nothing
 _PIECE = 0.01  # of the points: a smaller connected piece is no part of the body
@@ -115,11 +117,14 @@ class DeformableBody:
         rows = inner[chosen]
         rest = some[rows]
         count = len(rows)
-        along = dijkstra(graph, directed=False, indices=rows, limit=6 * self.distance)[:, rows]
-        nearest = np.argsort(along, axis=1)[:, 1 : _BESIDE + 1]
-        is_near = np.isfinite(np.take_along_axis(along, nearest, axis=1))
         own = np.arange(count)[:, None]
-        self._around = np.hstack([own, np.where(is_near, nearest, own)])
+        self._around = np.repeat(own, min(_BESIDE + 1, count), axis=1)
+        for first in range(0, count, _STARTS):  # the ways from all nodes at once would fill the memory
+            part = slice(first, first + _STARTS)
+            along = dijkstra(graph, directed=False, indices=rows[part], limit=_WAY * self.distance)[:, rows]
+            nearest = np.argsort(along, axis=1)[:, 1 : _BESIDE + 1]
+            is_near = np.isfinite(np.take_along_axis(along, nearest, axis=1))
+            self._around[part, 1:] = np.where(is_near, nearest, own[part])
         is_beside = np.zeros((count, count), bool)
         is_beside[own, self._around] = True
         is_beside |= is_beside.T

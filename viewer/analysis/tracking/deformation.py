@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...threads import ranges, threads_for, together
+from ...threads import ranges, shares, threads_for, together
 from .body import BodyPose, DeformableBody
 from .pattern import ExpectedPoints, RecurringPoints
 from .surface import MomentSurface
@@ -84,7 +84,13 @@ class DeformingSurface:
         self._body = DeformableBody(held.points, surface.spacing)
         self._rest = self._body.pose
         self.places, normals, fitted = held.points.copy(), np.zeros((count, 3)), np.zeros(count, bool)
-        fit_rows(held, np.arange(count), self.places, normals, fitted)
+        rows = np.arange(count)
+
+        def fit(first: int, last: int) -> None:
+            part = slice(first, last)
+            fit_rows(held, rows[part], self.places[part], normals[part], fitted[part])
+
+        together(count, [partial(fit, *share) for share in shares(count)])
         colors = np.ascontiguousarray(held.parabolas[:, 1:, 0], np.float64)
         colors[~fitted] = 0.0
         self.held = self.hold(self.places, normals, colors)

@@ -12,14 +12,17 @@ looked for.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...threads import shares, together
 from .surface import MomentSurface
 
 if TYPE_CHECKING:
+    from .pattern_growth_kernels import MatchGrowth
     from .pattern_search_kernels import PatternFit, PatternSearch
 
 Float = NDArray[np.float64]
@@ -219,7 +222,10 @@ class RecurringPoints:
         if self._queued:
             from .pattern_growth_kernels import prove_matches
 
-            prove_matches(before.held, now.held, before.around, self._grown, self.maps, self.matches)
+            def prove(first: int, last: int) -> None:
+                prove_matches(before.held, now.held, before.around, self._growth, first, last, self.matches)
+
+            together(count, [partial(prove, *share) for share in shares(count)])
 
     def carried(self, rows: Rows, linear: Float) -> tuple[Rows, Float]:
         """Rows (n,) of the frame, or -1, in the next one, and a map to the frame, (3, 3), as one to the next,
@@ -240,6 +246,12 @@ class RecurringPoints:
         rows = known[nearest]
         arms = np.einsum("nij,nj->ni", self.maps[rows], positions - points[nearest])
         return self._now.held.points[self.matches[rows]] + arms, away <= reach
+
+    @property
+    def _growth(self) -> MatchGrowth:
+        from .pattern_growth_kernels import MatchGrowth
+
+        return MatchGrowth(self._grown, self._taken, self.maps, self._queue, self._is_reached)
 
     def _expected_at(self, row: int) -> tuple[Float, Float, float]:
         """Predict where a point goes, (3,), how it turns, (3, 3), and to how many spacings: as the nearest
@@ -268,7 +280,7 @@ class RecurringPoints:
 
     def _grow(self, rows: Rows, matches: Rows, maps: Float) -> None:
         """Grow from matches (n,) of rows (n,), of those that have none yet. maps: (n, 3, 3)."""
-        from .pattern_growth_kernels import MatchGrowth, grow_matches
+        from .pattern_growth_kernels import grow_matches
 
         is_free = (self._grown[rows] < 0) & (self._taken[matches] < 0)
         is_first = np.zeros(len(rows), bool)
@@ -283,7 +295,7 @@ class RecurringPoints:
             self._before.held,
             self._now.held,
             self._before.around,
-            MatchGrowth(self._grown, self._taken, self.maps, self._queue, self._is_reached),
+            self._growth,
             first,
             last,
         )

@@ -102,13 +102,14 @@ def grow_matches(
 
 @compiled
 def prove_matches(
-    before: Cells, now: Cells, around: NDArray[np.int32], matches: NDArray[np.int64], maps: Float,
+    before: Cells, now: Cells, around: NDArray[np.int32], growth: MatchGrowth, first: int, last: int,
     proven: NDArray[np.int64],
 ) -> None:  # fmt: skip
-    """Keep the matches that those around them bear out: proven (N,) gets them, others are -1. The arrays are
-    those of `grow_matches`."""
+    """Keep those of the matches from first to last - 1 that the ones around them bear out: proven (N,) gets
+    them, others are -1. around: as of `grow_matches`."""
+    matches, maps = growth.matches, growth.maps
     linear, position = np.empty((3, 3)), np.empty(3)
-    for row in range(len(matches)):
+    for row in range(first, last):
         proven[row] = -1
         if matches[row] < 0:
             continue
