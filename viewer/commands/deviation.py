@@ -8,7 +8,7 @@ M3C2, values are distances between means of points, and each has a level of dete
 from __future__ import annotations
 
 import re
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, Namespace
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -26,11 +26,12 @@ from ..analysis.motion.stabilise import FrameMotion
 from ..csv_text import cell, save_rows
 from ..document.saved_session import known_as
 from ..errors import InputError
-from ..files import output_folder, save_json, whole_file
+from ..files import output_folder, save_json
 from ..scan.inputs import scan_inputs
+from ..scan.pose import Pose
 from ..scan.timeline import Timeline
-from ..scan.times import frame_in_words
-from ._console import progress, tell, warn
+from ._console import tell, warn
+from ._maps import map_files, positive_length, tell_left_out, written_maps
 from ._outputs import add_output_argument, claim
 from ._reference import StartOfMotion, check_unit
 from ._rigid import rigid_part, tell_rigid
@@ -40,7 +41,7 @@ _TABLE, _REPORT, _PARTIAL = "deviation.csv", "report.json", "transforms.partial"
 _COLUMNS = ("frame", "time", "mean", "rms", "p95", "max", "share")
 _SURFACE, _M3C2 = "surface", "m3c2"
 _VALUE, _DETECTABLE, _DETECTED = "value", "detectable", ("detected",)
-_NONE = {_VALUE: np.empty(0, np.float32), _DETECTABLE: np.empty(0, np.float32)}
+_NONE = np.empty(0, np.float32)
 _FEW = 0.5  # of the points: a warning where fewer have a value
 
 
@@ -66,7 +67,7 @@ def add_arguments(parser: ArgumentParser) -> None:
         "Scan4D finds it",
     )  # fmt: skip
     parser.add_argument(
-        "--reach", type=_length, metavar="LENGTH",
+        "--reach", type=positive_length, metavar="LENGTH",
         help="distance from the reference beyond which a point has no value, in the unit of the scan; "
         "default: a tenth of the longest edge of the reference",
     )  # fmt: skip
@@ -76,11 +77,11 @@ def add_arguments(parser: ArgumentParser) -> None:
         "distance between the means of the points in a cylinder; default surface",
     )  # fmt: skip
     parser.add_argument(
-        "--cylinder", type=_length, metavar="RADIUS",
+        "--cylinder", type=positive_length, metavar="RADIUS",
         help="with M3C2: radius of the cylinder; default: 2.5 times the spacing of the reference",
     )  # fmt: skip
     parser.add_argument(
-        "--normal", type=_length, metavar="RADIUS",
+        "--normal", type=positive_length, metavar="RADIUS",
         help="with M3C2: radius around a point whose plane gives its normal; default: 3 times the spacing "
         "of the reference, or 12.5 times its noise if that is more",
     )  # fmt: skip
@@ -119,16 +120,6 @@ class _Compared:
     facts: dict[str, Any]
 
 
-def _length(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not 0 < value < np.inf:
-        raise ArgumentTypeError(f"'{text}' is not a positive length")
-    return value
-
-
 @contextmanager
 def _opened(args: Namespace, timeline: Timeline) -> Iterator[Timeline]:
     """The scan of the reference. Raises InputError where its unit differs."""
@@ -143,27 +134,24 @@ def _opened(args: Namespace, timeline: Timeline) -> Iterator[Timeline]:
 def _written(args: Namespace, timeline: Timeline, other: Timeline) -> list[Path]:
     """Measure all frames; gives the files that it wrote. Raises InputError."""
     table, facts = args.out / _TABLE, args.out / _REPORT
-    files = [args.out / f"{index + 1:04d}.npz" for index in range(len(timeline))]
+    files = map_files(args.out, timeline)
     inputs = [*scan_inputs(timeline), *scan_inputs(other), *([args.region] if args.region else [])]
     claim([table, facts, *files], inputs, args.force)
     compared = _compared(args, timeline, other)
     output_folder(args.out)
-    rows, shares, left_out = [], [], {}
-    with progress(len(timeline)) as tick:
-        for index, file in enumerate(files):
-            if index + 1 < len(timeline):
-                timeline.request(index + 1)
-            try:
-                arrays = _measured(compared, timeline, index)
-                _save(file, arrays)
-            except InputError as error:
-                left_out[index], arrays = error.what, _NONE
-                file.unlink(missing_ok=True)  # that of an earlier run
-            found = DeviationStatistics.of(arrays[_VALUE])
-            shares.append(found.share)
-            beyond = [detected_share(**arrays)] if args.method == _M3C2 else []
-            rows.append((index + 1, float(timeline.times[index]), *map(cell, [*found, *beyond])))
-            tick()
+    rows, shares = [], []
+    left_out: dict[int, str] = {}
+
+    def measure(pose: Pose) -> Mapping[str, np.ndarray]:
+        return _measured(compared, pose)
+
+    for index, arrays in written_maps(timeline, files, measure, left_out):
+        found = DeviationStatistics.of(arrays.get(_VALUE, _NONE))
+        shares.append(found.share)
+        numbers = [*found]
+        if args.method == _M3C2:
+            numbers.append(detected_share(arrays.get(_VALUE, _NONE), arrays.get(_DETECTABLE, _NONE)))
+        rows.append((index + 1, float(timeline.times[index]), *map(cell, numbers)))
     report(timeline, 0)
     save_rows(table, [_COLUMNS + (_DETECTED if args.method == _M3C2 else ()), *rows])
     reasons = {str(index + 1): reason for index, reason in left_out.items()}
@@ -212,32 +200,21 @@ def _start(args: Namespace, timeline: Timeline, other: Timeline) -> StartOfMotio
     return StartOfMotion(other.pose(int(args.to_pose)), f"{args.to} {args.to_pose}", None, scan=args.to)
 
 
-def _measured(compared: _Compared, timeline: Timeline, index: int) -> dict[str, np.ndarray]:
-    """The deviations of a frame, and with M3C2 the least that noise does not explain: (N,) float32, in the
-    order of its file. Raises InputError."""
-    cloud, reference = timeline.pose(index).cloud, compared.reference
-    found = FrameMotion.still() if compared.motions is None else compared.motions[index]
+def _measured(compared: _Compared, pose: Pose) -> dict[str, np.ndarray]:
+    """The deviations of a frame, and with M3C2 the least that noise does not explain, (N,). Raises
+    InputError."""
+    reference = compared.reference
+    found = FrameMotion.still() if compared.motions is None else compared.motions[pose.index]
     if found.motion is None:
         raise InputError(found.reason)
-    positions = found.motion.inverse.points(cloud.world())
+    positions = found.motion.inverse.points(pose.cloud.world())
     if isinstance(reference, M3C2Reference):
         distances = reference.distances(positions, compared.reach)
         moved: np.ndarray | float = 0.0
         if compared.middle is not None:
             moved = found.deviations_at(positions, distances.directions, compared.middle)
-        known = {_VALUE: distances.values, _DETECTABLE: distances.detectable(moved)}
-    else:
-        known = {_VALUE: reference.signed(positions, compared.reach)}
-    rows = slice(None) if cloud.ids is None else cloud.ids
-    arrays = {name: np.full(len(cloud) + cloud.dropped, np.nan, np.float32) for name in known}
-    for name, values in known.items():
-        arrays[name][rows] = values
-    return arrays
-
-
-def _save(file: Path, arrays: Mapping[str, np.ndarray]) -> None:
-    with whole_file(file) as part, open(part, "wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, **arrays)
+        return {_VALUE: distances.values, _DETECTABLE: distances.detectable(moved)}
+    return {_VALUE: reference.signed(positions, compared.reach)}
 
 
 def _tell(timeline: Timeline, compared: _Compared, shares: list[float], left_out: Mapping[int, str]) -> None:
@@ -251,7 +228,4 @@ def _tell(timeline: Timeline, compared: _Compared, shares: list[float], left_out
         warn(f"Fewer than half of the points have a value in {few} of {len(shares)} frames")
     if compared.reference.outside_by == ESTIMATED:
         warn("The reference has no normals. Scan4D estimates which side is outside")
-    if left_out:
-        index, reason = next(iter(left_out.items()))
-        share = f"{len(left_out)} of {len(shares)} frames have no values"
-        warn(f"{share}, such as {frame_in_words(index)}: {reason}")
+    tell_left_out(timeline, left_out)

@@ -82,6 +82,19 @@ class PointReference:
         together(len(local), works)
         return found
 
+    def surface_points(self) -> Float:
+        """The points of the pose, moved onto their surface, which averages noise: (N, 3), absolute.
+
+        A point without neighbours stays.
+        """
+        from ..tracking.deformation_kernels import fit_rows
+
+        points = self._surface.held.points
+        found, normals = np.empty((2, len(points), 3))
+        fitted = np.empty(len(points), np.bool_)
+        fit_rows(self._surface.held, np.arange(len(points)), found, normals, fitted)
+        return np.where(fitted[:, None], found, points) + self._origin
+
 
 def deviation_reference(pose: Pose, faces: Triangles) -> DeviationReference:
     """The surface of a pose. faces: (F, 3) of ids of its points, perhaps none. Raises InputError."""

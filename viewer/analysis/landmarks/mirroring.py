@@ -11,11 +11,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ...rigid import Rigid
 
 Positions = Mapping[str, NDArray[np.float64]]
 
@@ -44,6 +46,16 @@ class MirrorPlane:
     normal: NDArray[np.float64]
     offset: float
     sigma: float
+
+    def in_frame(self, origin: NDArray[np.float64]) -> MirrorPlane:
+        """The plane, relative to an origin (3,)."""
+        return replace(self, offset=float(self.offset - self.normal @ origin))
+
+    def moved(self, motion: Rigid) -> MirrorPlane:
+        """The plane, moved."""
+        normal = motion.rotation @ self.normal
+        on_plane = motion.points(self.offset * self.normal)
+        return replace(self, normal=normal, offset=float(normal @ on_plane))
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...rigid import Rigid, rigid_matrix
+from ..landmarks.mirroring import MirrorPlane, mirrored
 from ..tracking.registration import WAYS, PatchLevel, Placement, registered, rotations
 from ..tracking.surface import MomentSurface
 
@@ -114,6 +115,12 @@ class RegionSurface:
         count = round(self.count * float(chosen.mean()))
         points, normals = self.points[chosen], self.patch.normals[chosen]
         return self._around(points, normals, self.rows[chosen], count, self.spacing)
+
+    def mirrored(self, plane: MirrorPlane) -> RegionSurface:
+        """The mirror image of the region."""
+        normals = self.patch.normals
+        turned = normals - 2 * (normals @ plane.normal)[:, None] * plane.normal
+        return self._around(mirrored(self.points, plane), turned, self.rows, self.count, self.spacing)
 
     def some(self, count: int) -> SurfacePatch:
         """The patch with about so many of its points."""
