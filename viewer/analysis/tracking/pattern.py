@@ -34,6 +34,7 @@ _DISTINCT = np.log(4.0)  # a point, in information: residuals of other positions
 _SEARCH = 5.0  # spacings that a pattern may be from where it is looked for
 _SEED_SEARCH = 12.0  # the same for patterns that matches grow from
 _NEAR_SEARCH = 3.0  # the same where the way is known about
+_SWING = 1.0  # of the way from the nearest matched point, that a point may go besides
 _SEEDS = 24  # patterns that are tried in a round
 _LEAPS = 3  # rounds at most, each over what growth has not reached yet
 _FARTHEST = 15.0  # the same in spacings of the pattern
@@ -262,10 +263,11 @@ class RecurringPoints:
         if not len(known):
             return position, np.eye(3), _SEED_SEARCH
         away = position - self._before.held.points[known]
-        nearest = np.argmin((away**2).sum(axis=1))
-        one = known[nearest]
+        squares = (away**2).sum(axis=1)
+        nearest = np.argmin(squares)
+        one, distance = known[nearest], np.sqrt(squares[nearest]) / self._before.spacing
         place = self._now.held.points[self._grown[one]] + self.maps[one] @ away[nearest]
-        return place, self.maps[one], _SEED_SEARCH
+        return place, self.maps[one], min(_NEAR_SEARCH + _SWING * distance, _SEED_SEARCH)
 
     def _grow_from(self, position: Float, expected: Float, linear: Float, search: float) -> None:
         """Grow matches from the pattern around a position, where it is found near another one."""
