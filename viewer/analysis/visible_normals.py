@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..backends.auto_splats import widening_of
 from ..backends.auto_splats.neighborhoods import MOST_NEIGHBORS, Neighborhoods, Search
 from ..camera import Camera
 from ..drawing.renderer import shared_renderer
 from ..errors import InputError
 from ..gpu.constants import UNKNOWN
 from ..picture.surface import Surface
+from ..scan.noise import noise_of
 from ..scan.pods import first_camera
 from ..scan.points import PointCloud
 from ..scan.pose import Pose
@@ -57,7 +59,8 @@ class NormalSearch:
     """Rules for normals from neighborhoods. Raises InputError for values outside their range.
 
     k: points of a neighborhood, the point itself among them. adaptive: whether planes go through as few of
-    the nearest points as noise allows. hidden_neighbors: whether hidden points that are at most some
+    the nearest points as noise allows, and where points are noisy, through all in a ball that the noise
+    widens, as `auto_splats` has it. hidden_neighbors: whether hidden points that are at most some
     neighborhoods away take part. expansions: of a neighborhood without another point, until its point is an
     outlier; None: there are no outliers. growth: of the area within which another point must follow.
     """
@@ -93,7 +96,8 @@ def estimate_normals(
     are outliers too that lie off all others: d_2^2 > 0.7 d_count^2.
 
     The normal is that of the plane through the neighborhood. An adaptive search takes so few of the nearest
-    points that neither their residuals nor some more points turn the plane by much.
+    points that neither their residuals nor some more points turn the plane by much. If the noise exceeds a
+    twelfth of the spacing, it takes all points in a ball of up to twice the neighborhood's radius.
 
     camera: None fits the pose from the front. Raises InputError, NoOpenGLError.
     """
@@ -109,6 +113,9 @@ def estimate_normals(
     found = surface.cached(Neighborhoods)
     alone = UNKNOWN if search.expansions is None else 2.0**search.expansions
     rules = Search(search.k, search.hidden_neighbors, False, search.growth, alone, adaptive=search.adaptive)
+    if search.adaptive and len(pose.cloud):
+        noise = noise_of(pose.cloud)
+        rules = replace(rules, widening=widening_of(noise, search.k), noise=noise.deviation)
     found.find(resident, surface, view, rules)
     return read_normals(resident.cloud, found)
 

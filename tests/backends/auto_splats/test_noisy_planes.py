@@ -120,6 +120,17 @@ def test_normals_are_about_as_right_as_with_the_best_number_of_neighbors(
     assert median(drawn(draw, cloud)) < 1.1 * min(fixed)
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_scripts_get_the_normals_that_pictures_show(draw: Callable[..., Surface], noise: float) -> None:
+    cloud = bare(sphere(6000), noise)
+    shown = drawn(draw, cloud)
+    found = viewer.estimate_normals(cloud, camera_of(cloud), size=SIZE)
+    _, here, there = np.intersect1d(shown.rows, found.rows, return_indices=True)
+    assert len(here) > 0.9 * len(found.rows)
+    apart = np.degrees(np.arccos(np.clip((shown.normals[here] * found.normals[there]).sum(axis=1), -1, 1)))
+    assert np.median(apart) < 0.1
+
+
 @pytest.mark.parametrize("noise", [0.3, 0.5])
 @pytest.mark.parametrize("k", [10, 16])
 def test_planes_go_through_all_points_of_a_wider_ball(

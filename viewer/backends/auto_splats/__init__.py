@@ -257,13 +257,13 @@ def search_of(params: Params, pose: GpuPose, noise: Noise) -> Search:
         adaptive=params.adaptive,
         elliptical=params.elliptical,
         by_scanner=params.orient == "scanner" and bool(pose.views),
-        widening=_widening(noise, params.k),
+        widening=widening_of(noise, params.k),
         noise=noise.deviation,
         raises=params.surface == LOCAL,
     )
 
 
-def _widening(noise: Noise, k: int) -> float:
+def widening_of(noise: Noise, k: int) -> float:
     """The radius of the ball whose points determine a plane, in radii of a neighborhood of k points.
 
     A neighborhood of more than the usual number of points is wider already, so its ball grows less.
