@@ -21,19 +21,17 @@ class FrameNumbers(Generic[V]):
         self._context, self._title, self._make_unknown = context, title, unknown
         self._found: WeakKeyDictionary[Life, tuple[object, V]] = WeakKeyDictionary()
         self._unknown: WeakKeyDictionary[Life, V] = WeakKeyDictionary()
+        self._keys: Mapping[int, object] = {}
         self._task: Task | None = None
 
     def of(self, pose: Pose) -> V:
-        """The numbers of a pose; the unknown ones as long as they are not known."""
-        if (found := self._found.get(pose.life)) is not None:
+        """The numbers of a pose; the unknown ones where it has no key, and as long as they are not known."""
+        found = self._found.get(pose.life)
+        if found is not None and pose.index in self._keys and found[0] == self._keys[pose.index]:
             return found[1]
         if (unknown := self._unknown.get(pose.life)) is None:
             unknown = self._unknown[pose.life] = self._make_unknown(pose)
         return unknown
-
-    def forget(self) -> None:
-        """Forget all numbers."""
-        self._found = WeakKeyDictionary()
 
     def advance(self, keys: Mapping[int, object], find: Callable[[Pose], V]) -> None:
         """Have found what the view shows, then what it shows next.
@@ -41,6 +39,7 @@ class FrameNumbers(Generic[V]):
         keys: of what the numbers depend on, by frame; frames without one are left. find: gives the numbers
         of a pose, on a thread of its own.
         """
+        self._keys = keys
         if self._task is not None and any(work.task is self._task for work in self._context.works):
             return
         if (pose := self._next(keys)) is None:

@@ -132,6 +132,7 @@ class Tool(PaintingTool):
         work = self.finder.work
         deviations = None if work is None else work.deviations
         if work is None or deviations is None:
+            self.numbers.advance({}, _unknown)
             return
         places = work.places
 
@@ -165,13 +166,7 @@ class Tool(PaintingTool):
 
     def _numbers(self, pose: Pose) -> Mapping[str, NDArray[Any]]:
         is_laid = self.choices.is_on or self.colored.name
-        return {NAME: self._known(pose)} if is_laid else {}
-
-    def _known(self, pose: Pose) -> Values:
-        """The deviations of a pose; none in a gap of a stabilised scan."""
-        work = self.finder.work
-        is_gap = work is not None and work.deviations is not None and pose.index not in work.places
-        return _unknown(pose) if is_gap else self.numbers.of(pose)
+        return {NAME: self.numbers.of(pose)} if is_laid else {}
 
     def drawn(self, frame: int) -> DrawnMarks:
         """How the deviations of a frame of a saved picture are found again."""

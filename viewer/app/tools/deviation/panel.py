@@ -151,7 +151,9 @@ def _draw_histogram(tool: Tool) -> None:
     if values is None or low is None or high is None or not low < high:
         return
     counts = tool.cached.of("histogram", (values, look), lambda: np.histogram(values, _BARS, (low, high))[0])
-    most, em = max(int(counts.max()), 1), imgui.get_font_size()
+    most, em = int(counts.max()), imgui.get_font_size()
+    if not most:
+        return
     corner, room = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     step, table = room / _BARS, color_table(look.color_map)
     for number, count in enumerate(counts.tolist()):

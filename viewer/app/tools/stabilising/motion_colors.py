@@ -23,7 +23,6 @@ class MotionColors:
     """The numbers of the frames that are in memory."""
 
     def __init__(self, context: ToolContext) -> None:
-        self._motions: Motions | None = None
         self._numbers = FrameNumbers[Values](context, "Measuring distances", _unknown)
 
     def of(self, pose: Pose) -> Values:
@@ -32,10 +31,10 @@ class MotionColors:
 
     def advance(self, motions: Motions | None, is_wanted: bool) -> None:
         """Have found what the view shows, then what it shows next. is_wanted: whether the view shows any."""
-        if motions is not self._motions:
-            self._motions = motions
-            self._numbers.forget()
-        if motions is None or motions.reference is None or not is_wanted:
+        if motions is None or motions.reference is None:
+            self._numbers.advance({}, _unknown)
+            return
+        if not is_wanted:
             return
         reference, rows, known = motions.reference, motions.rows, motions.known
 
