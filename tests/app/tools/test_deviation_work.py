@@ -55,7 +55,7 @@ def test_cancelled_work_goes_on_and_what_is_kept_is_read(
     again = work(timeline)
     again.find()
     assert again.is_whole
-    assert [again.found[frame] for frame in (0, 1)] == [first.found[frame] for frame in (0, 1)]
+    assert [again.known[frame] for frame in (0, 1)] == list(first.found.values())
     with monkeypatch.context() as patch:
         patch.setattr(finder, "frame_deviation", None)  # nothing is found again
         kept = work(timeline)
@@ -66,14 +66,16 @@ def test_cancelled_work_goes_on_and_what_is_kept_is_read(
 def test_frames_that_move_are_found_again(timeline: Timeline) -> None:
     found = work(timeline)
     found.find()
-    recorded = dict(found.found)
+    recorded = found.known
     moved = truth(3, 0).inverse
     found.places = RECORDED | {3: FramePlace(moved, moved)}
     assert found.left == [3]
     found.find()
     assert found.is_whole
-    assert found.found[3][1].whole.rms < 0.2 * recorded[3][1].whole.rms, "its motion is removed"
-    assert found.found[2] is recorded[2]
+    assert found.known[3].whole.rms < 0.2 * recorded[3].whole.rms, "its motion is removed"
+    found.places = RECORDED
+    assert not found.left, "both are kept side by side"
+    assert found.known == recorded
 
 
 def test_a_reference_that_cannot_be_read_is_a_problem(timeline: Timeline) -> None:

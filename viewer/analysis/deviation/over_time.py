@@ -78,27 +78,26 @@ class KeptDeviations:
         self._folder = cache_folder() / "deviation"
         self._path = self._folder / f"{digest}.json"
 
-    def read(self) -> dict[int, tuple[str, FrameDeviation]]:
-        """The statistics by frame, each with the key of its `FramePlace`; none where there is no usable
-        file."""
+    def read(self) -> dict[tuple[int, str], FrameDeviation]:
+        """The statistics by frame and the key of its `FramePlace`; none where there is no usable file."""
         with suppress(InputError), reading(self._path, "does not hold deviations", "Delete the file"):
             try:
                 said = parsed_json(read_text(self._path, _MOST_BYTES))
-                frames = said["frames"] if said["key"] == self._key else {}
+                frames = said["frames"] if said["key"] == self._key else []
                 return {
-                    int(frame): (of, FrameDeviation(_statistics(whole), region and _statistics(region)))
-                    for frame, (of, whole, region) in frames.items()
+                    (int(frame), of): FrameDeviation(_statistics(whole), region and _statistics(region))
+                    for frame, of, whole, region in frames
                 }
             except (AttributeError, KeyError, TypeError) as error:
                 raise ValueError(f"{type(error).__name__}: {error}") from error
         return {}
 
-    def save(self, found: Mapping[int, tuple[str, FrameDeviation]]) -> None:
+    def save(self, found: Mapping[tuple[int, str], FrameDeviation]) -> None:
         """Write the statistics, where that is possible; else they are found again next time."""
-        frames = {
-            frame: (of, _plain(one.whole), one.region and _plain(one.region))
-            for frame, (of, one) in found.items()
-        }
+        frames = [
+            (frame, of, _plain(one.whole), one.region and _plain(one.region))
+            for (frame, of), one in found.items()
+        ]
         with suppress(InputError):
             save_json(self._path, {"key": self._key, "frames": frames})
         forget_oldest(self._folder, _MOST_KEPT)

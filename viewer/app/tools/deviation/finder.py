@@ -30,7 +30,8 @@ class DeviationWork:
     """Deviations as far as a thread of its own has found them.
 
     places: of the frames whose motion is known; the window replaces them. deviations: None before the
-    reference was read. found: statistics by frame, with the key of its place. problem: why there are none.
+    reference was read. found: statistics by frame and the key of its place, so that those of the recorded
+    and of the stabilised scan stay side by side. problem: why there are none.
     """
 
     timeline: Timeline
@@ -38,14 +39,20 @@ class DeviationWork:
     spheres: tuple[Sphere, ...]
     places: Mapping[int, FramePlace]
     deviations: Deviations | None = None
-    found: dict[int, tuple[str, FrameDeviation]] = field(default_factory=dict)
+    found: dict[tuple[int, str], FrameDeviation] = field(default_factory=dict)
     problem: str = ""
 
     @property
     def left(self) -> list[int]:
         """The frames that are not known, with a motion."""
-        known = {frame: one[0] for frame, one in list(self.found.items())}
-        return [frame for frame, place in self.places.items() if known.get(frame) != place.key]
+        return [frame for frame, place in self.places.items() if (frame, place.key) not in self.found]
+
+    @property
+    def known(self) -> dict[int, FrameDeviation]:
+        """The statistics of the frames where they are shown, none before the reference was read."""
+        places = {} if self.deviations is None else self.places
+        keys = {frame: (frame, place.key) for frame, place in places.items()}
+        return {frame: self.found[key] for frame, key in keys.items() if key in self.found}
 
     @property
     def is_whole(self) -> bool:
@@ -92,7 +99,7 @@ class DeviationWork:
                     found = frame_deviation(self.deviations, cloud, spheres, place)
                 except InputError:  # the frame cannot be read, which the window says where it shows it
                     found = FrameDeviation(_NONE, _NONE if self.spheres else None)
-                self.found[frame] = place.key, found
+                self.found[frame, place.key] = found
                 if time.monotonic() - saved > _SAVING:
                     kept.save(self.found)
                     saved = time.monotonic()
@@ -129,11 +136,7 @@ class DeviationFinder(Resumed[DeviationWork]):
         if self.work is not None and is_wanted:
             self.work.places = places
         has_changed = self.take(is_same, make, is_wanted and reference is not None)
-        work = self.work
-        found = {} if work is None or work.deviations is None else dict(list(work.found.items()))
-        known = {
-            frame: one for frame, (key, one) in found.items() if frame in places and places[frame].key == key
-        }
+        known = {} if self.work is None or not is_wanted else self.work.known
         if has_changed or known != self.known:
             self.known, has_changed = known, True
         return has_changed
