@@ -72,6 +72,11 @@ def test_a_key_shows_deviations_which_pictures_and_films_keep(
         assert (picture(saved) == again).all(), "deviations are measured again"
         assert np.abs(picture(saved) - nameless).mean() < 1
         assert len(np.unique(again.reshape(-1, 3), axis=0)) > 500, "it is coloured"
+        app.press("ctrl+e")
+        app.choose("Export", "##format", "###mp4")
+        app.act("Export", ("item_click", "Export"))
+        film = Path(app.told(r"Saved (.+\.mp4)")[1])
+        assert film.stat().st_size > 1000
         app.press("shift+m")
         state = app.settle()
         assert (state.document["look"]["color_by"], state.document["look"]["plain"]) == ("auto", Look().plain)
