@@ -11,6 +11,9 @@ import pytest
 from command_line import Run
 from hill_folders import turning_hills
 
+from viewer.errors import InputError
+from viewer.scan.open import open_scan
+
 FLOOR = "v -40 -40 0\nv 40 -40 0\nv 40 40 0\nv -40 40 0\nf 1 2 3 4\n"
 
 
@@ -72,6 +75,14 @@ def test_stabilised_frames_of_a_rigid_patch_do_not_deviate(run: Run) -> None:
     mean = run("deviation", "seq", "--unit", "mm", *words, "--to-pose", "0:3", "-o", "mean")
     assert mean.code == 0, mean.err
     assert json.loads(Path("mean/report.json").read_text())["reference"]["mean"]["frames"] == [1, 2, 3]
+
+
+def test_a_reference_without_a_unit_is_taken_to_have_that_of_the_scan() -> None:
+    with open_scan("demo") as scan, open_scan("floor.obj") as floor:
+        assert scan.gives_unit_to(floor)
+        assert not scan.gives_unit_to(scan)
+        with pytest.raises(InputError, match="has the unit 'mm', but the scan has 'units'"):
+            floor.gives_unit_to(scan)
 
 
 def test_m3c2_tells_the_least_that_it_detects(run: Run) -> None:

@@ -20,7 +20,6 @@ from ..errors import InputError
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import frame_in_words
-from ..scan.units import conversion
 from ._console import tell, warn
 from ._scans import open_timeline, poses_between
 
@@ -80,10 +79,9 @@ class StartOfMotion:
 
 
 def check_unit(other: Timeline, timeline: Timeline) -> None:
-    """Raise InputError where a reference scan has another unit than the scan."""
-    if conversion(other.unit, timeline.unit) != 1.0:
-        what = f"has the unit '{other.unit}', but the scan has '{timeline.unit}'"
-        raise InputError(what, other.name, "Use a reference in the unit of the scan")
+    """Warn where Scan4D assumes the unit of a reference scan. Raises InputError where it has another unit."""
+    if timeline.gives_unit_to(other):
+        warn(f"{other.name} states no unit. Scan4D assumes {timeline.unit}, the unit of the scan")
 
 
 def _frames(text: str, timeline: Timeline, option: str) -> tuple[int, ...]:

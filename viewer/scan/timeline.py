@@ -30,7 +30,7 @@ from .reading.record import Reading
 from .reading.sequence import Decided, ReportKind
 from .sources import FrameSource
 from .times import frame_in_words
-from .units import usable_unit
+from .units import conversion, usable_unit
 
 _TRACEBACKS = 10  # of broken frames that are stored: each takes a millisecond to write, and kilobytes
 _CLOSE_WAIT = 2.0  # seconds that closing waits for a pose that is being read
@@ -180,6 +180,18 @@ class Timeline:
     def files(self) -> tuple[Path, ...]:
         """The files that hold its frames; none for the demo."""
         return self.source.files
+
+    def gives_unit_to(self, other: Timeline) -> bool:
+        """Whether a scan to compare with states no unit, so that Scan4D assumes this one's for it.
+
+        Raises InputError where it states another unit.
+        """
+        if other.unit == UNKNOWN_UNIT != self.unit:
+            return True
+        if conversion(other.unit, self.unit) != 1.0:
+            what = f"has the unit '{other.unit}', but the scan has '{self.unit}'"
+            raise InputError(what, other.name, "Use a reference in the unit of the scan")
+        return False
 
     def label(self, index: int) -> str:
         """The name of a frame, for example its file's."""

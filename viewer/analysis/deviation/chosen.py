@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from ...errors import InputError
 from ...rigid import Rigid
 from ...scan.open import open_scan
-from ...scan.points import UNKNOWN_UNIT, PointCloud
+from ...scan.points import PointCloud
 from ...scan.pose import Pose
 from ...scan.timeline import Timeline
-from ...scan.units import conversion
 from ..motion.rest import mean_of_rest
 from ..motion.stabilise import MotionReference
 from .reference import DeviationReference, deviation_reference
@@ -29,20 +28,17 @@ def search_reach(pose: Pose) -> float:
     return _REACH * float((pose.bounds.high - pose.bounds.low).max())
 
 
-def _check_unit(other: Timeline, timeline: Timeline) -> None:
-    """Raise InputError where a reference states another unit than the scan; one that states none is taken to
-    have that of the scan."""
-    if other.unit != UNKNOWN_UNIT and conversion(other.unit, timeline.unit) != 1.0:
-        what = f"has the unit '{other.unit}', but the scan has '{timeline.unit}'"
-        raise InputError(what, other.name, "Use a reference in the unit of the scan")
-
-
 @dataclass(frozen=True, eq=False)
 class Deviations:
-    """Signed distances from a reference. reach: beyond which a point has no value, scan units."""
+    """Signed distances from a reference.
+
+    reach: beyond which a point has no value, scan units. assumes_unit: the reference states no unit, so that
+    Scan4D assumes that of the scan.
+    """
 
     reference: DeviationReference
     reach: float
+    assumes_unit: bool = False
 
     def of(self, cloud: PointCloud, reference_from_frame: Rigid) -> NDArray[np.float32]:
         """The deviations of a cloud, (N,) float32 by row, scan units; NaN where a point has none."""
@@ -66,8 +62,8 @@ class ReferenceChoice:
         """Deviations from the reference. timeline: of the scan. Raises InputError."""
         if self.file:
             with open_scan(self.file) as other:
-                _check_unit(other, timeline)
-                return _deviations(other, other.pose(0))
+                assumes_unit = timeline.gives_unit_to(other)
+                return _deviations(other, other.pose(0), assumes_unit)
         timeline.label(self.last)  # raises where there is none
         pose = timeline.pose(self.first)
         if self.first != self.last:
@@ -79,9 +75,9 @@ class ReferenceChoice:
         return _deviations(timeline, pose)
 
 
-def _deviations(timeline: Timeline, pose: Pose) -> Deviations:
+def _deviations(timeline: Timeline, pose: Pose, assumes_unit: bool = False) -> Deviations:
     faces = timeline.faces(pose.index).triangles()
-    return Deviations(deviation_reference(pose, faces), search_reach(pose))
+    return Deviations(deviation_reference(pose, faces), search_reach(pose), assumes_unit)
 
 
 def moved_to_reference(

@@ -102,6 +102,9 @@ def _draw_state(tool: Tool, ui: Ui) -> None:
         finder.resume()
     if work.deviations is not None and work.deviations.reference.outside_by == ESTIMATED:
         widgets.faint("The reference has no normals: Scan4D estimates which side is outside.")
+    if work.deviations is not None and work.deviations.assumes_unit:
+        unit = work.timeline.unit
+        widgets.faint(f"The reference states no unit: Scan4D assumes {unit}, the unit of the scan.")
     is_still = tool.context.followed.still is not None
     words = "The scan is stabilised." if is_still else "The scan is as recorded. U stabilises it."
     widgets.faint(words)
