@@ -19,7 +19,7 @@ layout(binding = TEXTURE_LISTED) uniform usamplerBuffer listed_cells;
 
 const float SLANTED = 1.5;  // times as far apart samples of a grid may lie where a surface is seen aslant
 const float AHEAD = 0.59;   // how far beside a pixel on an outline the nearest sample may lie, in sample spacings
-const float NARROW = 2.0;   // width of a gap that is one between samples in any case, in sample spacings
+const float NARROW = 2.0;   // width of a gap that is one between samples in any case, in spacings, or pixels if more
 const int BETWEEN = 3;      // samples from one to the other of neighbours: a cell shows one of several
 const float LEAST = 1e-3;  // weight of samples beyond a kernel's reach, before distance
 
@@ -113,13 +113,13 @@ Sides sides_around(ivec2 pixel, int level, float farthest, float apart) {
 }
 
 // Whether the gap that a pixel lies in is one between samples of a grid, rather than between two parts of the subject:
-// narrow, or with neighbours in a range image on either side. apart: samples, in cells.
-bool is_between(Sides sides, float apart) {
+// no wider than `narrow` cells, or with samples of one surface on either side that lie `between` apart in a range image.
+bool is_between(Sides sides, float narrow, int between) {
     for (int k = 0; k < 4; ++k) {
-        if (sides.low_nearest[k] + sides.high_nearest[k] <= NARROW * apart) return true;
+        if (sides.low_nearest[k] + sides.high_nearest[k] <= narrow) return true;
         int low = sides.low_cell[k], high = sides.high_cell[k];
         if (low == NO_CELL || high == NO_CELL) continue;
-        if (are_neighbors(texelFetch(best, low).r, texelFetch(best, high).r, BETWEEN)) return true;
+        if (are_neighbors(texelFetch(best, low).r, texelFetch(best, high).r, between)) return true;
     }
     return false;
 }
@@ -150,7 +150,9 @@ Given given_by(ivec2 pixel, int level) {
 #if FRAMED
     if (gap) {
         all_around = sides_around(pixel, level, farthest, apart);
-        bay = !is_ahead(all_around, (margin + AHEAD) * apart) || !is_between(all_around, apart);
+        float drawn = max(apart, window.scale);  // samples of coarser levels lie a pixel apart
+        bool between = is_between(all_around, NARROW * drawn, int(ceil(float(BETWEEN) * drawn / apart)));
+        bay = !between || !is_ahead(all_around, (margin + AHEAD) * apart);
     }
 #endif
     for (int n = 0; n < SURFACES && isinf(given.surface.x); ++n) {
