@@ -25,6 +25,7 @@ from .surfaces import Meeting, RangeSurface, meet
 
 SCATTER = 4.0  # deviations within which two measures are of one surface
 _REACH = 0.1  # of the subject's radius: no farther apart are measures compared
+_GOOD = 0.75  # of the best weight: pixels that may be kept in place of better ones, for a shorter seam
 _SAME_SIDE = 0.5  # least cosine between normals of one surface
 _NORMAL_DEVIATION = 1.4826  # times the median of absolute values
 
@@ -124,7 +125,7 @@ class _Contest:
         of_tied, alone = np.zeros(len(own), bool), np.ones(len(own), bool)
         of_tied[covering.faces[covering.shown & tied].ravel()] = True
         alone[covering.faces[covering.shown].ravel()] = False
-        covering.mask(own, of_tied | alone)
+        covering.mask(own, of_tied | alone, own >= _GOOD * best)
         checkpoint(0.95)
         kept = covering.kept & ~(alone & (best > own + self.rules.ties))
         return Competition(

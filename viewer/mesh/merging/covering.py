@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
 _PLACES_AT_ONCE = 1 << 17
 _PIXELS_AT_ONCE = 1 << 16
+_EXCHANGES_AT_ONCE = 1 << 12
+_RINGS = (0, 1, 2, 3, 4) * 4  # around a pixel, that are exchanged with it, time after time
+_LEAST = 1e-12  # of the area: what an exchange has to save
 _MOST_CELLS = 16  # of space in which a triangle lies, on average
 _FINEST = 6  # parts of an edge in which what covers a triangle is looked at, at most
 _INSET = 0.7  # of a triangle, in which that is: a sliver along its edge brings back none
@@ -101,19 +104,26 @@ class TriangleCover:
         """The area, each patch once, that these triangles (F,) of several views cover."""
         return float(self._patches[self._times(shown) > 1].sum())
 
-    def mask(self, weights: NDArray[np.floating], fixed: NDArray[np.bool_]) -> None:
+    def mask(self, weights: NDArray[np.float64], fixed: NDArray[np.bool_], good: NDArray[np.bool_]) -> None:
         """Mask the pixels that no place needs to keep a triangle, those of the lowest weights (V,) first.
 
-        fixed: (V,), pixels that stay all the same.
+        Then exchange kept pixels for masked ones where less lies over each other so.
+
+        fixed: (V,), pixels that stay all the same. good: (V,), those that others may be exchanged for.
         """
-        from .covering_kernels import Masking, count_shown, mask_unneeded
+        from .covering_kernels import Exchanged, Masking, count_shown, exchange, mask_unneeded
 
         rows, pixels = np.arange(len(self.faces), dtype=np.uint32), len(self.kept)
+        measured = len(rows) - len(self._replaced)
+        per_face = np.diff(self.covers.first)
         masking = Masking(
             self.faces,
+            np.concatenate([np.full(measured, -1), self._replaced.astype(np.int64)]),
             _inverted([(self.faces.ravel(), np.repeat(rows, 3))], pixels),
-            _inverted([(self._replaced, rows[len(rows) - len(self._replaced) :])], pixels),
+            _inverted([(self._replaced, rows[measured:])], pixels),
             self.covers,
+            _inverted([(self.covers.numbers, np.repeat(rows, per_face))], len(self._patches)),
+            self._patches,
             np.zeros(len(self._patches), np.int32),
             self.shown,
             self.kept,
@@ -124,6 +134,15 @@ class TriangleCover:
         for some in np.split(order, range(_PIXELS_AT_ONCE, len(order), _PIXELS_AT_ONCE)):
             checkpoint()
             mask_unneeded(masking, some)
+        for rings in _RINGS:
+            corners = self.kept[self.faces[:measured]]
+            beside = np.zeros(pixels, bool)
+            beside[self.faces[:measured][corners.any(axis=1)].ravel()] = True
+            choice = Exchanged(weights, fixed, good, np.zeros(pixels, bool))
+            seam = order[::-1][(beside & good & ~self.kept)[order[::-1]]]
+            for some in np.split(seam, range(_EXCHANGES_AT_ONCE, len(seam), _EXCHANGES_AT_ONCE)):
+                checkpoint()
+                exchange(masking, some, rings, choice, _LEAST * self.area)
 
     def _times(self, shown: NDArray[np.bool_]) -> NDArray[np.int32]:
         """The number of views of which one of these triangles, (F,), covers each place, (P,)."""

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ...compiled import compiled, inlined
 
 _EDGE = 1e-6  # of a triangle: how far outside of it a line still meets it, so that none falls between two
+_MOST = 1 << 12  # pixels that are exchanged at once
 _MARGIN = 1e-4  # of a cell: what lies so close to it belongs to it, too, so that no rounding loses it
 
 
@@ -190,27 +191,34 @@ def count_views(
 
 
 class Masking(NamedTuple):
-    """The F triangles between V pixels, which masks show or hide, and the P places that they cover."""
+    """The F triangles between V pixels, which masks show or hide, and the P places that they cover.
+
+    A triangle is shown where its corners are kept and the pixel whose place it takes, if any, is masked."""
 
     faces: NDArray[np.uint32]  # (F, 3)
+    instead_of: NDArray[np.int64]  # (F,), the pixel whose place a face takes, -1: none
     corner_of: Lists  # for each pixel, the faces that it is a corner of
     replaced_by: Lists  # for each pixel, the faces that take its place once it is masked
     covers: Lists  # for each face, the places that it lies over
+    covered_by: Lists  # for each place, the faces over it
+    patches: NDArray[np.float64]  # (P,), the area of each place, scan units squared
     shown_over: NDArray[np.int32]  # (P,), how many shown faces each place has over it
     shown: NDArray[np.bool_]  # (F,)
     kept: NDArray[np.bool_]  # (V,), the pixels
 
 
 @inlined
-def _counted(masking: Masking, face: int, change: int) -> bool:
-    """Count a face on or off over its places, and tell whether all of them have one left."""
-    covers, shown_over = masking.covers, masking.shown_over
-    all_covered = True
+def _counted(masking: Masking, face: int, change: int) -> tuple[float, bool]:
+    """Count a face on or off over its places: the area that this adds to what lies over each other, and
+    whether a place has no face left."""
+    covers, shown_over, area, opened = masking.covers, masking.shown_over, 0.0, False
     for n in range(covers.first[face], covers.first[face + 1]):
         place = covers.numbers[n]
+        if max(shown_over[place], shown_over[place] + change) > 1:
+            area += change * masking.patches[place]
         shown_over[place] += change
-        all_covered = all_covered and shown_over[place] > 0
-    return all_covered
+        opened = opened or shown_over[place] == 0
+    return area, opened
 
 
 @compiled
@@ -222,34 +230,142 @@ def count_shown(masking: Masking) -> None:
 
 
 @compiled
-def mask_unneeded(masking: Masking, order: NDArray[np.int64]) -> None:
-    """Mask pixels, one after another, that leave a shown face over every place that has one now.
+def _keep(masking: Masking, pixel: int, kept: bool) -> tuple[float, bool]:
+    """Keep a pixel, or mask it: the area that this adds to what lies over each other, and whether a place
+    loses its last face. The faces that come are counted before those that go."""
+    masking.kept[pixel] = kept
+    area, opened = 0.0, False
+    for change in (1, -1):
+        for lists in (masking.corner_of, masking.replaced_by):
+            for n in range(lists.first[pixel], lists.first[pixel + 1]):
+                face = lists.numbers[n]
+                a, b, c = masking.faces[face, 0], masking.faces[face, 1], masking.faces[face, 2]
+                wanted = masking.kept[a] and masking.kept[b] and masking.kept[c]
+                if wanted and masking.instead_of[face] >= 0:
+                    wanted = not masking.kept[masking.instead_of[face]]
+                if wanted == (change > 0) and masking.shown[face] != wanted:
+                    masking.shown[face] = wanted
+                    added, opens = _counted(masking, face, change)
+                    area += added
+                    opened = opened or (opens and change < 0)
+    return area, opened
 
-    Masking a pixel hides the faces at it, and shows those that take its place.
-    """
-    faces, corner_of, replaced_by, _, _, shown, kept = masking
+
+@compiled
+def mask_unneeded(masking: Masking, order: NDArray[np.int64]) -> None:
+    """Mask pixels, one after another, that leave a shown face over every place that has one now."""
     for pixel in order:
-        for n in range(replaced_by.first[pixel], replaced_by.first[pixel + 1]):
-            face = replaced_by.numbers[n]
-            if kept[faces[face, 0]] and kept[faces[face, 1]] and kept[faces[face, 2]]:
-                shown[face] = True
-                _counted(masking, face, 1)
-        needed = False
-        for n in range(corner_of.first[pixel], corner_of.first[pixel + 1]):
-            face = corner_of.numbers[n]
-            if shown[face] and not _counted(masking, face, -1):
-                needed = True
-        for n in range(corner_of.first[pixel], corner_of.first[pixel + 1]):
-            face = corner_of.numbers[n]
-            if needed and shown[face]:
-                _counted(masking, face, 1)
-            elif shown[face]:
-                shown[face] = False
-        kept[pixel] = needed
-        if not needed:
+        if _keep(masking, pixel, False)[1]:
+            _keep(masking, pixel, True)
+
+
+class Exchanged(NamedTuple):
+    """Numbers and flags of V pixels, which decide what is exchanged."""
+
+    weights: NDArray[np.float64]  # (V,): the lowest are masked first
+    fixed: NDArray[np.bool_]  # (V,), pixels that are never masked
+    good: NDArray[np.bool_]  # (V,), masked pixels that may be kept
+    tried: NDArray[np.bool_]  # (V,), pixels near the middle of a block; none is the middle of another one
+
+
+@compiled
+def _around(
+    masking: Masking, block: NDArray[np.int64], rings: int, good: NDArray[np.bool_], found: NDArray[np.bool_]
+) -> tuple[int, int]:
+    """Find the good masked pixels of a view up to so many pixels from block[0]: the length of the block with
+    these, and with those half as far away. found: (V,), marks them."""
+    found[block[0]] = True
+    start, count, inner = 0, 1, 1
+    for ring in range(rings):
+        end = count
+        if ring <= rings // 2:
+            inner = end
+        for number in range(start, end):
+            pixel = block[number]
+            for n in range(masking.corner_of.first[pixel], masking.corner_of.first[pixel + 1]):
+                for corner in masking.faces[masking.corner_of.numbers[n]]:
+                    other = np.int64(corner)
+                    if count < len(block) and good[other] and not (masking.kept[other] or found[other]):
+                        found[other] = True
+                        block[count] = other
+                        count += 1
+        start = end
+    return count, inner
+
+
+@compiled
+def _beneath(
+    masking: Masking,
+    block: NDArray[np.int64],
+    fixed: NDArray[np.bool_],
+    found: NDArray[np.bool_],
+    pixels: NDArray[np.int64],
+) -> int:
+    """Find the kept pixels whose shown faces lie over places of a block's, and that are neither fixed nor
+    found: how many there are. pixels: (N,), gets them. found: (V,), marks them."""
+    count = 0
+    for pixel in block:
+        for n in range(masking.corner_of.first[pixel], masking.corner_of.first[pixel + 1]):
+            face = masking.corner_of.numbers[n]
+            if not masking.shown[face]:
+                continue
+            for k in range(masking.covers.first[face], masking.covers.first[face + 1]):
+                place = masking.covers.numbers[k]
+                if masking.shown_over[place] < 2:
+                    continue
+                for j in range(masking.covered_by.first[place], masking.covered_by.first[place + 1]):
+                    over = masking.covered_by.numbers[j]
+                    if not masking.shown[over]:
+                        continue
+                    for corner in masking.faces[over]:
+                        other = np.int64(corner)
+                        if count < len(pixels) and not (fixed[other] or found[other]):
+                            found[other] = True
+                            pixels[count] = other
+                            count += 1
+    return count
+
+
+@compiled
+def exchange(
+    masking: Masking,
+    order: NDArray[np.int64],
+    rings: int,
+    pixels: Exchanged,
+    least: float,
+) -> None:
+    """Keep masked pixels, one after another, each with those up to so many rings around it, and mask those
+    beneath, the lowest weights first; if then an area of `least` less lies over each other, and no place has
+    lost its last face. Else all stays."""
+    weights, fixed, good, tried = pixels
+    found, changed = np.zeros(len(masking.kept), np.bool_), np.empty(3 * _MOST, np.int64)
+    block, under = np.empty(_MOST, np.int64), np.empty(_MOST, np.int64)
+    for pixel in order:
+        if masking.kept[pixel] or tried[pixel]:
             continue
-        for n in range(replaced_by.first[pixel], replaced_by.first[pixel + 1]):
-            face = replaced_by.numbers[n]
-            if shown[face]:
-                shown[face] = False
-                _counted(masking, face, -1)
+        block[0] = pixel
+        count, inner = _around(masking, block, rings, good, found)
+        area, opened = 0.0, False
+        tried[block[:inner]] = True
+        changed[:count] = block[:count]
+        for one in block[:count]:
+            added, opens = _keep(masking, one, True)
+            area += added
+            opened = opened or opens
+        beneath = under[: _beneath(masking, block[:count], fixed, found, under)]
+        found[block[:count]] = False
+        found[beneath] = False
+        total = count
+        for one in np.concatenate((beneath[np.argsort(weights[beneath])], block[:count][::-1])):
+            if opened:
+                break
+            added, opens = _keep(masking, one, False)
+            if opens:
+                _keep(masking, one, True)
+            else:
+                area += added
+                changed[total] = one
+                total += 1
+        if opened or area > -least:
+            for one in changed[:total][::-1]:
+                _keep(masking, one, not masking.kept[one])
