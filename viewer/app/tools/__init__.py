@@ -12,6 +12,7 @@ and, where it has some,
 
     COMMANDS            title of a menu -> entries of that menu (see viewer/app/commands.py), whose functions
                         take the Tool; those with a `short` title stand on the toolbar
+    RANK                the place of its section among those of tools: lower ones stand first; default 0
     MOUSE               (how, what) of the mouse, for the list of keys
     Settings            a frozen dataclass (see viewer/params.py) of what comes back at the next start, as
                         `context.settings`

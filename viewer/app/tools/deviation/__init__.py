@@ -30,6 +30,7 @@ from .choices import FILE, Deviating
 from .finder import DeviationFinder
 
 TITLE = "Deviation"
+RANK = 1  # below the tools that it builds on
 _FIRST_END = 0.01  # of the scan's radius: where the colour map ends before deviations are known
 
 Values = NDArray[np.float32]
