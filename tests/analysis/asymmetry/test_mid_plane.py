@@ -62,6 +62,7 @@ def turned(degrees: float, seed: int) -> Rigid:
     return Rigid(rigid_matrix(rotation, np.array([300.0, -40.0, 900.0])))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("amount", [0.0, 1.8, 4.0])
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 120.0])
 def test_the_mid_plane_is_found_from_any_start(amount: float, degrees: float) -> None:
@@ -102,7 +103,9 @@ def test_a_plane_near_another_one_is_the_same_as_from_a_search() -> None:
     np.testing.assert_allclose(jumped.plane.normal, far.rotation @ LEFT, atol=1e-3)
 
 
-@pytest.mark.parametrize("amount", [0.5, 1.8, 4.0])
+@pytest.mark.parametrize(
+    "amount", [pytest.param(0.5, marks=pytest.mark.slow), 1.8, pytest.param(4.0, marks=pytest.mark.slow)]
+)
 def test_the_map_is_how_much_more_one_side_has(amount: float) -> None:
     points = subject(40_000, amount)
     plane = MirroredPose(pose(points)).mid_plane(LEFT).plane
@@ -125,7 +128,7 @@ def test_the_map_is_how_much_more_one_side_has(amount: float) -> None:
     assert rms == pytest.approx(right, rel=0.05)
 
 
-@pytest.mark.parametrize("noise", [0.05, 0.3])
+@pytest.mark.parametrize("noise", [pytest.param(0.05, marks=pytest.mark.slow), 0.3])
 def test_noise_does_not_count_as_asymmetry(noise: float) -> None:
     plane = MirrorPlane(LEFT, 0.0, np.nan)
     still, smiling = (asymmetry_map(pose(subject(40_000, each, noise)), plane, 20.0) for each in (0.0, 4.0))
