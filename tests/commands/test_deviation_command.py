@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from command_line import Run
 from hill_folders import turning_hills
+from range_scenes import sphere_view
 
 from viewer.errors import InputError
+from viewer.scan.formats.exr import write_views
 from viewer.scan.open import open_scan
 
 FLOOR = "v -40 -40 0\nv 40 -40 0\nv 40 40 0\nv -40 40 0\nf 1 2 3 4\n"
@@ -54,6 +56,19 @@ def test_distances_from_a_mesh_are_signed_and_in_the_order_of_the_file(run: Run)
     near = run("deviation", "above", "--to", "floor.obj", "--reach", "1", "-o", "near")
     assert "Fewer than half of the points have a value in 1 of 2 frames" in near.err
     assert table("near/deviation.csv")[1]["mean"] == ""
+
+
+def test_range_views_have_a_value_for_each_pixel(run: Run) -> None:
+    views = [sphere_view((0, 0, 4)), sphere_view((0, 0, -4), name="right")]
+    write_views(Path("ball.exr"), views)
+    done = run("deviation", "ball.exr", "--to", "ball.exr", "-o", "out")
+    assert done.code == 0, done.err
+    value = np.load("out/0001.npz")["value"]
+    seen = np.concatenate([(view.mask & np.isfinite(view.depth)).ravel() for view in views])
+    assert value.shape == seen.shape
+    assert not np.isfinite(value[~seen]).any()
+    assert np.isfinite(value[seen]).mean() > 0.9
+    assert np.nanmedian(np.abs(value)) < 0.01
 
 
 def test_stabilised_frames_of_a_rigid_patch_do_not_deviate(run: Run) -> None:

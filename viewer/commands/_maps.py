@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..files import whole_file
-from ..scan.points import PointCloud
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import frame_in_words
@@ -42,7 +41,7 @@ def written_maps(
             arrays: Mapping[str, NDArray[np.float32]] = {}
             try:
                 pose = timeline.pose(index)
-                arrays = _save(file, pose.cloud, measure(pose))
+                arrays = _save(file, pose, measure(pose))
             except InputError as error:
                 left_out[index] = error.what
                 file.unlink(missing_ok=True)  # that of an earlier run
@@ -58,13 +57,15 @@ def tell_left_out(timeline: Timeline, left_out: Mapping[int, str]) -> None:
         warn(f"{share}, such as {frame_in_words(index)}: {reason}")
 
 
-def _save(file: Path, cloud: PointCloud, arrays: Mapping[str, Float]) -> dict[str, NDArray[np.float32]]:
-    """Write values (N,) of the points of a cloud, as float32 in the order of its file; gives what is written.
+def _save(file: Path, pose: Pose, arrays: Mapping[str, Float]) -> dict[str, NDArray[np.float32]]:
+    """Write values (N,) of the points of a pose, as float32 in the order of its file; gives what is written.
 
-    A point that Scan4D has dropped has NaN.
+    Of range views, these are the values of all pixels. A point that Scan4D has left out has NaN.
     """
-    rows = slice(None) if cloud.ids is None else cloud.ids
-    ordered = {name: np.full(len(cloud) + cloud.dropped, np.nan, np.float32) for name in arrays}
+    cloud = pose.cloud
+    count = sum(view.depth.size for view in pose.views) or len(cloud) + cloud.dropped
+    rows = np.arange(len(cloud)) if cloud.ids is None else cloud.ids
+    ordered = {name: np.full(count, np.nan, np.float32) for name in arrays}
     for name, values in arrays.items():
         ordered[name][rows] = values
     with whole_file(file) as part, open(part, "wb") as stream:

@@ -175,4 +175,5 @@ def _tell(timeline: Timeline, known: Mapping[int, _Frame], reach: float) -> None
     tell(f"Scan4D looks up to {reach:.3g} {timeline.unit} away (--reach)")
     few = sum(frame.share < _FEW for frame in known.values())
     if few:
-        warn(f"Fewer than half of the points have a mirror image in {few} of {len(timeline)} frames")
+        share = f"in {few} of {len(timeline)} frames"
+        warn(f"Fewer than half of the points have a mirror image {share}. Name the subject with --region")
