@@ -29,8 +29,9 @@ def written_maps(
     files: Sequence[Path],
     measure: Callable[[Pose], Mapping[str, Float]],
     left_out: MutableMapping[int, str],
-) -> Iterator[tuple[int, Mapping[str, NDArray[np.float32]]]]:
-    """Measure each frame and write its values; gives the frame and the values, none where it is left out.
+) -> Iterator[tuple[int, Mapping[str, Float]]]:
+    """Measure each frame and write its values; gives the frame and the values of its points, none where it is
+    left out.
 
     left_out: gets the reason why a frame has no values, an InputError of reading or measuring.
     """
@@ -38,12 +39,13 @@ def written_maps(
         for index, file in enumerate(files):
             if index + 1 < len(timeline):
                 timeline.request(index + 1)
-            arrays: Mapping[str, NDArray[np.float32]] = {}
+            arrays: Mapping[str, Float] = {}
             try:
                 pose = timeline.pose(index)
-                arrays = _save(file, pose, measure(pose))
+                arrays = measure(pose)
+                _save(file, pose, arrays)
             except InputError as error:
-                left_out[index] = error.what
+                left_out[index], arrays = error.what, {}
                 file.unlink(missing_ok=True)  # that of an earlier run
             yield index, arrays
             tick()
@@ -57,8 +59,8 @@ def tell_left_out(timeline: Timeline, left_out: Mapping[int, str]) -> None:
         warn(f"{share}, such as {frame_in_words(index)}: {reason}")
 
 
-def _save(file: Path, pose: Pose, arrays: Mapping[str, Float]) -> dict[str, NDArray[np.float32]]:
-    """Write values (N,) of the points of a pose, as float32 in the order of its file; gives what is written.
+def _save(file: Path, pose: Pose, arrays: Mapping[str, Float]) -> None:
+    """Write values (N,) of the points of a pose, as float32 in the order of its file.
 
     Of range views, these are the values of all pixels. A point that Scan4D has left out has NaN.
     """
@@ -70,7 +72,6 @@ def _save(file: Path, pose: Pose, arrays: Mapping[str, Float]) -> dict[str, NDAr
         ordered[name][rows] = values
     with whole_file(file) as part, open(part, "wb") as stream:
         np.savez_compressed(stream, allow_pickle=False, **ordered)
-    return ordered
 
 
 def positive_length(text: str) -> float:

@@ -41,7 +41,7 @@ _TABLE, _REPORT, _PARTIAL = "deviation.csv", "report.json", "transforms.partial"
 _COLUMNS = ("frame", "time", "mean", "rms", "p95", "max", "share")
 _SURFACE, _M3C2 = "surface", "m3c2"
 _VALUE, _DETECTABLE, _DETECTED = "value", "detectable", ("detected",)
-_NONE = np.empty(0, np.float32)
+_NONE = np.empty(0)
 _FEW = 0.5  # of the points: a warning where fewer have a value
 
 
