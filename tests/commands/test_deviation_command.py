@@ -107,6 +107,7 @@ def test_m3c2_tells_the_least_that_it_detects(run: Run) -> None:
     words = ("deviation", "seq", "--unit", "mm", "--to", "seq", "--method", "m3c2", "--reach", "9")
     recorded = run(*words, "--cylinder", "3", "--whole-cylinder", "-o", "out")
     assert recorded.code == 0, recorded.err
+    assert "with radii of 3 (--cylinder) and" in recorded.out
     moved = np.load("out/0003.npz")
     assert moved["value"].dtype == moved["detectable"].dtype == np.float32
     assert table("out/deviation.csv")[0]["detected"] == "0.0"

@@ -18,6 +18,8 @@ from ._console import progress, warn
 
 Float = NDArray[np.float64]
 
+_FEW = 0.5  # of the points: a warning where fewer have a value
+
 
 def map_files(folder: Path, timeline: Timeline) -> list[Path]:
     """The file of each frame, counted from 1."""
@@ -49,6 +51,14 @@ def written_maps(
                 file.unlink(missing_ok=True)  # that of an earlier run
             yield index, arrays
             tick()
+
+
+def tell_few(shares: Sequence[float], has: str, hint: str = "") -> None:
+    """Warn where fewer than half of the points of a frame have a value. shares: of each frame that was
+    measured. has: what the points have, in words."""
+    few = sum(share < _FEW for share in shares)
+    if few:
+        warn(f"Fewer than half of the points have {has} in {few} of {len(shares)} frames{hint}")
 
 
 def tell_left_out(timeline: Timeline, left_out: Mapping[int, str]) -> None:

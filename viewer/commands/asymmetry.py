@@ -28,8 +28,8 @@ from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ..scan.times import frame_in_words
-from ._console import tell, warn
-from ._maps import map_files, positive_length, tell_left_out, written_maps
+from ._console import tell
+from ._maps import map_files, positive_length, tell_few, tell_left_out, written_maps
 from ._outputs import add_output_argument, claim
 from ._reference import StartOfMotion
 from ._rigid import RigidPart, rigid_part, tell_rigid
@@ -37,7 +37,6 @@ from ._scans import SCAN_HELP, open_timeline, report
 
 _TABLE, _REPORT, _PARTIAL = "asymmetry.csv", "report.json", "transforms.partial"
 _COLUMNS = ("frame", "time", "rms", "share", "nx", "ny", "nz", "d")
-_FEW = 0.5  # of the points: a warning where fewer have a value
 
 Float = NDArray[np.float64]
 
@@ -173,7 +172,5 @@ def _tell(timeline: Timeline, known: Mapping[int, _Frame], reach: float) -> None
         rms = f"{known[most].rms:.3g} {timeline.unit} RMS"
         tell(f"The asymmetry is largest in {frame_in_words(most)}: {rms}")
     tell(f"Scan4D looks up to {reach:.3g} {timeline.unit} away (--reach)")
-    few = sum(frame.share < _FEW for frame in known.values())
-    if few:
-        share = f"in {few} of {len(timeline)} frames"
-        warn(f"Fewer than half of the points have a mirror image {share}. Name the subject with --region")
+    shares = [frame.share for frame in known.values()]
+    tell_few(shares, "a mirror image", ". Name the subject with --region")

@@ -31,7 +31,7 @@ from ..scan.inputs import scan_inputs
 from ..scan.pose import Pose
 from ..scan.timeline import Timeline
 from ._console import tell, warn
-from ._maps import map_files, positive_length, tell_left_out, written_maps
+from ._maps import map_files, positive_length, tell_few, tell_left_out, written_maps
 from ._outputs import add_output_argument, claim
 from ._reference import StartOfMotion, check_unit
 from ._rigid import rigid_part, tell_rigid
@@ -42,7 +42,6 @@ _COLUMNS = ("frame", "time", "mean", "rms", "p95", "max", "share")
 _SURFACE, _M3C2 = "surface", "m3c2"
 _VALUE, _DETECTABLE, _DETECTED = "value", "detectable", ("detected",)
 _NONE = np.empty(0)
-_FEW = 0.5  # of the points: a warning where fewer have a value
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -223,9 +222,12 @@ def _tell(timeline: Timeline, compared: _Compared, shares: list[float], left_out
     if known:
         tell(f"On average, {np.mean(known):.1%} of the points lie above or below the reference surface")
     tell(f"Scan4D looks up to {compared.reach:.3g} {timeline.unit} away (--reach)")
-    few = sum(share < _FEW for share in known)
-    if few:
-        warn(f"Fewer than half of the points have a value in {few} of {len(shares)} frames")
+    tell_few(known, "a value")
+    if isinstance(compared.reference, M3C2Reference):
+        radii = (
+            f"{compared.reference.cylinder:.3g} (--cylinder) and {compared.reference.normal:.3g} (--normal)"
+        )
+        tell(f"M3C2 compares points, also those of a mesh, with radii of {radii} {timeline.unit}")
     if compared.reference.outside_by == ESTIMATED:
         warn("The reference has no normals. Scan4D estimates which side is outside")
     tell_left_out(timeline, left_out)

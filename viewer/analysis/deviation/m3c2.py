@@ -22,7 +22,7 @@ from .reference import sided
 Float = NDArray[np.float64]
 
 _CYLINDER = 2.5  # spacings, so that a cylinder holds about 20 points
-_NORMAL_NOISE = 12.5  # standard deviations of noise: half of the scale that the paper asks for (section 3.2)
+_NORMAL_NOISE = 12.5  # standard deviations of noise: half of the scale that the paper asks for
 _NORMAL = 3.0  # spacings, at least
 _TOLD = 1.96  # standard deviations
 
